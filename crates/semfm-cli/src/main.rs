@@ -1,0 +1,3 @@
+//! SemFM at the shell.
+
+fn main() {}

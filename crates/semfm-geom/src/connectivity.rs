@@ -1,0 +1,1 @@
+//! Edges, components, boundaries: how the triangles of a mesh hang together.

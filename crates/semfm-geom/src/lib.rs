@@ -1,0 +1,28 @@
+//! Meshes, Laplacians, eigenbases and spatial search: the ground floor of SemFM.
+//!
+//! Everything above this crate (views, functional maps, grasps) speaks in the types defined here:
+//! a [`Mesh`] is checked once at its door, a [`Laplacian`] is positive semidefinite with a lumped
+//! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
+//! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
+
+pub mod cloud;
+pub mod connectivity;
+pub mod eigenbasis;
+pub mod eigensolver;
+mod error;
+pub mod laplacian;
+pub mod math;
+pub mod mesh;
+pub mod nearest;
+pub mod sampling;
+pub mod shape;
+pub mod task;
+
+pub use cloud::SemanticCloud;
+pub use eigenbasis::Eigenbasis;
+pub use error::{Error, Result};
+pub use laplacian::Laplacian;
+pub use mesh::{Mesh, MeshHash};
+pub use nearest::PointIndex;
+pub use shape::{Shape, ShapeSettings};
+pub use task::Task;

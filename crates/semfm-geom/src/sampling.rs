@@ -1,0 +1,117 @@
+//! Points spread over a surface: uniform by area, or as far from each other as they can be.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::math::DVec3;
+use crate::{Error, Mesh, Result};
+
+/// One point on a mesh: where it is, on which triangle, and the triangle's unit normal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceSample {
+    /// Triangle id.
+    pub face: u32,
+    /// Position.
+    pub point: DVec3,
+    /// Unit normal of the triangle.
+    pub normal: DVec3,
+}
+
+/// `n` independent points, uniform by area (two uniforms per point, Osada et al. 2002, eq. 1).
+///
+/// The same seed gives the same points on every machine.
+///
+/// # Errors
+/// [`Error::NoArea`] where every triangle is degenerate.
+pub fn sample_uniform(mesh: &Mesh, n: usize, seed: u64) -> Result<Vec<SurfaceSample>> {
+    let mut total = 0.0;
+    let cumulative: Vec<f64> = (0..mesh.n_faces())
+        .map(|face| {
+            total += mesh.face_area(face);
+            total
+        })
+        .collect();
+    if !(total > 0.0 && total.is_finite()) {
+        return Err(Error::NoArea { n_faces: mesh.n_faces() });
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    Ok((0..n).map(|_| sample_one(mesh, &cumulative, &mut rng)).collect())
+}
+
+fn sample_one(mesh: &Mesh, cumulative: &[f64], rng: &mut impl Rng) -> SurfaceSample {
+    let total = cumulative[cumulative.len() - 1];
+    let pick = rng.random::<f64>() * total;
+    // The first face whose cumulative area exceeds the pick has area, so it has a normal.
+    let face = cumulative.partition_point(|&sum| sum <= pick).min(cumulative.len() - 1);
+    let [a, b, c] = mesh.corners(face);
+    let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
+    let point = (1.0 - u) * a + u * (1.0 - v) * b + u * v * c;
+    SurfaceSample { face: face as u32, point, normal: mesh.face_normal_scaled(face).normalize_or_zero() }
+}
+
+/// `n` farthest-point samples out of `6 n` area-uniform ones: near-even cover of the surface.
+///
+/// # Errors
+/// As [`sample_uniform`].
+pub fn sample_even(mesh: &Mesh, n: usize, seed: u64) -> Result<Vec<SurfaceSample>> {
+    let dense = sample_uniform(mesh, 6 * n, seed)?;
+    let points: Vec<DVec3> = dense.iter().map(|sample| sample.point).collect();
+    Ok(farthest_points(&points, n).into_iter().map(|i| dense[i as usize]).collect())
+}
+
+/// Ids of `n` points (all of them where there are fewer), each the farthest from those before it,
+/// starting with point 0 (Gonzalez 1985). Ties go to the lowest id.
+pub fn farthest_points(points: &[DVec3], n: usize) -> Vec<u32> {
+    let n = n.min(points.len());
+    let mut distance = vec![f64::INFINITY; points.len()];
+    let mut chosen = Vec::with_capacity(n);
+    let mut next = 0;
+    while chosen.len() < n {
+        chosen.push(next as u32);
+        let newest = points[next];
+        distance[next] = f64::NEG_INFINITY;
+        let mut farthest = f64::NEG_INFINITY;
+        for (i, (d, p)) in distance.iter_mut().zip(points).enumerate() {
+            *d = d.min(p.distance_squared(newest));
+            if *d > farthest {
+                (farthest, next) = (*d, i);
+            }
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_square() -> Mesh {
+        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        Mesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+    }
+
+    #[test]
+    fn uniform_samples_fill_a_square_evenly() {
+        let samples = sample_uniform(&unit_square(), 4000, 1).unwrap();
+        let left = samples.iter().filter(|s| s.point.x < 0.25).count();
+        assert!((900..1100).contains(&left), "a quarter of the area got {left} of 4000 samples");
+    }
+
+    #[test]
+    fn farthest_points_never_repeat_even_on_one_spot() {
+        let mut chosen = farthest_points(&[DVec3::ONE; 20], 12);
+        chosen.sort_unstable();
+        chosen.dedup();
+        assert_eq!(chosen.len(), 12);
+    }
+
+    #[test]
+    fn even_samples_keep_their_distance() {
+        let even = sample_even(&unit_square(), 100, 3).unwrap();
+        let closest = (0..100)
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .map(|(i, j)| even[i].point.distance(even[j].point))
+            .fold(f64::INFINITY, f64::min);
+        assert!(closest > 0.06, "two of 100 even samples are {closest} apart");
+    }
+}

@@ -1,0 +1,1 @@
+//! Roads through the built binary.

@@ -1,0 +1,3 @@
+//! One subcommand for each job of the CI.
+
+fn main() {}
