@@ -17,6 +17,8 @@ pub mod nearest;
 pub mod sampling;
 pub mod shape;
 pub mod task;
+#[cfg(any(test, feature = "zoo"))]
+pub mod zoo;
 
 pub use cloud::SemanticCloud;
 pub use eigenbasis::Eigenbasis;
