@@ -11,6 +11,7 @@ pub mod connectivity;
 pub mod eigenbasis;
 pub mod eigensolver;
 mod error;
+pub mod io;
 pub mod laplacian;
 pub mod math;
 pub mod mesh;
