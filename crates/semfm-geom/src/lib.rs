@@ -5,6 +5,7 @@
 //! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
 //! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
 
+pub mod clean;
 pub mod cloud;
 pub mod connectivity;
 pub mod eigenbasis;
@@ -16,6 +17,7 @@ pub mod mesh;
 pub mod nearest;
 pub mod sampling;
 pub mod shape;
+pub mod surface;
 pub mod task;
 
 pub use cloud::SemanticCloud;
@@ -25,4 +27,5 @@ pub use laplacian::Laplacian;
 pub use mesh::{Mesh, MeshHash};
 pub use nearest::PointIndex;
 pub use shape::{Shape, ShapeSettings};
+pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::Task;
