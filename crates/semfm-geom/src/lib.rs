@@ -7,6 +7,7 @@
 
 pub mod clean;
 pub mod cloud;
+mod collapse;
 pub mod connectivity;
 pub mod eigenbasis;
 pub mod eigensolver;
@@ -17,6 +18,7 @@ pub mod mesh;
 pub mod nearest;
 pub mod sampling;
 pub mod shape;
+pub mod simplify;
 pub mod surface;
 pub mod task;
 
