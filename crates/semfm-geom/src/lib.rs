@@ -6,7 +6,9 @@
 //! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
 
 pub mod cholesky;
+pub mod clean;
 pub mod cloud;
+mod collapse;
 pub mod connectivity;
 pub mod eigenbasis;
 pub mod eigensolver;
@@ -18,6 +20,8 @@ pub mod mesh;
 pub mod nearest;
 pub mod sampling;
 pub mod shape;
+pub mod simplify;
+pub mod surface;
 pub mod task;
 #[cfg(any(test, feature = "zoo"))]
 pub mod zoo;
@@ -29,4 +33,5 @@ pub use laplacian::Laplacian;
 pub use mesh::{Mesh, MeshHash};
 pub use nearest::PointIndex;
 pub use shape::{Shape, ShapeSettings};
+pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::Task;
