@@ -59,6 +59,15 @@ pub fn principal_frame(mesh: &Mesh) -> Result<DMat3> {
     })
 }
 
+/// Positions of the vertices that some triangle uses: strays must not shrink the object's pictures.
+pub(crate) fn surface_vertices(mesh: &Mesh) -> Vec<DVec3> {
+    let mut used = vec![false; mesh.n_vertices()];
+    for &id in mesh.faces().iter().flatten() {
+        used[id as usize] = true;
+    }
+    mesh.vertices().iter().zip(used).filter_map(|(&p, used)| used.then_some(p)).collect()
+}
+
 fn area_and_centroid(mesh: &Mesh) -> (f64, DVec3) {
     let (low, _) = mesh.bounds();
     let mut area = 0.0;

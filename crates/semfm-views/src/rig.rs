@@ -4,7 +4,7 @@ use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 
 use crate::camera::MAX_IMAGE_SIDE;
-use crate::frame::principal_frame;
+use crate::frame::{principal_frame, surface_vertices};
 use crate::{Camera, Error, Result};
 
 /// The camera stands so that the bounding sphere fits its view with this much to spare.
@@ -103,9 +103,9 @@ pub fn rig(mesh: &Mesh, settings: &RigSettings) -> Result<Vec<Camera>> {
     settings.check()?;
     let frame = principal_frame(mesh)?;
     let frame = if settings.principal_frame { frame } else { DMat3::IDENTITY };
-    let (centre, radius) = bounding_sphere_in(mesh, frame);
+    let object = Extent::new(mesh, frame);
     fibonacci_directions(settings.count)
-        .map(|direction| fitted(mesh, frame, centre, radius, direction, settings))
+        .map(|direction| object.camera(direction, settings))
         .collect()
 }
 
@@ -129,8 +129,8 @@ pub fn camera_towards(
     let frame =
         DMat3::from_cols(up.any_orthonormal_vector().cross(up), up.any_orthonormal_vector(), up);
     let frame = frame.transpose();
-    let (centre, radius) = bounding_sphere_in(mesh, frame);
-    fitted(mesh, frame, centre, radius, frame * direction, settings)
+    let object = Extent::new(mesh, frame);
+    object.camera(frame * direction, settings)
 }
 
 /// `count` unit vectors spread evenly over the sphere along a golden-angle spiral, from +z down to
@@ -146,60 +146,64 @@ pub fn fibonacci_directions(count: usize) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// Centre (object's frame) of the bounding box taken in `frame`, and the distance to the farthest
-/// vertex.
-fn bounding_sphere_in(mesh: &Mesh, frame: DMat3) -> (DVec3, f64) {
-    let infinite = DVec3::INFINITY;
-    let (low, high) = mesh
-        .vertices()
-        .iter()
-        .map(|&p| frame * p)
-        .fold((infinite, -infinite), |(low, high), p| (low.min(p), high.max(p)));
-    let centre = frame.transpose() * ((low + high) / 2.0);
-    let radius = mesh.vertices().iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
-    (centre, radius)
-}
-
-/// The camera in direction `direction` (in `frame`, whose z is up) that frames the silhouette.
-fn fitted(
-    mesh: &Mesh,
+/// What a camera must frame: the surface's vertices and their bounding sphere, in a frame whose z
+/// is up.
+struct Extent {
+    vertices: Vec<DVec3>,
     frame: DMat3,
+    /// Centre of the bounding box along the frame's axes.
     centre: DVec3,
     radius: f64,
-    direction: DVec3,
-    settings: &RigSettings,
-) -> Result<Camera> {
-    // Rows of the rotation: image right, image down, and forward, away from the direction.
-    let right = DVec3::Z.cross(direction).try_normalize().unwrap_or(DVec3::X);
-    let up = direction.cross(right);
-    let camera_from_frame = DMat3::from_cols(right, -up, -direction).transpose();
-    let distance = STAND_OFF * radius / (settings.field_of_view / 2.0).sin();
-    let rotation = camera_from_frame * frame;
-    let translation = DVec3::Z * distance - rotation * centre;
-    let camera_from_object = DAffine3::from_mat3_translation(rotation, translation);
+}
 
-    let (mut low, mut high) = (DVec3::INFINITY, -DVec3::INFINITY);
-    for &p in mesh.vertices() {
-        let p = camera_from_object.transform_point3(p);
-        let slope = p / p.z; // (x/z, y/z, 1)
-        (low, high) = (low.min(slope), high.max(slope));
+impl Extent {
+    fn new(mesh: &Mesh, frame: DMat3) -> Self {
+        let vertices = surface_vertices(mesh);
+        let (low, high) = vertices
+            .iter()
+            .map(|&p| frame * p)
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            });
+        let centre = frame.transpose() * ((low + high) / 2.0);
+        let radius = vertices.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        Self { vertices, frame, centre, radius }
     }
-    let half = ((high - low) / 2.0).truncate().max_element();
-    let sphere = radius / distance;
-    let side = f64::from(settings.size);
-    let focal = settings.fill * side / 2.0 / half.max(sphere / settings.max_zoom);
-    let middle = (low + high) / 2.0;
-    let camera = Camera {
-        width: settings.size,
-        height: settings.size,
-        fx: focal,
-        fy: focal,
-        cx: side / 2.0 - focal * middle.x,
-        cy: side / 2.0 - focal * middle.y,
-        camera_from_object,
-    };
-    camera.check("fitted camera")?;
-    Ok(camera)
+
+    /// The camera in direction `direction` (in the frame) that frames the silhouette.
+    fn camera(&self, direction: DVec3, settings: &RigSettings) -> Result<Camera> {
+        // Rows of the rotation: image right, image down, and forward, away from the direction.
+        let right = DVec3::Z.cross(direction).try_normalize().unwrap_or(DVec3::X);
+        let up = direction.cross(right);
+        let camera_from_frame = DMat3::from_cols(right, -up, -direction).transpose();
+        let rotation = camera_from_frame * self.frame;
+        let distance = STAND_OFF * self.radius / (settings.field_of_view / 2.0).sin();
+        let translation = DVec3::Z * distance - rotation * self.centre;
+        let camera_from_object = DAffine3::from_mat3_translation(rotation, translation);
+
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &p in &self.vertices {
+            let p = camera_from_object.transform_point3(p);
+            let slope = p / p.z; // (x/z, y/z, 1)
+            (low, high) = (low.min(slope), high.max(slope));
+        }
+        let half = ((high - low) / 2.0).truncate().max_element();
+        let half_of_sphere = self.radius / distance;
+        let side = f64::from(settings.size);
+        let focal = settings.fill * side / 2.0 / half.max(half_of_sphere / settings.max_zoom);
+        let middle = (low + high) / 2.0;
+        let camera = Camera {
+            width: settings.size,
+            height: settings.size,
+            fx: focal,
+            fy: focal,
+            cx: side / 2.0 - focal * middle.x,
+            cy: side / 2.0 - focal * middle.y,
+            camera_from_object,
+        };
+        camera.check("fitted camera")?;
+        Ok(camera)
+    }
 }
 
 #[cfg(test)]

@@ -9,9 +9,11 @@ mod nearest_seen;
 mod pull;
 mod unproject;
 
+use semfm_geom::math::bounds;
 use semfm_geom::sampling::{SurfaceSample, sample_even, sample_uniform};
 use semfm_geom::{Mesh, SemanticCloud, Task};
 
+use crate::frame::surface_vertices;
 use crate::{EmbeddedView, Error, Result};
 
 /// How image features reach the surface samples.
@@ -127,13 +129,18 @@ pub fn lift(
         LiftRule::Pull { .. } => sample_even(mesh, settings.n_samples, settings.seed)?,
         LiftRule::Unproject { .. } => sample_uniform(mesh, settings.n_samples, settings.seed)?,
     };
+    // Both rules measure in the size of the surface, whatever stray vertices the mesh holds.
+    let vertices = surface_vertices(mesh);
+    let (low, high) = bounds(&vertices).expect("a mesh has a triangle, and that has corners");
     let features = match settings.rule {
         LiftRule::Pull { depth_tolerance } => {
-            let tolerance = depth_tolerance * mesh.bounding_sphere().1;
-            pull::pull(mesh, &samples, views, dim, tolerance, task)?
+            let centre = (low + high) / 2.0;
+            let radius = vertices.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+            pull::pull(mesh, &samples, views, dim, depth_tolerance * radius, task)?
         }
         LiftRule::Unproject { radius } => {
-            unproject::unproject(mesh, &samples, views, dim, radius * mesh.diagonal(), task)?
+            let epsilon = radius * low.distance(high);
+            unproject::unproject(mesh, &samples, views, dim, epsilon, task)?
         }
     };
     let report = LiftReport {
