@@ -18,7 +18,7 @@ use semfm_geom::{Mesh, Task};
 pub use shade::{CornerNormals, Paint};
 
 use crate::{Camera, Error, Result, View};
-use raster::{BACKGROUND, Raster};
+use raster::Raster;
 use triangle::Projection;
 
 /// Samples of one z-buffer: larger pictures are drawn in bands of rows, which bounds the memory.
@@ -171,10 +171,8 @@ fn trace(
     triangles: &mut [i32],
 ) {
     let raster = Raster::new(projection, 1, rows);
-    for (depth, &inverse) in depth.iter_mut().zip(&raster.inverse_depth) {
-        *depth = 1.0 / inverse; // +∞ on the background
-    }
-    for (triangle, &id) in triangles.iter_mut().zip(&raster.triangles) {
-        *triangle = if id == BACKGROUND { -1 } else { id as i32 };
+    for ((depth, triangle), hit) in depth.iter_mut().zip(triangles).zip(raster.hits) {
+        *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
+        *triangle = hit.face().map_or(-1, |face| face as i32);
     }
 }

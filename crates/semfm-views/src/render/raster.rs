@@ -2,26 +2,45 @@
 
 use std::ops::Range;
 
-use super::triangle::{Projection, TriangleForms};
+use super::triangle::{LinearForm, Projection, TriangleForms};
 
-/// Marks a sample that sees no triangle.
-pub(crate) const BACKGROUND: u32 = u32::MAX;
+/// The nearest triangle at a sample: bits of 1/z (f32, not negative, so they sort as it does) above
+/// the complement of the triangle's id. The larger of two hits is the nearer one, or the one with
+/// the lower id, whatever the order of drawing.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Hit(u64);
 
-/// Nearest triangle and 1/z for a band of rows of a grid of samples, row-major.
+impl Hit {
+    /// Endlessly far: also what triangles beyond f32's range come to.
+    const NONE: Self = Self(0);
+
+    fn new(inverse_depth: f32, face: u32) -> Self {
+        Self(u64::from(inverse_depth.to_bits()) << 32 | u64::from(!face))
+    }
+
+    /// 1/z (relative precision 6e-8), 0 on the background.
+    pub fn inverse_depth(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    /// Triangle id, `None` on the background.
+    pub fn face(self) -> Option<u32> {
+        (self.inverse_depth() > 0.0).then_some(!self.0 as u32)
+    }
+}
+
+/// Nearest triangle for a band of rows of a grid of samples.
 ///
 /// The grid has `per_pixel` samples along each side of a pixel; sample (i, j) looks through pixel
-/// position ((i + ½)/per_pixel, (j + ½)/per_pixel). Of triangles at the same f32 depth the one with
-/// the lowest id wins.
+/// position ((i + ½)/per_pixel, (j + ½)/per_pixel).
 pub(crate) struct Raster {
     pub per_pixel: u32,
     /// Samples in a row.
     pub width: usize,
     /// Rows of the grid that this band covers.
     pub rows: Range<usize>,
-    /// 1/z in f32 (relative precision 6e-8), 0 on the background.
-    pub inverse_depth: Vec<f32>,
-    /// Triangle ids, [`BACKGROUND`] where there is none.
-    pub triangles: Vec<u32>,
+    /// What each sample sees (rows × width), row-major.
+    pub hits: Vec<Hit>,
 }
 
 impl Raster {
@@ -29,13 +48,7 @@ impl Raster {
     pub fn new(projection: &Projection<'_>, per_pixel: u32, rows: Range<usize>) -> Self {
         let width = projection.camera.width as usize * per_pixel as usize;
         let n_samples = width * rows.len();
-        let mut raster = Self {
-            per_pixel,
-            width,
-            rows,
-            inverse_depth: vec![0.0; n_samples],
-            triangles: vec![BACKGROUND; n_samples],
-        };
+        let mut raster = Self { per_pixel, width, rows, hits: vec![Hit::NONE; n_samples] };
         for face in 0..projection.mesh.n_faces() {
             let bounds = projection.pixel_box(face);
             let columns = raster.samples_in(bounds.low[0], bounds.high[0], 0..width);
@@ -59,10 +72,9 @@ impl Raster {
     /// Grid rows or columns whose positions lie within [low, high], clipped to `allowed`.
     fn samples_in(&self, low: f64, high: f64, allowed: Range<usize>) -> Range<usize> {
         let per_pixel = f64::from(self.per_pixel);
-        // `as` saturates, and takes NaN to 0: an endless box is the whole range, an empty one none.
-        let start = (low * per_pixel - 0.5).ceil() as usize;
-        let end = (high * per_pixel + 0.5).floor() as usize;
-        start.max(allowed.start)..end.min(allowed.end)
+        // `as` saturates: an endless box is the whole range, an empty one none.
+        let end = (high * per_pixel + 0.5).max(0.0) as i32 as usize;
+        ceil(low * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
     }
 
     fn draw(
@@ -73,42 +85,79 @@ impl Raster {
         rows: Range<usize>,
     ) {
         let per_pixel = f64::from(self.per_pixel);
+        let edges = forms.weights.map(|weight| Edge::new(weight, per_pixel));
         let [lowest, highest] = forms.bounds;
         let slope = forms.inverse_depth.du / per_pixel;
         for row in rows {
             let v = self.position(row);
-            let Some(span) = self.span(forms, v, &columns) else { continue };
+            let span = span(&edges, v, &columns);
+            if span.is_empty() {
+                continue;
+            }
             let start = forms.inverse_depth.row(v) + forms.inverse_depth.du * 0.5 / per_pixel;
+            let mut column = span.start as f64;
             let first = (row - self.rows.start) * self.width;
-            let depths = &mut self.inverse_depth[first..][span.clone()];
-            let ids = &mut self.triangles[first..][span.clone()];
-            for ((column, depth), id) in span.zip(depths).zip(ids) {
-                let inverse = (start + slope * column as f64).clamp(lowest, highest) as f32;
-                if inverse > *depth {
-                    (*depth, *id) = (inverse, face);
-                }
+            for hit in &mut self.hits[first..][span] {
+                let inverse = at_least(lowest, at_most(highest, start + slope * column)) as f32;
+                *hit = (*hit).max(Hit::new(inverse, face));
+                column += 1.0;
             }
         }
     }
+}
 
-    /// Columns of a row that lie inside all three edges: each edge bounds them from one side.
-    fn span(&self, forms: &TriangleForms, v: f64, columns: &Range<usize>) -> Option<Range<usize>> {
-        let per_pixel = f64::from(self.per_pixel);
-        let (mut low, mut high) = (columns.start as f64, columns.end as f64 - 1.0);
-        for weight in &forms.weights {
-            let row = weight.row(v);
-            // Two triangles at a shared edge compute the same quotient: one takes the columns up
-            // to it, the other those from it on.
-            let crossing = -row / weight.du * per_pixel - 0.5;
-            if weight.du > 0.0 {
-                low = low.max(crossing);
-            } else if weight.du < 0.0 {
-                high = high.min(crossing);
-            } else if row < 0.0 {
-                return None;
-            }
-        }
-        let (start, end) = (low.ceil() as usize, high.floor() + 1.0);
-        (end > 0.0 && start < end as usize).then_some(start..end as usize)
+/// The border of a half-plane, made ready to be cut with many rows without branching.
+#[derive(Clone, Copy)]
+struct Edge {
+    weight: LinearForm,
+    /// Grid columns to the crossing, per unit of the form's value at the row's start.
+    columns_per_value: f64,
+    /// From the crossing to the bound that this edge sets: half a column back to the sample's own
+    /// index on the side that it bounds, endlessly far on the other.
+    to_low: f64,
+    to_high: f64,
+}
+
+impl Edge {
+    fn new(weight: LinearForm, per_pixel: f64) -> Self {
+        let (far, half) = (f64::INFINITY, -0.5);
+        let (to_low, to_high) = if weight.du < 0.0 { (-far, half) } else { (half, far) };
+        // A level edge crosses at −∞ above zero and at +∞ below: all of the row, or nothing.
+        let du = if weight.du == 0.0 { 0.0 } else { weight.du };
+        Self { weight, columns_per_value: -per_pixel / du, to_low, to_high }
     }
+}
+
+/// Columns of the row at `v` that lie inside all three edges: each bounds them from one side.
+///
+/// Two triangles compute the same crossing for the edge they share, so one takes the columns up to
+/// it and the other those from it on.
+fn span(edges: &[Edge; 3], v: f64, columns: &Range<usize>) -> Range<usize> {
+    let (mut low, mut high) = (columns.start as f64, columns.end as f64 - 1.0);
+    for edge in edges {
+        let crossing = edge.weight.row(v) * edge.columns_per_value;
+        let (from, to) = (crossing + edge.to_low, crossing + edge.to_high);
+        // ∞ − ∞ and 0 · ∞, on a level edge, bound nothing.
+        low = at_least(low, from);
+        high = at_most(high, to);
+    }
+    // Within the columns, so the casts neither saturate nor see a negative number.
+    if low <= high { ceil(low)..high as i32 as usize + 1 } else { 0..0 }
+}
+
+/// The larger number, `low` where the other is NaN: one instruction, unlike `f64::max`.
+fn at_least(low: f64, x: f64) -> f64 {
+    if x > low { x } else { low }
+}
+
+/// The smaller number, `high` where the other is NaN.
+fn at_most(high: f64, x: f64) -> f64 {
+    if x < high { x } else { high }
+}
+
+/// Smallest index that is not below `x`; 0 for anything negative or NaN. (`f64::ceil` is a call
+/// on processors without SSE 4.1, and casts to `usize` are slow on x86.)
+fn ceil(x: f64) -> usize {
+    let below = x.max(0.0) as i32;
+    below as usize + usize::from(f64::from(below) < x)
 }

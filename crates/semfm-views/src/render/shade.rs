@@ -7,7 +7,7 @@ use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
 use super::RenderSettings;
-use super::raster::{BACKGROUND, Raster};
+use super::raster::{Hit, Raster};
 use super::triangle::Projection;
 use crate::{Error, Result};
 
@@ -117,13 +117,13 @@ impl<'a> Shader<'a> {
         let per_pixel = self.settings.supersampling as usize;
         let grid_rows = rows.start * per_pixel..rows.end * per_pixel;
         let raster = Raster::new(self.projection, self.settings.supersampling, grid_rows.clone());
-        let mut ids = raster.triangles.chunks_exact(raster.width).zip(grid_rows);
+        let mut grid = raster.hits.chunks_exact(raster.width).zip(grid_rows);
         let mut sums = vec![[0f32; 3]; raster.width / per_pixel];
         let share = 255.0 / (per_pixel * per_pixel) as f32;
         for pixels in rgb.chunks_exact_mut(sums.len() * 3) {
             sums.fill([0.0; 3]);
-            for (ids, row) in ids.by_ref().take(per_pixel) {
-                self.add_row(&raster, ids, raster.position(row), &mut sums);
+            for (hits, row) in grid.by_ref().take(per_pixel) {
+                self.add_row(&raster, hits, raster.position(row), &mut sums);
             }
             for (byte, sum) in pixels.iter_mut().zip(sums.as_flattened()) {
                 *byte = (sum * share + 0.5) as u8; // saturates
@@ -133,20 +133,19 @@ impl<'a> Shader<'a> {
 
     /// Adds the colours of one row of samples at height `v` to the sums of its pixels. Neighbours
     /// mostly see the same triangle, so its forms are made once per run.
-    fn add_row(&self, raster: &Raster, ids: &[u32], v: f64, sums: &mut [[f32; 3]]) {
+    fn add_row(&self, raster: &Raster, hits: &[Hit], v: f64, sums: &mut [[f32; 3]]) {
         let mut column = 0;
-        for run in ids.chunk_by(|a, b| a == b) {
+        for run in hits.chunk_by(|a, b| a.face() == b.face()) {
             let columns = column..column + run.len();
             column = columns.end;
             let mut add = |column: usize, colour: [f32; 3]| {
                 let sum = &mut sums[column / raster.per_pixel as usize];
                 *sum = [0, 1, 2].map(|k| sum[k] + colour[k]);
             };
-            let face = run[0] as usize;
-            if run[0] == BACKGROUND {
+            let Some(face) = run[0].face().map(|face| face as usize) else {
                 columns.for_each(|column| add(column, self.settings.background));
                 continue;
-            }
+            };
             let Some(forms) = self.projection.forms(face) else { continue };
             let light = self.brightness(face);
             let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
