@@ -44,3 +44,13 @@ pub enum Error {
         source: std::io::Error,
     },
 }
+
+impl Error {
+    pub(crate) fn invalid(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
+    }
+}
