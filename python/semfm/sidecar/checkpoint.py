@@ -23,7 +23,7 @@ from .errors import SidecarError, expected
 _INSTALL = "needs torch and transformers: pip install 'semfm[embed]'"
 _CONFIGS = ["config.json", "preprocessor_config.json", "processor_config.json"]
 _WEIGHTS = ["*.safetensors", "*.safetensors.index.json"]
-_HUB_NAME = re.compile(r"[\w.-]+(/[\w.-]+)?")
+_HUB_NAME = re.compile(r"\w[\w.-]*(/\w[\w.-]*)?")
 
 
 @dataclass(frozen=True)
