@@ -80,12 +80,13 @@ def test_cameras_and_poses_are_copied_byte_for_byte(tmp_path, views):
     assert len(copies(views)) == 6 and copies(tmp_path / "e.mcap") == copies(views)
 
 
-def test_the_same_input_gives_the_same_bytes(tmp_path, views):
+def test_the_same_bytes_at_every_thread_and_batch_count(tmp_path, views):
     written = []
-    for name in ("a.mcap", "b.mcap"):
-        embed_file(views, tmp_path / name, open_encoder(str(write_encoder(tmp_path))))
-        written.append((tmp_path / name).read_bytes())
-    assert written[0] == written[1]
+    for threads, batch in ((1, 1), (3, 2), (2, 14)):
+        encoder = open_encoder(str(write_encoder(tmp_path)), threads=threads)
+        embed_file(views, tmp_path / "e.mcap", encoder, EmbedSettings(batch=batch))
+        written.append((tmp_path / "e.mcap").read_bytes())
+    assert written[0] == written[1] == written[2]
 
 
 def test_a_picture_of_another_size_is_resized_and_the_grid_still_covers_it(tmp_path):
