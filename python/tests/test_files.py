@@ -31,7 +31,7 @@ def two_views(path: Path, **kwargs) -> Path:
 @pytest.mark.parametrize("compression", CompressionType)
 def test_a_views_file_reads_back(tmp_path, compression):
     views = read_views(two_views(tmp_path / "v.mcap", compression=compression))
-    assert views.size == (24, 32) and views.metadata == METADATA
+    assert views.size == (24, 32) and views.metadata.items() > METADATA.items()
     assert [view.frame_id for view in views.views] == ["view_000", "view_001"]
     np.testing.assert_array_equal(views.views[1].rgb, asymmetric_picture(24, 32, 8, 1))
     np.testing.assert_array_equal(views.views[0].on_object, disc(24, 32))
@@ -127,6 +127,9 @@ def test_a_foreign_file_is_refused_with_the_reason(tmp_path, change, reason):
 def test_metadata_and_existence_are_asked_for(tmp_path):
     with pytest.raises(SidecarError, match="a views file"):
         read_views(two_views(tmp_path / "v.mcap", metadata=None))
+    for wrong in ({"format": "semfm.embeddings/1"}, {"n_views": "3"}, {"width": "33"}):
+        with pytest.raises(SidecarError, match=f"metadata {next(iter(wrong))}"):
+            read_views(two_views(tmp_path / "v.mcap", metadata={**METADATA, **wrong}))
     with pytest.raises(SidecarError, match="No such file"):
         read_views(tmp_path / "nowhere.mcap")
 

@@ -162,7 +162,7 @@ def test_the_command_writes_the_same_embeddings_twice(checkpoints, tmp_path, cap
     (message,) = topics["/views/002/embeddings"]
     assert tokens(message).shape == (4, 4, 32)
     assert (message.x0, message.y0, message.x1, message.y1) == (4, 4, 60, 60)
-    assert metadata["encoder"] == "dinov2" and metadata["encoder_revision"].startswith("sha256:")
+    assert metadata["encoder"] == "dinov2" and metadata["revision"].startswith("sha256:")
     assert json.loads(metadata["preprocessing"])["crop_size"]["height"] == 56
 
 

@@ -14,7 +14,14 @@ from mcap.writer import CompressionType
 from mcap_protobuf.writer import Writer
 from PIL import Image
 
-METADATA = {"format": "semfm.views/1", "mesh_hash": "blake3:00", "seed": "7"}
+METADATA = {
+    "format": "semfm.views/1",
+    "mesh_hash": f"blake3:{0:064}",
+    "n_vertices": "8",
+    "n_triangles": "12",
+    "rig": "by hand",
+    "seed": "7",
+}
 
 
 def png(rgb: np.ndarray) -> bytes:
@@ -57,7 +64,8 @@ def write_views(
 ) -> Path:
     """A views file of pictures (height × width × 3) and masks (height × width).
 
-    ``change`` may edit the list of (topic, message) before it is written.
+    ``change`` may edit the list of (topic, message) before it is written. Number and size of the
+    views are added to ``metadata`` where it does not say otherwise.
     """
     messages = []
     for i, (rgb, mask) in enumerate(zip(pictures, masks)):
@@ -66,7 +74,9 @@ def write_views(
         for n, (topic, message) in enumerate(change(messages)):
             writer.write_message(topic, message, log_time=1000 + n, publish_time=2000 + n)
         if metadata is not None:
-            writer._writer.add_metadata("semfm", metadata)
+            height, width = masks[0].shape
+            counts = {"n_views": str(len(masks)), "width": str(width), "height": str(height)}
+            writer._writer.add_metadata("semfm", {**counts, **metadata})
     return path
 
 

@@ -9,7 +9,7 @@ from typing import Callable, Iterator
 import numpy as np
 
 from .coverage import patch_coverage
-from .embeddings_file import DTYPES, EmbeddedView, write_embeddings
+from .embeddings_file import DTYPES, EMBEDDINGS_FORMAT, EmbeddedView, write_embeddings
 from .encoder import Encoder
 from .errors import SidecarError, expected
 from .patches import OUTLIER_RATIO, ROLLS, embed_pictures
@@ -98,10 +98,11 @@ def _metadata(file: ViewsFile, encoder: Encoder, settings: EmbedSettings) -> dic
     """The views' own metadata and how the embeddings were made."""
     return {
         **file.metadata,
+        "format": EMBEDDINGS_FORMAT,
         "encoder": encoder.name,
-        "encoder_revision": encoder.revision,
+        "revision": encoder.revision,
         "preprocessing": encoder.preprocessing,
-        "rolls": ",".join(str(90 * turn) for turn in ROLLS[settings.rolls]),
+        "rolls": str(settings.rolls),
         "outliers": f"dropped per roll where raw norm > {OUTLIER_RATIO:g} x the grid's median",
         "normalisation": "L2 per output and roll, concatenated, mean of the valid rolls",
         "dtype": settings.dtype,

@@ -17,6 +17,9 @@ from .errors import SidecarError
 from .mcap_reader import Message
 from .views_file import METADATA_NAME, ViewRecord
 
+#: The ``format`` entry of an embeddings file's metadata.
+EMBEDDINGS_FORMAT = "semfm.embeddings/1"
+
 #: Numbers per dtype name, little-endian as the schema says.
 DTYPES = {"f16": "<f2", "f32": "<f4"}
 

@@ -146,8 +146,8 @@ class OnnxEncoder:
         }
         self.preprocessing = json.dumps(settings)
         # input = rgb · scale + offset, per channel
-        self._scale = np.float32(1 / 255) / np.float32(description.std)
-        self._offset = -np.float32(description.mean) / np.float32(description.std)
+        mean, std = (np.asarray(x, np.float32) for x in (description.mean, description.std))
+        self._scale, self._offset = np.float32(1 / 255) / std, -mean / std
 
     def grid(self, height: int, width: int) -> Grid:
         """Tokens tile the whole picture."""

@@ -21,8 +21,9 @@ from . import schemas
 from .errors import expected
 from .mcap_reader import McapFile, Message, read_mcap
 
-#: Name of our metadata record.
+#: Name of our metadata record, and its ``format`` entry in a views file.
 METADATA_NAME = "semfm"
+VIEWS_FORMAT = "semfm.views/1"
 _TOPIC = re.compile(r"/views/(\d{3,})/(image|camera|triangles)")
 _SCHEMAS = {
     "image": ("foxglove.CompressedImage", schemas.CompressedImage),
@@ -87,6 +88,10 @@ def read_views(path: str | os.PathLike[str]) -> ViewsFile:
     sizes = {view.rgb.shape[:2] for view in views}
     if len(sizes) > 1:
         raise expected(name, "images", "one size", ", ".join(f"{w}×{h}" for h, w in sorted(sizes)))
+    (height, width), n_views = views[0].rgb.shape[:2], len(views)
+    for key, value in (("n_views", n_views), ("width", width), ("height", height)):
+        if metadata.get(key) != str(value):
+            raise expected(name, f"metadata {key}", value, repr(metadata.get(key)))
     return ViewsFile(name, views, metadata)
 
 
@@ -94,6 +99,8 @@ def _metadata(path: str, file: McapFile) -> dict[str, str]:
     found = [pairs for name, pairs in file.metadata if name == METADATA_NAME]
     if len(found) != 1:
         raise expected(path, "metadata", f"one record '{METADATA_NAME}' (a views file)", len(found))
+    if (form := found[0].get("format")) != VIEWS_FORMAT:
+        raise expected(path, "metadata format", f"'{VIEWS_FORMAT}'", repr(form))
     return found[0]
 
 
