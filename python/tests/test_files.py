@@ -15,12 +15,11 @@ from foxglove_schemas_protobuf import (
     RawImage_pb2,
 )
 from mcap.writer import CompressionType
-from views_builder import METADATA, asymmetric_picture, disc, png, write_views
-
 from semfm.sidecar import schemas
 from semfm.sidecar.errors import SidecarError
 from semfm.sidecar.mcap_reader import read_mcap
 from semfm.sidecar.views_file import read_views
+from views_builder import METADATA, asymmetric_picture, disc, png, write_views
 
 
 def two_views(path: Path, **kwargs) -> Path:
@@ -104,7 +103,10 @@ def drop(*topics: str):
         (drop("/tf"), "pose of view_000"),
         (drop("/views/001/camera"), "/views/001/camera"),
         (drop("/views/001/triangles"), "/views/001/triangles"),
-        (drop(*(f"/views/000/{k}" for k in ("image", "camera", "depth", "triangles"))), "/views/000"),
+        (
+            drop(*(f"/views/000/{k}" for k in ("image", "camera", "depth", "triangles"))),
+            "/views/000",
+        ),
         (lambda messages: [], "no views"),
         (lambda messages: messages + messages[:1], "a second one"),
         (edit("/views/000/image", format="jpeg"), "format png"),

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from emb_reader import per_patch, read_embeddings, tokens
 from mcap.reader import make_reader
-from tiny_onnx import foretold, write_encoder
-from views_builder import METADATA, asymmetric_picture, disc, write_views
-
 from semfm.sidecar import EmbedSettings, SidecarError, embed_file, open_encoder
 from semfm.sidecar.cli import main
 from semfm.sidecar.onnx_encoder import read_description
+from tiny_onnx import foretold, write_encoder
+from views_builder import METADATA, asymmetric_picture, disc, write_views
 
 pytest.importorskip("onnxruntime")
 
@@ -98,9 +97,13 @@ def test_a_picture_of_another_size_is_resized_and_the_grid_still_covers_it(tmp_p
     assert (message.x0, message.y0, message.x1, message.y1) == (0, 0, 54, 36)
     small = asymmetric_picture(32, 48, 8)  # the same colours
     found, wanted = tokens(message).reshape(-1, 7), foretold(small).reshape(-1, 7)
-    cosines = (found * wanted).sum(1) / np.linalg.norm(found, axis=1) / np.linalg.norm(wanted, axis=1)
+    cosines = (
+        (found * wanted).sum(1) / np.linalg.norm(found, axis=1) / np.linalg.norm(wanted, axis=1)
+    )
     assert (message.rows, message.cols) == (4, 6)
-    assert np.median(cosines) > 0.98 and np.argmax(found @ wanted.T, axis=1).tolist() == list(range(24))
+    assert np.median(cosines) > 0.98 and np.argmax(found @ wanted.T, axis=1).tolist() == list(
+        range(24)
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from views_builder import asymmetric_picture, disc
-
 from semfm.sidecar.coverage import patch_coverage
 from semfm.sidecar.encoder import Grid
 from semfm.sidecar.errors import SidecarError
 from semfm.sidecar.patches import OUTLIER_RATIO, ROLLS, embed_pictures, is_outlier, unit_tokens
 from semfm.sidecar.token_grid import processed_grid
+from views_builder import asymmetric_picture, disc
 
 
 class ColourEncoder:

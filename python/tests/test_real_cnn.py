@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from views_builder import disc
-
 from semfm.sidecar import open_encoder
 from semfm.sidecar.patches import ROLLS, embed_pictures
+from views_builder import disc
 
 pytest.importorskip("onnxruntime")
 

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from emb_reader import read_embeddings, tokens
 from PIL import Image
-from views_builder import asymmetric_picture, disc, write_views
-
 from semfm.sidecar import SidecarError, open_encoder
 from semfm.sidecar.cli import main
 from semfm.sidecar.patches import ROLLS, embed_pictures, unit_tokens
+from views_builder import asymmetric_picture, disc, write_views
 
 pytestmark = pytest.mark.full
 

@@ -57,7 +57,9 @@ class Checkpoint:
         try:
             return AutoImageProcessor.from_pretrained(self.folder, local_files_only=True)
         except (OSError, ValueError, KeyError, TypeError, ImportError) as error:
-            raise expected(self.name, "preprocessor_config.json", "an image processor", error) from error
+            raise expected(
+                self.name, "preprocessor_config.json", "an image processor", error
+            ) from error
 
     def model(self, class_name: str) -> Any:
         """The network as a transformers class, in float32, ready to run.

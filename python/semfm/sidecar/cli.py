@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 import time
-from typing import Sequence
+from collections.abc import Sequence
 
 from .. import __version__
 from .embed import EmbedSettings, embed_file
@@ -53,7 +53,11 @@ def parser() -> argparse.ArgumentParser:
     run = p.add_argument_group("how it runs")
     run.add_argument("--device", choices=DEVICES, default="auto", help="default %(default)s")
     run.add_argument(
-        "--batch", type=int, default=settings.batch, metavar="N", help="pictures at once (%(default)s)"
+        "--batch",
+        type=int,
+        default=settings.batch,
+        metavar="N",
+        help="pictures at once (%(default)s)",
     )
     run.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
     run.add_argument(

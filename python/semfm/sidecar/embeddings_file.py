@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import IO, Iterable, Iterator
+from typing import IO
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
@@ -14,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from . import schemas
 from .encoder import Grid
 from .errors import SidecarError
-from .mcap_reader import Message
+from .mcap_records import Message
 from .views_file import METADATA_NAME, ViewRecord
 
 #: The ``format`` entry of an embeddings file's metadata.
@@ -57,7 +58,7 @@ def write_embeddings(
         ``f16`` or ``f32``.
     """
     with _replacing(path) as file:
-        # Tensors of this kind do not compress (lz4 saves nothing, zstd 8 % at a third of the speed).
+        # Such tensors do not compress: lz4 saves nothing, zstd 8 % at a third of the speed.
         writer = Writer(file, compression=CompressionType.NONE, enable_data_crcs=True)
         writer.start(profile="", library="semfm-embed")
         writer.add_metadata(METADATA_NAME, metadata)

@@ -11,71 +11,50 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from io import BytesIO
-from typing import Iterator
 
 from .errors import SidecarError, expected
+from .mcap_records import (
+    ATTACHMENT,
+    ATTACHMENT_INDEX,
+    CHANNEL,
+    CHUNK,
+    CHUNK_INDEX,
+    DATA_END,
+    FOOTER,
+    HEADER,
+    MESSAGE,
+    MESSAGE_INDEX,
+    METADATA,
+    METADATA_INDEX,
+    SCHEMA,
+    STATISTICS,
+    SUMMARY_OFFSET,
+    Body,
+    Channel,
+    McapFile,
+    Message,
+    Schema,
+)
 
 MAGIC = b"\x89MCAP0\r\n"
 #: Views files hold a few MB; nothing sound of ours comes near these.
 MAX_FILE_BYTES = 4 << 30
 MAX_CHUNK_BYTES = 256 << 20
 
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
-ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(
-    9, 16
-)
 _IN_DATA = {SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA, DATA_END}
 _IN_CHUNK = {SCHEMA, CHANNEL, MESSAGE}
 _IN_SUMMARY = {
-    SCHEMA, CHANNEL, CHUNK_INDEX, ATTACHMENT_INDEX, STATISTICS, METADATA_INDEX, SUMMARY_OFFSET, FOOTER
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Schema:
-    """A schema record."""
-
-    id: int
-    name: str
-    encoding: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A channel record with its schema looked up (``None`` for schema id 0)."""
-
-    id: int
-    topic: str
-    encoding: str
-    schema: Schema | None
-    metadata: dict[str, str]
-
-
-@dataclass(frozen=True)
-class Message:
-    """A message with its channel; times in nanoseconds as recorded."""
-
-    channel: Channel
-    sequence: int
-    log_time: int
-    publish_time: int
-    data: bytes
-
-
-@dataclass
-class McapFile:
-    """All that a sound file holds, in file order."""
-
-    profile: str = ""
-    messages: list[Message] = field(default_factory=list)
-    metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    n_attachments: int = 0
-    n_chunks: int = 0
+    SCHEMA,
+    CHANNEL,
+    CHUNK_INDEX,
+    ATTACHMENT_INDEX,
+    STATISTICS,
+    METADATA_INDEX,
+    SUMMARY_OFFSET,
+    FOOTER,
+}
 
 
 def read_mcap(path: str | os.PathLike[str]) -> McapFile:
@@ -102,54 +81,6 @@ def read_mcap(path: str | os.PathLike[str]) -> McapFile:
     return _Reader(os.fspath(path), data).read()
 
 
-class _Body:
-    """A cursor over one record's bytes that never runs past their end."""
-
-    def __init__(self, data: memoryview, path: str, place: str) -> None:
-        self.data, self.path, self.place, self.at = data, path, place, 0
-
-    def take(self, n: int) -> memoryview:
-        left = len(self.data) - self.at
-        if n > left:
-            raise expected(self.path, self.place, f"{n} more bytes in the record", left)
-        self.at += n
-        return self.data[self.at - n : self.at]
-
-    def _number(self, code: str) -> int:
-        return struct.unpack("<" + code, self.take(struct.calcsize("<" + code)))[0]
-
-    def u16(self) -> int:
-        return self._number("H")
-
-    def u32(self) -> int:
-        return self._number("I")
-
-    def u64(self) -> int:
-        return self._number("Q")
-
-    def rest(self) -> memoryview:
-        return self.take(len(self.data) - self.at)
-
-    def text(self) -> str:
-        try:
-            return str(self.take(self.u32()), "utf-8")
-        except UnicodeDecodeError as error:
-            raise expected(self.path, self.place, "UTF-8 text", error.reason) from error
-
-    def part(self) -> _Body:
-        """The bytes of a length-prefixed array or map, as a cursor of their own."""
-        return _Body(self.take(self.u32()), self.path, self.place)
-
-    def pairs(self) -> dict[str, str]:
-        part, found = self.part(), {}
-        while part.at < len(part.data):
-            key = part.text()
-            if key in found:
-                raise expected(self.path, self.place, "each map key once", f"'{key}' twice")
-            found[key] = part.text()
-        return found
-
-
 class _Reader:
     """One pass over a file, then the checks of what its summary says about it."""
 
@@ -157,7 +88,9 @@ class _Reader:
         self.path, self.data = path, memoryview(data)
         self.file = McapFile()
         self.records: dict[int, tuple[int, int]] = {}  # offset -> (opcode, length with its prefix)
-        self.chunk_messages: dict[int, tuple[int, int]] = {}  # of the last chunk: offset -> (channel, time)
+        self.chunk_messages: dict[
+            int, tuple[int, int]
+        ] = {}  # of the last chunk: offset -> (channel, time)
         self.chunk_sizes: dict[int, tuple[str, int, int]] = {}
         self.counts: dict[int, int] = {}
 
@@ -167,9 +100,11 @@ class _Reader:
             found = "an empty file" if n == 0 else repr(bytes(data[:8]))
             raise expected(self.path, "byte 0", "the MCAP magic", found)
         if n < 16 or bytes(data[-8:]) != MAGIC:
-            raise expected(self.path, "end of file", "the MCAP magic", "something else (truncated?)")
+            raise expected(
+                self.path, "end of file", "the MCAP magic", "something else (truncated?)"
+            )
         records = self._records(data, 8, n - 8, "")
-        offset, opcode, body = next(records, (8, 0, _Body(data[:0], self.path, "byte 8")))
+        offset, opcode, body = next(records, (8, 0, Body(data[:0], self.path, "byte 8")))
         if opcode != HEADER:
             raise expected(self.path, "byte 8", "a header record", f"opcode {opcode:#04x}")
         self.file.profile = body.text()
@@ -180,7 +115,7 @@ class _Reader:
 
     def _records(
         self, data: memoryview, start: int, end: int, within: str
-    ) -> Iterator[tuple[int, int, _Body]]:
+    ) -> Iterator[tuple[int, int, Body]]:
         """Offset, opcode and body of each record in data[start:end]."""
         at = start
         while at < end:
@@ -190,16 +125,19 @@ class _Reader:
             opcode, length = struct.unpack_from("<BQ", data, at)
             if length > end - at - 9:
                 raise expected(
-                    self.path, place, f"{length} bytes of opcode {opcode:#04x}", f"{end - at - 9} left"
+                    self.path,
+                    place,
+                    f"{length} bytes of opcode {opcode:#04x}",
+                    f"{end - at - 9} left",
                 )
             if opcode == 0:
                 raise expected(self.path, place, "an opcode from 1", 0)
             if not within:
                 self.records[at] = (opcode, 9 + length)
-            yield at, opcode, _Body(data[at + 9 : at + 9 + length], self.path, place)
+            yield at, opcode, Body(data[at + 9 : at + 9 + length], self.path, place)
             at += 9 + length
 
-    def _data_section(self, records: Iterator[tuple[int, int, _Body]]) -> int:
+    def _data_section(self, records: Iterator[tuple[int, int, Body]]) -> int:
         """Read up to DataEnd; its offset's end, where the summary begins."""
         for offset, opcode, body in records:
             if opcode == DATA_END:
@@ -230,7 +168,7 @@ class _Reader:
         if saved and saved != (found := zlib.crc32(data)):
             raise expected(self.path, place, f"CRC {saved:#010x}", f"{found:#010x}")
 
-    def _content(self, opcode: int, body: _Body) -> None:
+    def _content(self, opcode: int, body: Body) -> None:
         if opcode == SCHEMA:
             schema = Schema(body.u16(), body.text(), body.text(), bytes(body.take(body.u32())))
             if schema.id == 0:
@@ -239,7 +177,9 @@ class _Reader:
         elif opcode == CHANNEL:
             id, schema_id = body.u16(), body.u16()
             if schema_id and schema_id not in self.file.schemas:
-                raise expected(self.path, body.place, f"schema {schema_id} before its channel", "none")
+                raise expected(
+                    self.path, body.place, f"schema {schema_id} before its channel", "none"
+                )
             schema_or_none = self.file.schemas.get(schema_id)
             channel = Channel(id, body.text(), body.text(), schema_or_none, body.pairs())
             self._once(self.file.channels, channel, body.place, "channel")
@@ -257,12 +197,14 @@ class _Reader:
         if known.setdefault(item.id, item) != item:
             raise expected(self.path, place, f"{kind} {item.id} as declared before", "another one")
 
-    def _chunk(self, offset: int, body: _Body) -> None:
+    def _chunk(self, offset: int, body: Body) -> None:
         body.u64(), body.u64()  # first and last log time
         size, crc, compression = body.u64(), body.u32(), body.text()
         packed = body.take(body.u64())
         if size > MAX_CHUNK_BYTES:
-            raise expected(self.path, body.place, f"a chunk of at most {MAX_CHUNK_BYTES} bytes", size)
+            raise expected(
+                self.path, body.place, f"a chunk of at most {MAX_CHUNK_BYTES} bytes", size
+            )
         data = self._unpack(compression, packed, size, body.place)
         if len(data) != size:
             raise expected(self.path, body.place, f"{size} bytes when unpacked", len(data))
@@ -298,7 +240,7 @@ class _Reader:
             raise expected(self.path, place, f"sound {compression} data", error) from error
         raise expected(self.path, place, "compression lz4, zstd or none", repr(compression))
 
-    def _message_index(self, body: _Body) -> None:
+    def _message_index(self, body: Body) -> None:
         id, part = body.u16(), body.part()
         while part.at < len(part.data):
             time, at = part.u64(), part.u64()
@@ -306,14 +248,14 @@ class _Reader:
                 wanted = f"a message of channel {id} at byte {at} of the chunk before"
                 raise expected(self.path, body.place, wanted, "none")
 
-    def _attachment(self, body: _Body) -> None:
+    def _attachment(self, body: Body) -> None:
         body.u64(), body.u64(), body.text(), body.text()
         body.take(body.u64())
         covered = body.data[: body.at]
         self._crc(body.place, body.u32(), covered)
         self.file.n_attachments += 1
 
-    def _summary(self, records: Iterator[tuple[int, int, _Body]], start: int) -> None:
+    def _summary(self, records: Iterator[tuple[int, int, Body]], start: int) -> None:
         footer_at, has_more = start, False
         offset_start = None
         for offset, opcode, body in records:
@@ -335,26 +277,32 @@ class _Reader:
         else:
             raise expected(self.path, "end of file", "a footer record", "none (truncated?)")
         if (extra := next(records, None)) is not None:
-            raise expected(self.path, f"byte {footer_at}", "the footer last", f"more at byte {extra[0]}")
+            raise expected(
+                self.path, f"byte {footer_at}", "the footer last", f"more at byte {extra[0]}"
+            )
 
     def _footer(
-        self, at: int, start: int, has_more: bool, offset_start: int | None, body: _Body
+        self, at: int, start: int, has_more: bool, offset_start: int | None, body: Body
     ) -> None:
         summary_start, summary_offset_start, crc = body.u64(), body.u64(), body.u32()
         if summary_start != (start if has_more else 0):
             raise expected(self.path, body.place, f"summary at byte {start}", summary_start)
         if summary_offset_start and not start <= summary_offset_start <= at:
-            raise expected(self.path, body.place, "the summary offsets' start", summary_offset_start)
+            raise expected(
+                self.path, body.place, "the summary offsets' start", summary_offset_start
+            )
         if offset_start is not None and summary_offset_start not in (0, offset_start):
-            raise expected(self.path, body.place, f"offsets at {offset_start}", summary_offset_start)
+            raise expected(
+                self.path, body.place, f"offsets at {offset_start}", summary_offset_start
+            )
         # The CRC covers the summary and the footer up to the CRC itself.
         self._crc(body.place, crc, self.data[start : at + 9 + 16])
 
-    def _repeated(self, opcode: int, body: _Body) -> None:
+    def _repeated(self, opcode: int, body: Body) -> None:
         """The summary repeats what the data section declared."""
         self._content(opcode, body)
 
-    def _statistics(self, body: _Body) -> None:
+    def _statistics(self, body: Body) -> None:
         found = (body.u64(), body.u16(), body.u32(), body.u32(), body.u32(), body.u32())
         file = self.file
         wanted = (
@@ -376,7 +324,7 @@ class _Reader:
                 wanted_count = f"{self.counts.get(id, 0)} messages on channel {id}"
                 raise expected(self.path, body.place, wanted_count, count)
 
-    def _index(self, opcode: int, body: _Body) -> None:
+    def _index(self, opcode: int, body: Body) -> None:
         """An index must point at a record of its kind, with its length."""
         if opcode == SUMMARY_OFFSET:
             group, at, length = body.take(1)[0], body.u64(), body.u64()
@@ -396,7 +344,7 @@ class _Reader:
         if opcode == CHUNK_INDEX:
             self._chunk_index(at, body)
 
-    def _chunk_index(self, at: int, body: _Body) -> None:
+    def _chunk_index(self, at: int, body: Body) -> None:
         part = body.part()
         while part.at < len(part.data):
             id, index_at = part.u16(), part.u64()

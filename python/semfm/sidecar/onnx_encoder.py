@@ -163,7 +163,9 @@ class OnnxEncoder:
             batch = np.ascontiguousarray(batch.transpose(0, 3, 1, 2))
         grid = (height // description.patch, width // description.patch)
         parts = [batch] if self._pool is None else [batch[i : i + 1] for i in range(len(batch))]
-        ran = list(map(self._run, parts) if self._pool is None else self._pool.map(self._run, parts))
+        ran = list(
+            map(self._run, parts) if self._pool is None else self._pool.map(self._run, parts)
+        )
         outputs = [np.concatenate(arrays) for arrays in zip(*ran)]
         return [self._tokens(n, o, grid) for n, o in zip(description.outputs, outputs)]
 
@@ -226,7 +228,9 @@ def _open_session(description: OnnxDescription, device: str) -> tuple[Any, bytes
             description.onnx, options, providers=[*gpu, "CPUExecutionProvider"]
         )
     except Exception as error:  # onnxruntime's own family, derived from Exception
-        raise expected(description.onnx, "model", "a network onnxruntime can load", error) from error
+        raise expected(
+            description.onnx, "model", "a network onnxruntime can load", error
+        ) from error
     inputs = [i.name for i in session.get_inputs()]
     if inputs != [description.input]:
         raise expected(description.onnx, "inputs", f"one, '{description.input}'", inputs)

@@ -12,8 +12,8 @@ it is divided away.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Sequence
 
 import numpy as np
 
@@ -24,14 +24,17 @@ from .errors import SidecarError, expected
 ROLLS = {1: (0,), 2: (0, 2), 4: (0, 1, 2, 3)}
 
 #: A token is an outlier when its raw norm passes this multiple of its grid's median.
-#: Plain tokens of a convolutional network (MobileNetV2, object on white) reach 3.5 times the median,
-#: so 4 is too near; the outliers worth dropping are the ones that reach 15.
+#: Plain tokens of a convolutional network (MobileNetV2, objects on white) reach 3.5 times the
+#: median, so 4 is too near; the outliers worth dropping are the ones that reach 15.
 OUTLIER_RATIO = 5.0
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Embeddings of a batch of pictures: data (n × rows × cols × d) float32, valid (n × rows × cols)."""
+    """Embeddings of a batch of pictures.
+
+    ``data`` is (n × rows × cols × d) float32, ``valid`` (n × rows × cols) bool.
+    """
 
     grid: Grid
     data: np.ndarray
@@ -100,5 +103,5 @@ def unit_tokens(outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def is_outlier(norms: np.ndarray) -> np.ndarray:
-    """Which raw norms (n × rows × cols) pass :data:`OUTLIER_RATIO` times their own grid's median."""
+    """Which raw norms (n × rows × cols) pass :data:`OUTLIER_RATIO` times their grid's median."""
     return norms > OUTLIER_RATIO * np.median(norms, axis=(1, 2), keepdims=True)

@@ -119,6 +119,6 @@ PATCH_EMBEDDINGS = "semfm.PatchEmbeddings"
 
 
 def patch_embeddings_schema() -> bytes:
-    """The schema record's data for ``semfm.PatchEmbeddings``: a FileDescriptorSet, self-contained."""
+    """The schema record's data for ``semfm.PatchEmbeddings``: a whole FileDescriptorSet."""
     files = descriptor_pb2.FileDescriptorSet(file=[_timestamp_file(), _file(PATCH_EMBEDDINGS)])
     return files.SerializeToString(deterministic=True)

@@ -19,7 +19,8 @@ from PIL import Image
 
 from . import schemas
 from .errors import expected
-from .mcap_reader import McapFile, Message, read_mcap
+from .mcap_reader import read_mcap
+from .mcap_records import McapFile, Message
 
 #: Name of our metadata record, and its ``format`` entry in a views file.
 METADATA_NAME = "semfm"
