@@ -8,9 +8,11 @@
 pub mod camera;
 pub mod embeddings;
 mod error;
+#[cfg(feature = "mcap")]
+pub mod mcap;
 pub mod view;
 
 pub use camera::Camera;
 pub use embeddings::{EmbeddedView, PatchEmbeddings};
-pub use error::{Error, Result};
+pub use error::{Error, Fault, Result};
 pub use view::View;
