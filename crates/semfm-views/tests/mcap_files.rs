@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use foxglove::Decode;
 use foxglove::bytes::Bytes;
 use foxglove::messages::{CameraCalibration, FrameTransform};
 use prost::Message as _;
@@ -335,15 +334,12 @@ fn missing_and_bent_cameras_are_refused() {
     let no_grid = refusal(|topic, _, data| (topic != "/views/000/embeddings").then_some(data));
     assert!(no_grid.to_string().contains("expected 2 views"), "{no_grid}");
     let twice = refusal(|topic, index, data| {
-        let mut data = FrameTransform::decode(&data[..])
-            .ok()
-            .filter(|_| (topic, index) == ("/tf", 1))
-            .map(|mut transform| {
-                transform.child_frame_id = "view_000".to_owned();
-                transform.encode_to_vec()
-            })
-            .unwrap_or(data);
-        Some(std::mem::take(&mut data))
+        if (topic, index) != ("/tf", 1) {
+            return Some(data);
+        }
+        let mut transform = FrameTransform::decode(&data[..]).unwrap();
+        transform.child_frame_id = "view_000".to_owned();
+        Some(transform.encode_to_vec())
     });
     assert!(twice.to_string().contains("topic /tf, message 1: expected one message"), "{twice}");
     let scaled = refusal(|topic, index, data| {

@@ -102,9 +102,10 @@ struct Summary<'a> {
 
 impl<'a> Summary<'a> {
     fn record(&mut self, contents: &mut Contents, record: &Record<'a>) -> Result<()> {
+        let is_split = self.groups.iter().any(|group| group.0 == record.opcode);
         match self.groups.last_mut() {
             Some((opcode, _, end)) if *opcode == record.opcode => *end = record.end(),
-            _ if self.groups.iter().any(|group| group.0 == record.opcode) => {
+            _ if is_split => {
                 return Err(record.misplaced("the summary grouped by kinds of records"));
             }
             _ => self.groups.push((record.opcode, record.place.offset, record.end())),
