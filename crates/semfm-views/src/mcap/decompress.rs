@@ -45,7 +45,7 @@ pub(super) fn decompress<'a>(
         return Ok(stored);
     }
     let limit =
-        file_bytes.saturating_mul(CHUNK_PER_FILE_BYTE).max(CHUNK_BYTES).min(CHUNK_BYTES_AT_MOST);
+        file_bytes.saturating_mul(CHUNK_PER_FILE_BYTE).clamp(CHUNK_BYTES, CHUNK_BYTES_AT_MOST);
     let length = usize::try_from(size).ok().filter(|&length| length <= limit).ok_or_else(|| {
         place.error(Fault::OverLimit, format!("at most {limit} bytes decompressed"), size)
     })?;

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::reader::{Contents, check_crc, declare};
-use super::record::{Place, Record, Records, opcode};
+use super::record::{Fields, HEAD, Place, Record, Records, opcode};
 use crate::{Fault, Result};
 
 /// Where the data section's records lie.
@@ -58,6 +58,7 @@ pub(super) fn check<'a>(
     records: &mut Records<'a>,
     data_end: usize,
 ) -> Result<()> {
+    check_summary_crc(records, data_end)?;
     let n_declared = [contents.schemas.len(), contents.channels.len()];
     let mut summary =
         Summary { layout, statistics: Vec::new(), groups: Vec::new(), indexed: BTreeMap::new() };
@@ -77,8 +78,10 @@ pub(super) fn check<'a>(
             _ => summary.record(contents, &record)?,
         }
     };
-    if let Some(extra) = records.next()? {
-        return Err(extra.misplaced("nothing behind the Footer"));
+    let n_behind = records.bytes.len() - footer.end();
+    if n_behind > 0 {
+        let expected = "the magic bytes and the end of the file behind it";
+        return Err(footer.place.error(Fault::Length, expected, format!("{n_behind} bytes more")));
     }
     summary.check_complete(footer.place)?;
     for record in &summary.statistics {
@@ -87,8 +90,11 @@ pub(super) fn check<'a>(
     for record in &offsets {
         summary.check_group(record)?;
     }
-    check_footer(&footer, data_end, offsets.first(), records.bytes)
+    check_footer(&footer, data_end, offsets.first())
 }
+
+/// Two offsets and a checksum: the specification promises that the footer will not grow.
+const FOOTER_BYTES: usize = 8 + 8 + 4;
 
 /// What the summary has said so far.
 struct Summary<'a> {
@@ -318,14 +324,13 @@ fn check_footer(
     footer: &Record<'_>,
     data_end: usize,
     first_offset: Option<&Record<'_>>,
-    bytes: &[u8],
 ) -> Result<()> {
     let place = footer.place;
-    if footer.body.len() != 20 {
+    if footer.body.len() != FOOTER_BYTES {
         return Err(place.error(Fault::Length, "20 bytes", footer.body.len()));
     }
     let mut fields = footer.fields();
-    let (summary_start, offset_start, crc) = (fields.u64()?, fields.u64()?, fields.u32()?);
+    let (summary_start, offset_start) = (fields.u64()?, fields.u64()?);
     let footer_start = place.offset;
     let summary_end = first_offset.map_or(footer_start, |record| record.place.offset);
     let check = |what, found: u64, expected: usize, may_be_zero: bool| {
@@ -336,7 +341,20 @@ fn check_footer(
         Err(place.error(Fault::Offset, expected, format!("byte {found}")))
     };
     check("the summary section", summary_start, data_end, summary_end == data_end)?;
-    check("the summary offsets", offset_start, summary_end, first_offset.is_none())?;
-    // From the summary's start through the footer's second field.
-    check_crc(crc, &bytes[data_end..footer_start + super::record::HEAD + 16], place)
+    check("the summary offsets", offset_start, summary_end, first_offset.is_none())
+}
+
+/// The checksum of the summary and of the footer's first two fields, compared before the summary is
+/// read: a flipped bit should be called that. The footer has the same length in every file, so its
+/// place is known; whether it really stands there is seen later.
+fn check_summary_crc(records: &Records<'_>, data_end: usize) -> Result<()> {
+    let footer_start = records.bytes.len().saturating_sub(HEAD + FOOTER_BYTES).max(data_end);
+    let mut tail = Records { at: footer_start, ..*records };
+    let Ok(Some(footer)) = tail.next() else { return Ok(()) };
+    if footer.opcode != opcode::FOOTER || footer.body.len() != FOOTER_BYTES {
+        return Ok(());
+    }
+    let (covered, crc) = records.bytes[data_end..].split_at(records.bytes.len() - 4 - data_end);
+    let mut crc = Fields { bytes: crc, place: footer.place };
+    check_crc(crc.u32()?, covered, footer.place)
 }

@@ -263,7 +263,7 @@ fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<
     }
     let n_pixels = width as usize * height as usize;
     let lengths = [rendered.rgb.len() / 3, rendered.depth.len(), rendered.triangles.len()];
-    if rendered.rgb.len() % 3 != 0 || lengths != [n_pixels; 3] {
+    if !rendered.rgb.len().is_multiple_of(3) || lengths != [n_pixels; 3] {
         let expected = format!("{n_pixels} pixels in rgb, depth and triangles");
         return Err(invalid(what, expected, format!("{lengths:?}")));
     }
