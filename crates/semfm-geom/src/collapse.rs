@@ -145,8 +145,8 @@ impl State {
         let faces = &self.faces_of[id as usize];
         let start = ring.iter().find(|&&(_, count)| count == 1).unwrap_or(&ring[0]).0;
         let (mut at, mut last, mut reached) = (start, usize::MAX, 0);
-        while let Some(next) = (0..faces.len())
-            .find(|&k| k != last && self.faces[faces[k] as usize].contains(&at))
+        while let Some(next) =
+            (0..faces.len()).find(|&k| k != last && self.faces[faces[k] as usize].contains(&at))
         {
             reached += 1;
             last = next;

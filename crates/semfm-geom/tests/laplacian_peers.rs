@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use semfm_geom::Mesh;
 use semfm_geom::laplacian::{
     CloudSettings, Laplacian, TuftedSettings, point_cloud_laplacian, tufted_laplacian,
 };
-use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
 const MESHES: [&str; 9] = [
@@ -24,7 +24,9 @@ const MESHES: [&str; 9] = [
 
 fn array(fixture: &str, name: &str) -> Vec<f64> {
     let path: PathBuf =
-        [env!("CARGO_MANIFEST_DIR"), "tests/fixtures/laplacian", fixture, &format!("{name}.npy")].iter().collect();
+        [env!("CARGO_MANIFEST_DIR"), "tests/fixtures/laplacian", fixture, &format!("{name}.npy")]
+            .iter()
+            .collect();
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap()
 }
@@ -79,6 +81,9 @@ fn point_cloud_laplacians_are_close_to_robust_laplacian() {
     for name in ["cloud_ball", "cloud_open_sheet"] {
         let ours = point_cloud_laplacian(&points(name), &CloudSettings::default()).unwrap();
         let (stiffness, mass) = differences(&ours, name);
-        assert!(stiffness < 1e-9 && mass < 1e-9, "{name}: stiffness {stiffness:.1e}, mass {mass:.1e}");
+        assert!(
+            stiffness < 1e-9 && mass < 1e-9,
+            "{name}: stiffness {stiffness:.1e}, mass {mass:.1e}"
+        );
     }
 }

@@ -8,9 +8,9 @@ use semfm_geom::simplify::{SimplifySettings, simplify};
 use semfm_geom::{Mesh, Task, math::DVec3};
 
 fn shared() -> Option<PathBuf> {
-    let root = std::env::var_os("SEMFM_SHARED").map(PathBuf::from).unwrap_or_else(|| {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared")
-    });
+    let root = std::env::var_os("SEMFM_SHARED")
+        .map(PathBuf::from)
+        .unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"));
     let found = root.join("data/objects").is_dir();
     if !found {
         eprintln!("SKIPPED: no real objects under {}", root.display());
@@ -30,8 +30,9 @@ fn read_obj(path: &Path) -> Mesh {
                 vertices.push(DVec3::new(x[0], x[1], x[2]));
             }
             Some("f") => {
-                let ids: Vec<u32> =
-                    words.map(|w| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect();
+                let ids: Vec<u32> = words
+                    .map(|w| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1)
+                    .collect();
                 faces.extend((2..ids.len()).map(|k| [ids[0], ids[k - 1], ids[k]]));
             }
             _ => {}
@@ -87,9 +88,20 @@ fn survey() {
         eprintln!(
             "   {} -> {} ({} tries, {ms} ms) hausdorff {:.4} components {} -> {} euler {} -> {}; \
              quality median {:.2} -> {:.2}, bad {:.3} -> {:.3}, area cv {:.2} -> {:.2}",
-            r.n_vertices_before, r.n_vertices, r.attempts, r.distance,
-            r.topology_before.n_components, r.topology.n_components,
-            r.topology_before.euler, r.topology.euler, a.0, b.0, a.1, b.1, a.2, b.2
+            r.n_vertices_before,
+            r.n_vertices,
+            r.attempts,
+            r.distance,
+            r.topology_before.n_components,
+            r.topology.n_components,
+            r.topology_before.euler,
+            r.topology.euler,
+            a.0,
+            b.0,
+            a.1,
+            b.1,
+            a.2,
+            b.2
         );
     }
 }

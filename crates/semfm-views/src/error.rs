@@ -76,10 +76,12 @@ impl Error {
         found: impl Into<String>,
     ) -> Self {
         Self::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
+    }
+
     /// A short name of the kind of failure, for programs.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Geom(_) => "geometry",
+            Self::Geom(cause) => cause.code(),
             Self::Invalid { .. } => "invalid",
             Self::Format { .. } => "format",
             Self::Container { fault, .. } => fault.code(),
@@ -93,7 +95,7 @@ impl Error {
         match self {
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format { place, .. } | Self::Container { place, .. } => Some(place.clone()),
-            Self::Geom(semfm_geom::Error::Format { place, .. }) => Some(place.clone()),
+            Self::Geom(cause) => cause.place(),
             _ => None,
         }
     }

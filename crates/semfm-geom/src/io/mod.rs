@@ -64,7 +64,8 @@ impl MeshFormat {
     /// The format that the first bytes of a file show; OBJ and binary STL show none.
     fn from_content(bytes: &[u8]) -> Option<Self> {
         let text = bytes.trim_ascii_start();
-        let is_off = || text.split(|b| !b.is_ascii_uppercase()).next().is_some_and(|w| w.ends_with(b"OFF"));
+        let is_off =
+            || text.split(|b| !b.is_ascii_uppercase()).next().is_some_and(|w| w.ends_with(b"OFF"));
         match text {
             _ if bytes.starts_with(b"glTF") => Some(Self::Glb),
             _ if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") => Some(Self::Ply),

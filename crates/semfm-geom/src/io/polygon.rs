@@ -108,12 +108,12 @@ impl PolygonCutter {
     fn flatten_if_concave(&mut self, corners: &[DVec3]) -> bool {
         let origin = corners[0];
         let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
-        let normal: DVec3 =
-            (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
         let Some(normal) = normal.try_normalize() else { return false };
         let (x, y) = normal.any_orthonormal_pair();
         self.flat.clear();
-        self.flat.extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
+        self.flat
+            .extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
         let n = self.flat.len();
         (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < 0.0)
     }
@@ -192,7 +192,8 @@ mod tests {
 
     #[test]
     fn repeated_corners_still_give_two_less_than_corners() {
-        let corners = polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
+        let corners =
+            polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
         assert_eq!(PolygonCutter::default().cut(&corners).len(), 4);
     }
 }

@@ -40,7 +40,11 @@ pub fn tufted_laplacian(mesh: &Mesh, settings: &TuftedSettings) -> Result<Laplac
 }
 
 /// As [`tufted_laplacian`], for triangles that each name three different vertices.
-pub(super) fn tufted_of_soup(points: &[DVec3], faces: &[[u32; 3]], mollify_factor: f64) -> Result<Laplacian> {
+pub(super) fn tufted_of_soup(
+    points: &[DVec3],
+    faces: &[[u32; 3]],
+    mollify_factor: f64,
+) -> Result<Laplacian> {
     if !(mollify_factor >= 0.0 && mollify_factor.is_finite()) {
         let (what, expected) = ("mollify_factor", "a number of mean edges, 0 or more".into());
         return Err(Error::OutOfRange { what, expected, found: mollify_factor.to_string() });
@@ -67,11 +71,19 @@ mod tests {
     #[test]
     fn on_a_delaunay_mesh_it_is_the_cotangent_laplacian() {
         let sphere = zoo::icosphere(3);
-        let (tufted, cotan) =
-            (tufted_laplacian(&sphere, &TuftedSettings::default()).unwrap(), cotan_laplacian(&sphere).unwrap());
+        let (tufted, cotan) = (
+            tufted_laplacian(&sphere, &TuftedSettings::default()).unwrap(),
+            cotan_laplacian(&sphere).unwrap(),
+        );
         for t in cotan.stiffness.triplet_iter() {
             let other = tufted.stiffness.get(t.row, t.col).copied().unwrap_or(0.0);
-            assert!((t.val - other).abs() < 1e-12, "({}, {}): {} against {other}", t.row, t.col, t.val);
+            assert!(
+                (t.val - other).abs() < 1e-12,
+                "({}, {}): {} against {other}",
+                t.row,
+                t.col,
+                t.val
+            );
         }
     }
 
@@ -93,6 +105,9 @@ mod tests {
         let line = Mesh::new(vec![DVec3::ZERO, DVec3::X], vec![[0, 1, 1]]).unwrap();
         assert!(matches!(tufted_laplacian(&line, &settings), Err(Error::NoArea { .. })));
         let bad = TuftedSettings { mollify_factor: f64::NAN };
-        assert!(matches!(tufted_laplacian(&zoo::tetrahedron(), &bad), Err(Error::OutOfRange { .. })));
+        assert!(matches!(
+            tufted_laplacian(&zoo::tetrahedron(), &bad),
+            Err(Error::OutOfRange { .. })
+        ));
     }
 }
