@@ -8,9 +8,11 @@
 pub mod cholesky;
 pub mod cloud;
 pub mod connectivity;
+pub mod descriptors;
 pub mod eigenbasis;
 pub mod eigensolver;
 mod error;
+pub mod geodesic;
 pub mod laplacian;
 pub mod math;
 pub mod mesh;
