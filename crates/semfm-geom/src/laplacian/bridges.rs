@@ -170,7 +170,7 @@ fn find(parent: &mut [u32], mut i: u32) -> u32 {
 
 /// Labels of the connected pieces of a stiffness matrix (n), numbered by their first vertex, and
 /// how many there are.
-pub(super) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> (Vec<u32>, usize) {
+pub(crate) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> (Vec<u32>, usize) {
     let mut parent: Vec<u32> = (0..n as u32).collect();
     for t in stiffness.triplet_iter().filter(|t| t.row < t.col && *t.val != 0.0) {
         let [a, b] = [t.row, t.col].map(|i| find(&mut parent, i as u32));

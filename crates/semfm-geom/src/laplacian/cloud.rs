@@ -1,7 +1,7 @@
 //! The Laplacian of points without triangles (Sharp & Crane 2020, §5.7).
 
 use super::star::{Neighbour, StarFinder, lift};
-use super::tufted::tufted_of_soup;
+use super::tufted::{delaunay_cover_of_soup, laplacian_of_cover};
 use super::{Laplacian, TuftedSettings};
 use crate::math::{DMat3, DVec2, DVec3};
 use crate::{Error, PointIndex, Result};
@@ -45,7 +45,8 @@ pub fn point_cloud_laplacian(points: &[DVec3], settings: &CloudSettings) -> Resu
         }
     }
     let triangles = union_of_stars(points, settings.n_neighbors)?;
-    let mut laplacian = tufted_of_soup(points, &triangles, settings.mollify_factor)?;
+    let cover = delaunay_cover_of_soup(points, &triangles, settings.mollify_factor)?;
+    let mut laplacian = laplacian_of_cover(&cover, points.len())?;
     laplacian.mass.iter_mut().for_each(|m| *m /= 3.0);
     laplacian.stiffness.val_mut().iter_mut().for_each(|w| *w /= 3.0);
     Ok(laplacian)

@@ -40,7 +40,7 @@ fn previous(h: usize) -> usize {
 }
 
 /// Four times the area of a triangle with these sides (Heron), 0 where they make none.
-fn quadruple_area(a: f64, b: f64, c: f64) -> f64 {
+pub(super) fn quadruple_area(a: f64, b: f64, c: f64) -> f64 {
     ((a + b + c) * (b + c - a) * (c + a - b) * (a + b - c)).max(0.0).sqrt()
 }
 
@@ -52,6 +52,11 @@ struct Corner {
 }
 
 impl IntrinsicTriangulation {
+    /// Number of triangles m.
+    pub fn n_triangles(&self) -> usize {
+        self.twin.len() / 3
+    }
+
     fn corner(&self, h: usize) -> Corner {
         let (a, b, c) = (self.length[h], self.length[next(h)], self.length[previous(h)]);
         Corner { cosine: b * b + c * c - a * a, sine: quadruple_area(a, b, c) }

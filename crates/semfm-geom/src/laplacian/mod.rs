@@ -13,6 +13,7 @@ mod bridges;
 mod cloud;
 mod cotan;
 mod cover;
+mod flat;
 mod foreign;
 mod intrinsic;
 mod star;
@@ -20,9 +21,11 @@ mod tufted;
 
 use faer::sparse::SparseColMat;
 
+pub(crate) use bridges::components;
 pub use bridges::{BridgeSettings, BridgedLaplacian, bridge};
 pub use cloud::{CloudSettings, point_cloud_laplacian};
 pub use cotan::cotan_laplacian;
+pub(crate) use flat::{FlatTriangle, flat_laplacian};
 pub use tufted::{TuftedSettings, tufted_laplacian};
 
 use crate::{Mesh, Result};

@@ -30,8 +30,11 @@ pub(super) struct Neighbour {
 /// there. So the points are lifted by these numbers and the triangulation is a weighted one, whose
 /// ties are broken alike from everywhere (Edelsbrunner & Mücke 1990 with finite numbers).
 pub(super) fn lift(id: usize) -> f64 {
-    const GOLDEN: u32 = 0x9E37_79B9; // 2³² over the golden ratio
-    f64::from((id as u32).wrapping_mul(GOLDEN)) / 2f64.powi(32)
+    // Two rounds of multiply and fold: a single multiplication is linear in the id, and on a grid
+    // numbered row by row both diagonals of every square would have the same sum.
+    let mut hash = (id as u32).wrapping_mul(0x9E37_79B9);
+    hash = (hash ^ hash >> 16).wrapping_mul(0x85EB_CA6B);
+    f64::from(hash ^ hash >> 13) / 2f64.powi(32)
 }
 
 /// One corner of the cell, and the neighbour whose bisector runs from here to the next corner.

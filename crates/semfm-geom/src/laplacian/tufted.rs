@@ -1,7 +1,9 @@
 //! The intrinsic Delaunay Laplacian of the tufted cover
 //! (Sharp & Crane 2020, "A Laplacian for Nonmanifold Triangle Meshes").
 
-use super::{Laplacian, assembly, cover::tufted_cover, fill_empty_masses};
+use super::cover::tufted_cover;
+use super::intrinsic::IntrinsicTriangulation;
+use super::{Laplacian, assembly, fill_empty_masses};
 use crate::math::DVec3;
 use crate::{Error, Mesh, Result};
 
@@ -31,36 +33,46 @@ impl Default for TuftedSettings {
 /// [`Error::NoArea`] where no triangle has three different vertices or all lie on one spot,
 /// [`Error::OutOfRange`] for a negative or non-finite `mollify_factor`.
 pub fn tufted_laplacian(mesh: &Mesh, settings: &TuftedSettings) -> Result<Laplacian> {
-    let whole = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
-    if mesh.faces().iter().all(whole) {
-        return tufted_of_soup(mesh.vertices(), mesh.faces(), settings.mollify_factor);
-    }
-    let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().filter(whole).collect();
-    tufted_of_soup(mesh.vertices(), &faces, settings.mollify_factor)
+    laplacian_of_cover(&delaunay_cover(mesh, settings)?, mesh.n_vertices())
 }
 
-/// As [`tufted_laplacian`], for triangles that each name three different vertices.
-pub(super) fn tufted_of_soup(
+/// The intrinsic Delaunay triangulation of a mesh's tufted cover.
+pub(super) fn delaunay_cover(mesh: &Mesh, settings: &TuftedSettings) -> Result<IntrinsicTriangulation> {
+    let whole = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
+    if mesh.faces().iter().all(whole) {
+        return delaunay_cover_of_soup(mesh.vertices(), mesh.faces(), settings.mollify_factor);
+    }
+    let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().filter(whole).collect();
+    delaunay_cover_of_soup(mesh.vertices(), &faces, settings.mollify_factor)
+}
+
+/// As [`delaunay_cover`], for triangles that each name three different vertices.
+pub(super) fn delaunay_cover_of_soup(
     points: &[DVec3],
     faces: &[[u32; 3]],
     mollify_factor: f64,
-) -> Result<Laplacian> {
+) -> Result<IntrinsicTriangulation> {
     if !(mollify_factor >= 0.0 && mollify_factor.is_finite()) {
         let (what, expected) = ("mollify_factor", "a number of mean edges, 0 or more".into());
         return Err(Error::OutOfRange { what, expected, found: mollify_factor.to_string() });
     }
-    let no_area = Error::NoArea { n_faces: faces.len() };
-    let Some(mut cover) = tufted_cover(points, faces, mollify_factor) else { return Err(no_area) };
+    let mut cover =
+        tufted_cover(points, faces, mollify_factor).ok_or(Error::NoArea { n_faces: faces.len() })?;
     cover.flip_to_delaunay();
-    let mut mass = cover.vertex_areas(points.len());
+    Ok(cover)
+}
+
+/// One sheet's worth of a cover's cotangent stiffness and lumped mass (n).
+pub(super) fn laplacian_of_cover(cover: &IntrinsicTriangulation, n: usize) -> Result<Laplacian> {
+    let mut mass = cover.vertex_areas(n);
     if mass.iter().all(|&m| m <= 0.0) {
-        return Err(no_area);
+        return Err(Error::NoArea { n_faces: cover.n_triangles() / 2 });
     }
     mass.iter_mut().for_each(|m| *m /= 2.0);
     fill_empty_masses(&mut mass);
     let mut edges = cover.weighted_edges();
     edges.iter_mut().for_each(|edge| edge.2 /= 2.0);
-    Ok(Laplacian { stiffness: assembly::stiffness(points.len(), &edges), mass })
+    Ok(Laplacian { stiffness: assembly::stiffness(n, &edges), mass })
 }
 
 #[cfg(test)]
