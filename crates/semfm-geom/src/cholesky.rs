@@ -3,7 +3,6 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot;
 use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::LltError;
 use faer::sparse::linalg::cholesky::{
     LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
@@ -71,8 +70,7 @@ impl SparseCholesky {
             .map(|_| ());
         match outcome {
             Ok(()) => Ok(Self { symbolic, values }),
-            Err(LltError::Generic(error)) => Err(failed(error)),
-            Err(LltError::Numeric(NonPositivePivot { index })) => {
+            Err(NonPositivePivot { index }) => {
                 let row = symbolic.perm().map_or(index, |perm| perm.arrays().0[index]);
                 Err(Error::NotPositiveDefinite { what: "the sparse matrix", row })
             }
@@ -82,6 +80,11 @@ impl SparseCholesky {
     /// Number of rows n.
     pub fn n_rows(&self) -> usize {
         self.symbolic.nrows()
+    }
+
+    /// The analysis of the sparsity pattern, for further factorisations of like matrices.
+    pub(crate) fn symbolic(&self) -> &SymbolicCholesky<usize> {
+        &self.symbolic
     }
 
     /// Numbers stored in the factor R, fill-in and supernodal padding included.
