@@ -63,7 +63,8 @@ fn satisfies(expected: &str, read: &Result<MeshFile, semfm_geom::Error>) -> bool
         Ok(_) if !verdict.starts_with("accept") => false,
         Ok(file) => {
             // The counts in brackets are exact where there are any.
-            let counts = if counted.starts_with("accept") { counted.trim_end_matches(']') } else { verdict };
+            let counts =
+                if counted.starts_with("accept") { counted.trim_end_matches(']') } else { verdict };
             let same = |key, found| number(counts, key).is_none_or(|expected| expected == found);
             same("v", file.mesh.n_vertices())
                 && same("f", file.n_faces)
@@ -101,7 +102,9 @@ fn every_mesh_gets_its_verdict() {
         }
         if std::env::var_os("SEMFM_VERBOSE").is_some() {
             eprintln!("{path}\t{}", describe(&read));
-            if let Ok(file) = &read && !file.appearance.notes.is_empty() {
+            if let Ok(file) = &read
+                && !file.appearance.notes.is_empty()
+            {
                 eprintln!("    notes {:?}", file.appearance.notes);
             }
         }
@@ -120,7 +123,11 @@ fn the_report_agrees_with_the_features_in_the_manifest() {
     for [path, special, expected] in rows(&corpus) {
         let Ok(file) = read_mesh(corpus.join(&path)) else { continue };
         // Files whose features were counted at all.
-        if !expected.starts_with("accept v=") || !expected.contains("tri=") || path.ends_with("gltf") || path.contains("/synth/") {
+        if !expected.starts_with("accept v=")
+            || !expected.contains("tri=")
+            || path.ends_with("gltf")
+            || path.contains("/synth/")
+        {
             continue;
         }
         let report = MeshReport::new(&file.mesh);
@@ -134,7 +141,11 @@ fn the_report_agrees_with_the_features_in_the_manifest() {
         ];
         for (key, found, default) in features {
             let expected = number(&special, key).unwrap_or(default);
-            if found != expected {
+            // The manifest fans every polygon; cutting concave ones at their ears can only save
+            // degenerate triangles.
+            if found != expected
+                && !(key == "degenerate" && special.contains("polygons") && found < expected)
+            {
                 failures.push(format!("{path}: {key}={expected}, found {found}"));
             }
         }

@@ -55,11 +55,20 @@ impl Texture {
     /// empty or the bytes do not fit.
     pub fn new(width: u32, height: u32, rgba8: Vec<u8>, wrap: [Wrap; 2]) -> Option<Self> {
         let n_bytes = u64::from(width) * u64::from(height) * 4;
-        (n_bytes > 0 && n_bytes == rgba8.len() as u64).then_some(Self { width, height, rgba8, wrap })
+        (n_bytes > 0 && n_bytes == rgba8.len() as u64).then_some(Self {
+            width,
+            height,
+            rgba8,
+            wrap,
+        })
     }
 
     /// Decodes a PNG or JPEG; the reason in words where that fails.
-    pub(crate) fn decode(bytes: &[u8], wrap: [Wrap; 2], budget: &mut ImageBudget) -> Result<Self, String> {
+    pub(crate) fn decode(
+        bytes: &[u8],
+        wrap: [Wrap; 2],
+        budget: &mut ImageBudget,
+    ) -> Result<Self, String> {
         let words = |error: image::ImageError| error.to_string();
         let reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
@@ -67,9 +76,14 @@ impl Texture {
         let mut decoder = reader.into_decoder().map_err(words)?;
         let (width, height) = decoder.dimensions();
         let n_bytes = u64::from(width) * u64::from(height) * 4;
-        if width > MAX_SIDE || height > MAX_SIDE || n_bytes.max(decoder.total_bytes()) > budget.bytes {
+        if width > MAX_SIDE
+            || height > MAX_SIDE
+            || n_bytes.max(decoder.total_bytes()) > budget.bytes
+        {
             let limit = budget.bytes >> 20;
-            return Err(format!("{width} × {height} pixels, more than {limit} MiB or {MAX_SIDE} on a side"));
+            return Err(format!(
+                "{width} × {height} pixels, more than {limit} MiB or {MAX_SIDE} on a side"
+            ));
         }
         let mut limits = Limits::default();
         limits.max_alloc = Some(budget.bytes);
@@ -153,7 +167,9 @@ mod tests {
         let error = Texture::decode(&bytes, [Wrap::Repeat; 2], &mut budget).unwrap_err();
         assert!(error.contains("6000 × 6000"), "{error}");
         assert!(Texture::decode(&png(8, 4), [Wrap::Repeat; 2], &mut budget).is_ok());
-        assert!(Texture::decode(&bytes[..99], [Wrap::Repeat; 2], &mut ImageBudget::generous()).is_err());
+        assert!(
+            Texture::decode(&bytes[..99], [Wrap::Repeat; 2], &mut ImageBudget::generous()).is_err()
+        );
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod ply;
 mod polygon;
 mod stl;
 mod text;
+mod write;
 
 use std::path::Path;
 
@@ -27,6 +28,7 @@ pub use self::appearance::{Appearance, Material};
 pub use self::atomic::write_atomically;
 pub use self::image::{Texture, Wrap};
 use self::input::{Input, quote, read_file};
+pub use self::write::{Paint, write_mesh, write_painted_mesh};
 use crate::math::DVec3;
 use crate::{Error, Mesh, Result};
 
@@ -64,7 +66,8 @@ impl MeshFormat {
     /// The format that the first bytes of a file show; OBJ and binary STL show none.
     fn from_content(bytes: &[u8]) -> Option<Self> {
         let text = bytes.trim_ascii_start();
-        let is_off = || text.split(|b| !b.is_ascii_uppercase()).next().is_some_and(|w| w.ends_with(b"OFF"));
+        let is_off =
+            || text.split(|b| !b.is_ascii_uppercase()).next().is_some_and(|w| w.ends_with(b"OFF"));
         match text {
             _ if bytes.starts_with(b"glTF") => Some(Self::Glb),
             _ if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") => Some(Self::Ply),

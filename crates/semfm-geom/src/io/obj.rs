@@ -71,9 +71,14 @@ impl ObjFile {
             }
             file.read_line(input, Line { number: line.number, text: &text }.without_comment())?;
         }
-        if let Some((line, id)) = file.highest.filter(|&(_, id)| id as usize >= file.vertices.len()) {
+        if let Some((line, id)) = file.highest.filter(|&(_, id)| id as usize >= file.vertices.len())
+        {
             let expected = format!("the number of one of the {} vertices", file.vertices.len());
-            return Err(input.error(format!("line {line}"), expected, format!("{}", u64::from(id) + 1)));
+            return Err(input.error(
+                format!("line {line}"),
+                expected,
+                format!("{}", u64::from(id) + 1),
+            ));
         }
         let n_uvs = file.uvs.len() as u32;
         let n_missing = file.n_bad_uvs + file.polygons.count_uvs_from(n_uvs);
@@ -128,7 +133,8 @@ impl ObjFile {
             let mut fields = word.split(|&b| b == b'/');
             let vertex = fields.next().unwrap_or_default();
             let id = resolve(vertex, self.vertices.len()).ok_or_else(|| {
-                let expected = format!("a vertex number, with {} defined so far", self.vertices.len());
+                let expected =
+                    format!("a vertex number, with {} defined so far", self.vertices.len());
                 input.error(line.place(), expected, quote(word))
             })?;
             let uv = match fields.next().filter(|field| !field.is_empty()) {
@@ -158,7 +164,9 @@ impl ObjFile {
         let missing = [f32::NAN; 4];
         (!self.colors.is_empty()).then(|| {
             (0..self.vertices.len())
-                .map(|i| rgba_from_floats(self.colors.get(i).unwrap_or(&missing).map(|x| x * scale)))
+                .map(|i| {
+                    rgba_from_floats(self.colors.get(i).unwrap_or(&missing).map(|x| x * scale))
+                })
                 .collect()
         })
     }

@@ -73,10 +73,21 @@ impl<'a> Reader<'a> {
         let n_vertices = count(input, &mut words, "the number of vertices")?;
         let n_faces = count(input, &mut words, "the number of faces")?;
         words.finish_line();
-        let mut reader =
-            Self { input, words, has_normals, has_colors, has_uvs, n_vertices, n_faces, colors: vec![], uvs: vec![] };
+        let mut reader = Self {
+            input,
+            words,
+            has_normals,
+            has_colors,
+            has_uvs,
+            n_vertices,
+            n_faces,
+            colors: vec![],
+            uvs: vec![],
+        };
         // The shortest vertex row is `0 0 0` and its line end, the shortest face row `0`.
-        reader.require_bytes(n_vertices.saturating_mul(6).saturating_add(n_faces.saturating_mul(2)))?;
+        reader.require_bytes(
+            n_vertices.saturating_mul(6).saturating_add(n_faces.saturating_mul(2)),
+        )?;
         Ok(reader)
     }
 
@@ -141,7 +152,11 @@ impl<'a> Reader<'a> {
             let n_corners = count(self.input, &mut self.words, "the number of corners of a face")?;
             if n_corners > self.words.bytes_left() {
                 let found = format!("only {} bytes more", self.words.bytes_left());
-                return Err(self.input.error(self.words.place(), format!("{n_corners} corners"), found));
+                return Err(self.input.error(
+                    self.words.place(),
+                    format!("{n_corners} corners"),
+                    found,
+                ));
             }
             for _ in 0..n_corners {
                 let given = self.words.integer("the number of a vertex")?;

@@ -6,6 +6,10 @@ use crate::math::{DVec2, DVec3};
 /// time, and at 256 a hostile file of nothing but such polygons costs as much as its parsing.
 const MAX_EAR_CORNERS: usize = 256;
 
+/// A corner that turns the wrong way by less than this share of the polygon's area counts as
+/// straight: coordinates with six digits leave corners on straight sides that off.
+const STRAIGHT: f64 = 1e-6;
+
 /// The faces of a file before they are cut, one after the other.
 #[derive(Default)]
 pub(crate) struct Polygons {
@@ -108,14 +112,16 @@ impl PolygonCutter {
     fn flatten_if_concave(&mut self, corners: &[DVec3]) -> bool {
         let origin = corners[0];
         let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
-        let normal: DVec3 =
-            (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        let double_area = normal.length();
         let Some(normal) = normal.try_normalize() else { return false };
         let (x, y) = normal.any_orthonormal_pair();
         self.flat.clear();
-        self.flat.extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
+        self.flat
+            .extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
         let n = self.flat.len();
-        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < 0.0)
+        let reflex = -STRAIGHT * double_area;
+        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < reflex)
     }
 
     /// Cuts ears off the flat polygon; false where it runs out of them early.
@@ -192,7 +198,8 @@ mod tests {
 
     #[test]
     fn repeated_corners_still_give_two_less_than_corners() {
-        let corners = polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
+        let corners =
+            polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
         assert_eq!(PolygonCutter::default().cut(&corners).len(), 4);
     }
 }

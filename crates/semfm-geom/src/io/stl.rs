@@ -20,7 +20,11 @@ const TRIANGLE: usize = 50;
 /// Reads an STL file of either kind.
 pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
     let mut soup = Soup::default();
-    if is_ascii(input.bytes) { read_ascii(input, &mut soup)? } else { read_binary(input, &mut soup)? }
+    if is_ascii(input.bytes) {
+        read_ascii(input, &mut soup)?
+    } else {
+        read_binary(input, &mut soup)?
+    }
     let n_faces = soup.faces.len();
     let appearance = Appearance::default();
     Ok(MeshParts { vertices: soup.vertices, faces: soup.faces, n_faces, appearance })
@@ -56,7 +60,12 @@ fn read_binary(input: Input<'_>, soup: &mut Soup) -> Result<()> {
     soup.faces.reserve_exact(n_triangles);
     for triangle in body.chunks_exact(TRIANGLE).take(n_triangles) {
         let value = |at: usize| {
-            f64::from(f32::from_le_bytes([triangle[at], triangle[at + 1], triangle[at + 2], triangle[at + 3]]))
+            f64::from(f32::from_le_bytes([
+                triangle[at],
+                triangle[at + 1],
+                triangle[at + 2],
+                triangle[at + 3],
+            ]))
         };
         soup.add([12, 24, 36].map(|at| DVec3::new(value(at), value(at + 4), value(at + 8))));
     }

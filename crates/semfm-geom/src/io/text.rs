@@ -30,7 +30,11 @@ impl<'a> Lines<'a> {
     pub fn new(input: Input<'a>) -> Result<Self> {
         let bytes = input.bytes;
         if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-            return Err(input.error("byte 0", "text in ASCII or UTF-8", "a UTF-16 byte order mark"));
+            return Err(input.error(
+                "byte 0",
+                "text in ASCII or UTF-8",
+                "a UTF-16 byte order mark",
+            ));
         }
         let offset = if bytes.starts_with(&[0xef, 0xbb, 0xbf]) { 3 } else { 0 };
         Ok(Self::starting_at(input, offset, 1))

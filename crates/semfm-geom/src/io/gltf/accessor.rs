@@ -93,12 +93,18 @@ impl<'a> Accessors<'a> {
     }
 
     /// Vectors of N numbers, of one of the allowed component types.
-    pub fn vectors<const N: usize>(&self, accessor: usize, allowed: &[Component]) -> Result<Vec<[f64; N]>> {
+    pub fn vectors<const N: usize>(
+        &self,
+        accessor: usize,
+        allowed: &[Component],
+    ) -> Result<Vec<[f64; N]>> {
         let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
         let json = self.get(accessor)?;
         let component = self.component(accessor, json, kind, allowed)?;
         let decode = |bytes: &[u8]| {
-            std::array::from_fn(|c| component.decode(&bytes[c * component.size()..], json.normalized))
+            std::array::from_fn(|c| {
+                component.decode(&bytes[c * component.size()..], json.normalized)
+            })
         };
         self.elements(accessor, json, N * component.size(), [0.0; N], decode)
     }
@@ -112,11 +118,21 @@ impl<'a> Accessors<'a> {
         self.elements(accessor, json, component.size(), 0, decode)
     }
 
-    fn component(&self, accessor: usize, json: &Accessor, kind: &str, allowed: &[Component]) -> Result<Component> {
+    fn component(
+        &self,
+        accessor: usize,
+        json: &Accessor,
+        kind: &str,
+        allowed: &[Component],
+    ) -> Result<Component> {
         let component = Component::from_code(json.component_type).filter(|c| allowed.contains(c));
         component.filter(|_| json.kind == kind).ok_or_else(|| {
             let found = format!("{} of component type {}", json.kind, json.component_type.0);
-            self.input.error(format!("accessor {accessor}"), format!("{kind} of {allowed:?}"), found)
+            self.input.error(
+                format!("accessor {accessor}"),
+                format!("{kind} of {allowed:?}"),
+                found,
+            )
         })
     }
 
@@ -148,8 +164,20 @@ impl<'a> Accessors<'a> {
             return Err(self.input.error(place, "sparse indices of U8, U16 or U32", found));
         };
         let indices = &sparse.indices;
-        let ids = self.strided(&place, indices.buffer_view, indices.byte_offset, n_sparse, component.size())?;
-        let values = self.strided(&place, sparse.values.buffer_view, sparse.values.byte_offset, n_sparse, size)?;
+        let ids = self.strided(
+            &place,
+            indices.buffer_view,
+            indices.byte_offset,
+            n_sparse,
+            component.size(),
+        )?;
+        let values = self.strided(
+            &place,
+            sparse.values.buffer_view,
+            sparse.values.byte_offset,
+            n_sparse,
+            size,
+        )?;
         for i in 0..n_sparse {
             let id = component.decode(ids.element(i), false) as usize;
             let Some(element) = elements.get_mut(id) else {
@@ -173,14 +201,21 @@ impl<'a> Accessors<'a> {
         let bytes = self.buffers.view(view.0)?;
         let offset = offset.map_or(0, |offset| offset.0);
         let stride = self.root.buffer_views[view.0].byte_stride.map_or(size, |stride| stride.0);
-        let end = count.checked_sub(1).and_then(|last| last.checked_mul(stride)?.checked_add(size)?.checked_add(offset));
+        let end = count
+            .checked_sub(1)
+            .and_then(|last| last.checked_mul(stride)?.checked_add(size)?.checked_add(offset));
         match end {
             Some(end) if end <= bytes.len() && stride >= size => {
                 Ok(Strided { bytes: &bytes[offset..], stride, size })
             }
             _ => {
-                let expected = format!("{count} elements of {size} bytes, {stride} apart, from byte {offset}");
-                Err(self.input.error(place, expected, format!("a buffer view of {} bytes", bytes.len())))
+                let expected =
+                    format!("{count} elements of {size} bytes, {stride} apart, from byte {offset}");
+                Err(self.input.error(
+                    place,
+                    expected,
+                    format!("a buffer view of {} bytes", bytes.len()),
+                ))
             }
         }
     }

@@ -57,7 +57,11 @@ impl<'a> Buffers<'a> {
         let length = json.byte_length.0;
         start.checked_add(length).and_then(|end| buffer.get(start..end)).ok_or_else(|| {
             let found = format!("a buffer of {}", buffer.len());
-            self.input.error(place, format!("{length} bytes from byte {start} of its buffer"), found)
+            self.input.error(
+                place,
+                format!("{length} bytes from byte {start} of its buffer"),
+                found,
+            )
         })
     }
 
@@ -72,7 +76,9 @@ impl<'a> Buffers<'a> {
             let bytes = match (&json.uri, self.chunk) {
                 (Some(uri), _) => self.resolve(&place, uri)?,
                 (None, Some(chunk)) if buffer == 0 => Bytes::Own(chunk),
-                (None, _) => return Err(self.input.error(place, "a uri or a binary chunk", "neither")),
+                (None, _) => {
+                    return Err(self.input.error(place, "a uri or a binary chunk", "neither"));
+                }
             };
             if bytes.len() < json.byte_length.0 {
                 let expected = format!("{} bytes", json.byte_length.0);
@@ -88,12 +94,15 @@ impl<'a> Buffers<'a> {
     pub fn resolve(&self, place: &str, uri: &str) -> Result<Bytes<'a>> {
         let refuse = |expected: &str| self.input.error(place, expected, quote(uri.as_bytes()));
         if let Some(data) = uri.strip_prefix("data:") {
-            let bytes = data.split_once(";base64,").and_then(|(_, text)| decode_base64(text.as_bytes()));
+            let bytes =
+                data.split_once(";base64,").and_then(|(_, text)| decode_base64(text.as_bytes()));
             return bytes.map(|b| Bytes::Other(Rc::new(b))).ok_or_else(|| refuse("base64 data"));
         }
         let name = decode_percent(uri).ok_or_else(|| refuse("a uri in UTF-8"))?;
         let relative = Path::new(&name);
-        let inside = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        let inside = relative
+            .components()
+            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         // A colon or a backslash makes it a URL or a path of another system.
         if name.is_empty() || !inside || name.contains([':', '\\', '\0']) {
             return Err(refuse("a file inside the folder of the glTF file"));
@@ -121,7 +130,8 @@ impl<'a> Buffers<'a> {
 
     /// Bytes held in memory by now.
     pub fn n_loaded(&self) -> usize {
-        self.files.borrow().values().map(|bytes| bytes.len()).sum::<usize>() + self.input.bytes.len()
+        self.files.borrow().values().map(|bytes| bytes.len()).sum::<usize>()
+            + self.input.bytes.len()
     }
 }
 
@@ -174,7 +184,9 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_rfc() {
-        for (text, bytes) in [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg", "foob")] {
+        for (text, bytes) in
+            [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg", "foob")]
+        {
             assert_eq!(decode_base64(text.as_bytes()).unwrap(), bytes.as_bytes());
         }
         for bad in ["Z", "Zm9vY", "Zm 9v", "Zg===", "Z-=="] {
@@ -195,8 +207,21 @@ mod tests {
         let buffers = Buffers::new(Input { path: &path, bytes: b"" }, &root, None);
         assert_eq!(&buffers.resolve("buffer 0", "./a%20b.bin").unwrap()[..], b"yes");
         let secret = folder.path().join("secret");
-        for bad in ["../secret", "%2e%2e/secret", "link", "/etc/passwd", "file:///etc/passwd",
-            "http://example.com/a", secret.to_str().unwrap(), "..\\secret", "", "%ff", "%4", "in/../../secret", "."] {
+        for bad in [
+            "../secret",
+            "%2e%2e/secret",
+            "link",
+            "/etc/passwd",
+            "file:///etc/passwd",
+            "http://example.com/a",
+            secret.to_str().unwrap(),
+            "..\\secret",
+            "",
+            "%ff",
+            "%4",
+            "in/../../secret",
+            ".",
+        ] {
             assert!(buffers.resolve("buffer 0", bad).is_err(), "{bad}");
         }
     }

@@ -6,8 +6,8 @@
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::Deserialize;
+use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 /// A whole number from 0: an index, a count, an offset. JSON may write 3 as `3.0`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,8 @@ impl<'de> Deserialize<'de> for Whole {
         let exact = |x: &f64| x.fract() == 0.0 && (0.0..9e15).contains(x);
         let whole = number.as_u64().or_else(|| number.as_f64().filter(exact).map(|x| x as u64));
         let size = whole.and_then(|whole| usize::try_from(whole).ok());
-        size.map(Self).ok_or_else(|| D::Error::custom(format!("{number} is not a whole number from 0")))
+        size.map(Self)
+            .ok_or_else(|| D::Error::custom(format!("{number} is not a whole number from 0")))
     }
 }
 
@@ -250,7 +251,9 @@ impl<'de> Visitor<'de> for UniqueNamesVisitor {
         while let Some(name) = map.next_key::<String>()? {
             map.next_value::<UniqueNames>()?;
             if let Some(twice) = names.replace(name) {
-                return Err(A::Error::custom(format!("the name `{twice}` stands twice in one object")));
+                return Err(A::Error::custom(format!(
+                    "the name `{twice}` stands twice in one object"
+                )));
             }
         }
         Ok(UniqueNames)

@@ -17,7 +17,12 @@ pub(crate) struct Surface {
 
 impl Surface {
     /// A material of the file. What cannot be read of it goes into `notes`.
-    pub fn read(accessors: &Accessors<'_>, material: Option<usize>, budget: &mut Option<ImageBudget>, notes: &mut Vec<String>) -> Self {
+    pub fn read(
+        accessors: &Accessors<'_>,
+        material: Option<usize>,
+        budget: &mut Option<ImageBudget>,
+        notes: &mut Vec<String>,
+    ) -> Self {
         let mut surface = Self {
             material: Material { color: [1.0; 4], texture: None },
             uv_set: 0,
@@ -28,11 +33,13 @@ impl Surface {
             notes.push(format!("material {id} does not exist"));
             return surface;
         };
-        let base = json.pbr_metallic_roughness.as_ref().or(json.extensions.specular_glossiness.as_ref());
+        let base =
+            json.pbr_metallic_roughness.as_ref().or(json.extensions.specular_glossiness.as_ref());
         let Some(BaseColor { factor, texture }) = base else { return surface };
         if let Some([r, g, b, a]) = *factor {
             // The factor is linear, we multiply in sRGB; for a power law both are the same.
-            surface.material.color = [srgb_from_linear(r), srgb_from_linear(g), srgb_from_linear(b), a];
+            surface.material.color =
+                [srgb_from_linear(r), srgb_from_linear(g), srgb_from_linear(b), a];
         }
         if let Some(info) = texture {
             surface.place(info);
@@ -56,21 +63,32 @@ impl Surface {
     }
 
     /// Texture coordinates of a primitive's vertices, where it has the set that the image takes.
-    pub fn uvs(&self, accessors: &Accessors<'_>, uv_accessor: usize) -> crate::Result<Vec<[f32; 2]>> {
+    pub fn uvs(
+        &self,
+        accessors: &Accessors<'_>,
+        uv_accessor: usize,
+    ) -> crate::Result<Vec<[f32; 2]>> {
         let allowed = [Component::F32, Component::U8, Component::U16];
-        let moved = |[u, v]: [f64; 2]| self.uv_from_uv.map(|[a, b, c]| a * u as f32 + b * v as f32 + c);
+        let moved =
+            |[u, v]: [f64; 2]| self.uv_from_uv.map(|[a, b, c]| a * u as f32 + b * v as f32 + c);
         Ok(accessors.vectors::<2>(uv_accessor, &allowed)?.into_iter().map(moved).collect())
     }
 }
 
-fn load(accessors: &Accessors<'_>, info: &TextureInfo, budget: &mut Option<ImageBudget>) -> Result<Texture, String> {
+fn load(
+    accessors: &Accessors<'_>,
+    info: &TextureInfo,
+    budget: &mut Option<ImageBudget>,
+) -> Result<Texture, String> {
     let root = accessors.root;
     let texture = root.textures.get(info.index.0).ok_or("its texture does not exist")?;
     let source = texture.source.ok_or("its texture has no image that we read")?;
     let image = root.images.get(source.0).ok_or("it does not exist")?;
     let words = |error: crate::Error| error.to_string();
     let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => accessors.buffers.resolve(&format!("image {}", source.0), uri).map_err(words)?,
+        (Some(uri), _) => {
+            accessors.buffers.resolve(&format!("image {}", source.0), uri).map_err(words)?
+        }
         (None, Some(view)) => Bytes::Own(accessors.buffers.view(view.0).map_err(words)?),
         (None, None) => return Err("it has neither a uri nor a buffer view".into()),
     };

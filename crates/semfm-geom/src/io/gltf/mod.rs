@@ -31,7 +31,8 @@ const KNOWN_EXTENSIONS: [&str; 5] = [
 
 /// Reads a glTF file, which is JSON, or a GLB, which has it in its first chunk.
 pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
-    let is_glb = input.bytes.starts_with(b"glTF") || input.path.extension().is_some_and(|e| e == "glb");
+    let is_glb =
+        input.bytes.starts_with(b"glTF") || input.path.extension().is_some_and(|e| e == "glb");
     let (json, chunk) = if is_glb { glb_chunks(input)? } else { (input.bytes, None) };
     let root = Root::parse(json).map_err(|error| {
         let place = format!("JSON line {} column {}", error.line(), error.column());
@@ -47,11 +48,17 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
 fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
     let word = |offset: usize| -> Result<usize> {
         let bytes = input.bytes.get(offset..offset + 4).and_then(|b| b.try_into().ok());
-        let bytes = bytes.ok_or_else(|| input.error(format!("byte {offset}"), "4 bytes", "the end of the file"))?;
+        let bytes = bytes.ok_or_else(|| {
+            input.error(format!("byte {offset}"), "4 bytes", "the end of the file")
+        })?;
         Ok(u32::from_le_bytes(bytes) as usize)
     };
     if !input.bytes.starts_with(b"glTF") || word(4)? != 2 {
-        return Err(input.error("byte 0", "glTF and version 2", input.bytes[..input.bytes.len().min(8)].escape_ascii().to_string()));
+        return Err(input.error(
+            "byte 0",
+            "glTF and version 2",
+            input.bytes[..input.bytes.len().min(8)].escape_ascii().to_string(),
+        ));
     }
     let length = word(8)?;
     if length < 20 || length > input.bytes.len() {
@@ -67,7 +74,11 @@ fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
         let end = start.saturating_add(n_bytes);
         if end > length {
             let found = format!("{} before the end", length - start);
-            return Err(input.error(format!("byte {offset}"), format!("a chunk of {n_bytes} bytes"), found));
+            return Err(input.error(
+                format!("byte {offset}"),
+                format!("a chunk of {n_bytes} bytes"),
+                found,
+            ));
         }
         chunks.push((kind, &input.bytes[start..end]));
         offset = end;
@@ -104,11 +115,14 @@ fn check_version(input: Input<'_>, root: &Root) -> Result<()> {
     let known = |name: &String| {
         let material = name.starts_with("KHR_materials_");
         // Image formats are a matter of appearance: a missing image is noted.
-        let image = matches!(name.as_str(), "EXT_texture_webp" | "KHR_texture_basisu" | "EXT_texture_avif");
+        let image =
+            matches!(name.as_str(), "EXT_texture_webp" | "KHR_texture_basisu" | "EXT_texture_avif");
         material || image || KNOWN_EXTENSIONS.contains(&name.as_str())
     };
     match root.extensions_required.iter().find(|name| !known(name)) {
-        Some(name) => Err(input.error("extensionsRequired", "extensions we follow", format!("`{name}`"))),
+        Some(name) => {
+            Err(input.error("extensionsRequired", "extensions we follow", format!("`{name}`")))
+        }
         None => Ok(()),
     }
 }

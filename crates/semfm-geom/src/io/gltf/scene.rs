@@ -27,14 +27,13 @@ pub(crate) struct SceneReader<'a> {
 
 impl<'a> SceneReader<'a> {
     pub fn new(accessors: &'a Accessors<'a>) -> Self {
-        let parts = MeshParts { vertices: vec![], faces: vec![], n_faces: 0, appearance: Appearance::default() };
-        Self {
-            accessors,
-            parts,
-            budget: None,
-            surfaces: HashMap::new(),
-            material_of: Vec::new(),
-        }
+        let parts = MeshParts {
+            vertices: vec![],
+            faces: vec![],
+            n_faces: 0,
+            appearance: Appearance::default(),
+        };
+        Self { accessors, parts, budget: None, surfaces: HashMap::new(), material_of: Vec::new() }
     }
 
     /// Reads all triangles of the default scene. Without any scene the file is a library: the nodes
@@ -50,7 +49,9 @@ impl<'a> SceneReader<'a> {
         };
         match scene {
             Some(scene) => self.walk(&scene.nodes)?,
-            None if root.nodes.iter().any(|node| node.mesh.is_some()) => self.walk(&parentless(&root.nodes))?,
+            None if root.nodes.iter().any(|node| node.mesh.is_some()) => {
+                self.walk(&parentless(&root.nodes))?
+            }
             None => {
                 for mesh in 0..root.meshes.len() {
                     self.add_mesh(mesh, DAffine3::IDENTITY)?;
@@ -74,7 +75,11 @@ impl<'a> SceneReader<'a> {
                 return Err(self.accessors.input.error(place(), "a node that exists", found));
             };
             if std::mem::replace(&mut met[id], true) {
-                return Err(self.accessors.input.error(place(), "one parent", "the node is met twice"));
+                return Err(self.accessors.input.error(
+                    place(),
+                    "one parent",
+                    "the node is met twice",
+                ));
             }
             let scene_from_node = scene_from_parent * self.transform(id, node)?;
             if let Some(mesh) = node.mesh {
@@ -120,7 +125,11 @@ impl<'a> SceneReader<'a> {
         let meshes = &self.accessors.root.meshes;
         let Some(json) = meshes.get(mesh) else {
             let found = format!("{} of them", meshes.len());
-            return Err(self.accessors.input.error(format!("mesh {mesh}"), "a mesh that exists", found));
+            return Err(self.accessors.input.error(
+                format!("mesh {mesh}"),
+                "a mesh that exists",
+                found,
+            ));
         };
         for (i, primitive) in json.primitives.iter().enumerate() {
             let place = format!("mesh {mesh}, primitive {i}");
@@ -130,7 +139,12 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Copies a primitive's vertices and triangles. One without positions shows nothing.
-    fn add_primitive(&mut self, place: &str, primitive: &Primitive, scene_from_mesh: DAffine3) -> Result<()> {
+    fn add_primitive(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        scene_from_mesh: DAffine3,
+    ) -> Result<()> {
         let mode = primitive.mode.map_or(4, |mode| mode.0);
         let Some(&Whole(position)) = primitive.attributes.get("POSITION") else { return Ok(()) };
         if mode < 4 {
@@ -138,7 +152,9 @@ impl<'a> SceneReader<'a> {
         }
         let input = self.accessors.input;
         let json = self.accessors.get(position)?;
-        if json.buffer_view.is_none() && primitive.extensions.contains_key("KHR_draco_mesh_compression") {
+        if json.buffer_view.is_none()
+            && primitive.extensions.contains_key("KHR_draco_mesh_compression")
+        {
             return Err(input.error(place, "plain positions", "KHR_draco_mesh_compression"));
         }
         let n_vertices = json.count.0;
@@ -147,7 +163,8 @@ impl<'a> SceneReader<'a> {
             None => n_vertices,
         };
         self.require_room(place, n_vertices, n_corners)?;
-        let quantized = self.accessors.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
+        let quantized =
+            self.accessors.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
         let allowed: &[Component] = if quantized {
             &[Component::F32, Component::I8, Component::U8, Component::I16, Component::U16]
         } else {
@@ -203,10 +220,16 @@ impl<'a> SceneReader<'a> {
             let colors: Result<Vec<[u8; 4]>> = match kind {
                 Ok((_, count)) if count != n_vertices => Ok(Vec::new()),
                 Ok(("VEC3", _)) => self.accessors.vectors::<3>(accessor, &allowed).map(|colors| {
-                    colors.into_iter().map(|[r, g, b]| rgba_from_floats([r, g, b, 1.0].map(|x| x as f32))).collect()
+                    colors
+                        .into_iter()
+                        .map(|[r, g, b]| rgba_from_floats([r, g, b, 1.0].map(|x| x as f32)))
+                        .collect()
                 }),
                 Ok(_) => self.accessors.vectors::<4>(accessor, &allowed).map(|colors| {
-                    colors.into_iter().map(|color| rgba_from_floats(color.map(|x| x as f32))).collect()
+                    colors
+                        .into_iter()
+                        .map(|color| rgba_from_floats(color.map(|x| x as f32)))
+                        .collect()
                 }),
                 Err(error) => Err(error),
             };
@@ -225,7 +248,13 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_material(&mut self, place: &str, primitive: &Primitive, n_vertices: usize, triangles: &[[u32; 3]]) {
+    fn add_material(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        n_vertices: usize,
+        triangles: &[[u32; 3]],
+    ) {
         let key = primitive.material.map(|material| material.0);
         if !self.surfaces.contains_key(&key) {
             let notes = &mut self.parts.appearance.notes;
@@ -237,7 +266,8 @@ impl<'a> SceneReader<'a> {
         self.material_of.resize(n_before + triangles.len(), *number);
         let appearance = &mut self.parts.appearance;
         let set = format!("TEXCOORD_{}", surface.uv_set);
-        let accessor = primitive.attributes.get(&set).filter(|_| surface.material.texture.is_some());
+        let accessor =
+            primitive.attributes.get(&set).filter(|_| surface.material.texture.is_some());
         if let Some(&Whole(accessor)) = accessor {
             let fits = self.accessors.get(accessor).is_ok_and(|json| json.count.0 == n_vertices);
             match surface.uvs(self.accessors, accessor) {
@@ -246,7 +276,9 @@ impl<'a> SceneReader<'a> {
                     all.resize(n_before, [MISSING_UV; 3]);
                     all.extend(triangles.iter().map(|ids| ids.map(|id| uvs[id as usize])));
                 }
-                Ok(_) => appearance.notes.push(format!("{place}: not as many texture coordinates as vertices")),
+                Ok(_) => appearance
+                    .notes
+                    .push(format!("{place}: not as many texture coordinates as vertices")),
                 Err(error) => appearance.notes.push(error.to_string()),
             }
         }
@@ -260,7 +292,8 @@ impl<'a> SceneReader<'a> {
         if self.surfaces.keys().any(Option::is_some) {
             let mut surfaces: Vec<_> = self.surfaces.into_values().collect();
             surfaces.sort_by_key(|&(number, _)| number);
-            appearance.materials = surfaces.into_iter().map(|(_, surface)| surface.material).collect();
+            appearance.materials =
+                surfaces.into_iter().map(|(_, surface)| surface.material).collect();
             appearance.material_of = (appearance.materials.len() > 1).then_some(self.material_of);
         }
         self.parts.n_faces = self.parts.faces.len();

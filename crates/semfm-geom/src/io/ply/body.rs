@@ -44,12 +44,20 @@ impl<'a> Body<'a> {
         let row: usize = element.properties.iter().map(least).sum();
         if row == 0 && element.count > 0 {
             let found = format!("element {} without properties", element.name);
-            return Err(self.input.error("header", "properties for every element with rows", found));
+            return Err(self.input.error(
+                "header",
+                "properties for every element with rows",
+                found,
+            ));
         }
         // The last line of an ascii file may lack its end.
         if element.count.saturating_mul(row) > self.bytes_left() + 1 {
             let expected = format!("{} rows of element {}", element.count, element.name);
-            return Err(self.input.error(self.place(), expected, format!("only {} bytes more", self.bytes_left())));
+            return Err(self.input.error(
+                self.place(),
+                expected,
+                format!("only {} bytes more", self.bytes_left()),
+            ));
         }
         Ok(())
     }
@@ -65,7 +73,9 @@ impl<'a> Body<'a> {
     pub fn place(&self) -> String {
         match &self.source {
             Source::Text(words) => format!("{}, {} {}", words.place(), self.element, self.row),
-            Source::Binary { offset, .. } => format!("byte {offset}, {} {}", self.element, self.row),
+            Source::Binary { offset, .. } => {
+                format!("byte {offset}, {} {}", self.element, self.row)
+            }
         }
     }
 
@@ -80,7 +90,11 @@ impl<'a> Body<'a> {
             Source::Binary { offset, big_endian } => {
                 let size = kind.size();
                 let Some(bytes) = self.input.bytes.get(*offset..*offset + size) else {
-                    return Err(self.input.error(self.place(), format!("{size} bytes"), "the end of the file"));
+                    return Err(self.input.error(
+                        self.place(),
+                        format!("{size} bytes"),
+                        "the end of the file",
+                    ));
                 };
                 let mut little = [0; 8];
                 little[..size].copy_from_slice(bytes);

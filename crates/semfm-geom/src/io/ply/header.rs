@@ -111,7 +111,11 @@ impl<'a> Header<'a> {
                 }
                 [b"property", ref property @ ..] => {
                     let Some(element) = elements.last_mut() else {
-                        return Err(input.error(line.place(), "an element before its properties", quote(line.text)));
+                        return Err(input.error(
+                            line.place(),
+                            "an element before its properties",
+                            quote(line.text),
+                        ));
                     };
                     let property = parse_property(input, line, element, property)?;
                     element.properties.push(property);
@@ -126,7 +130,13 @@ impl<'a> Header<'a> {
                     }
                     return Ok(Self { encoding, elements, lines });
                 }
-                _ => return Err(input.error(line.place(), "a line of a PLY 1.0 header", quote(line.text))),
+                _ => {
+                    return Err(input.error(
+                        line.place(),
+                        "a line of a PLY 1.0 header",
+                        quote(line.text),
+                    ));
+                }
             }
         }
     }
@@ -137,37 +147,72 @@ fn encoding_from_name(input: Input<'_>, line: Line<'_>, name: &[u8]) -> Result<E
         b"ascii" => Ok(Encoding::Ascii),
         b"binary_little_endian" => Ok(Encoding::Little),
         b"binary_big_endian" => Ok(Encoding::Big),
-        _ => Err(input.error(line.place(), "ascii, binary_little_endian or binary_big_endian", quote(name))),
+        _ => Err(input.error(
+            line.place(),
+            "ascii, binary_little_endian or binary_big_endian",
+            quote(name),
+        )),
     }
 }
 
-fn element(input: Input<'_>, line: Line<'_>, elements: &[Element], name: &[u8], count: &[u8]) -> Result<Element> {
+fn element(
+    input: Input<'_>,
+    line: Line<'_>,
+    elements: &[Element],
+    name: &[u8],
+    count: &[u8],
+) -> Result<Element> {
     let name = String::from_utf8_lossy(name).into_owned();
     if elements.iter().any(|element| element.name == name) {
-        return Err(input.error(line.place(), "each element once", format!("a second element {name}")));
+        return Err(input.error(
+            line.place(),
+            "each element once",
+            format!("a second element {name}"),
+        ));
     }
-    let count = std::str::from_utf8(count).ok().and_then(|text| text.parse().ok()).ok_or_else(|| {
-        input.error(line.place(), format!("the number of rows of element {name}"), quote(count))
-    })?;
+    let count =
+        std::str::from_utf8(count).ok().and_then(|text| text.parse().ok()).ok_or_else(|| {
+            input.error(line.place(), format!("the number of rows of element {name}"), quote(count))
+        })?;
     Ok(Element { name, count, properties: Vec::new() })
 }
 
-fn parse_property(input: Input<'_>, line: Line<'_>, element: &Element, words: &[&[u8]]) -> Result<Property> {
+fn parse_property(
+    input: Input<'_>,
+    line: Line<'_>,
+    element: &Element,
+    words: &[&[u8]],
+) -> Result<Property> {
     let scalar = |name: &[u8]| {
-        Scalar::from_name(name).ok_or_else(|| input.error(line.place(), "a PLY number type", quote(name)))
+        Scalar::from_name(name)
+            .ok_or_else(|| input.error(line.place(), "a PLY number type", quote(name)))
     };
     let (length, kind, name) = match *words {
         [b"list", length, kind, name] => (Some(scalar(length)?), scalar(kind)?, name),
         [kind, name] => (None, scalar(kind)?, name),
-        _ => return Err(input.error(line.place(), "the type and the name of a property", quote(line.text))),
+        _ => {
+            return Err(input.error(
+                line.place(),
+                "the type and the name of a property",
+                quote(line.text),
+            ));
+        }
     };
     if length.is_some_and(|length| !length.is_integer()) {
-        return Err(input.error(line.place(), "a whole-number type for a list's length", quote(line.text)));
+        return Err(input.error(
+            line.place(),
+            "a whole-number type for a list's length",
+            quote(line.text),
+        ));
     }
     let name = String::from_utf8_lossy(name).into_owned();
     if element.properties.iter().any(|property| property.name == name) {
         let found = format!("a second property {name}");
-        return Err(input.error(line.place(), format!("each property of {} once", element.name), found));
+        return Err(input.error(
+            line.place(),
+            format!("each property of {} once", element.name),
+            found,
+        ));
     }
     Ok(Property { name, length, scalar: kind })
 }

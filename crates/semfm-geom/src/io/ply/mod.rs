@@ -65,7 +65,12 @@ impl PlyFile {
         Ok(file)
     }
 
-    fn read_vertices(&mut self, input: Input<'_>, body: &mut Body<'_>, element: &Element) -> Result<()> {
+    fn read_vertices(
+        &mut self,
+        input: Input<'_>,
+        body: &mut Body<'_>,
+        element: &Element,
+    ) -> Result<()> {
         let place = || format!("header, element {}", element.name);
         let columns = |names: &[&str]| columns(element, names);
         let Some(xyz) = columns(&["x", "y", "z"]).filter(|_| element.count < NO_UV as usize) else {
@@ -90,11 +95,17 @@ impl PlyFile {
             self.vertices.push(DVec3::new(values[xyz[0]], values[xyz[1]], values[xyz[2]]));
             if let Some(rgb) = &rgb {
                 let channel = |column: usize| {
-                    let full = if element.properties[column].scalar.is_integer() { 255.0 } else { 1.0 };
+                    let full =
+                        if element.properties[column].scalar.is_integer() { 255.0 } else { 1.0 };
                     (values[column] / full) as f32
                 };
                 let a = alpha.as_ref().map_or(f32::NAN, |alpha| channel(alpha[0]));
-                colors.push(rgba_from_floats([channel(rgb[0]), channel(rgb[1]), channel(rgb[2]), a]));
+                colors.push(rgba_from_floats([
+                    channel(rgb[0]),
+                    channel(rgb[1]),
+                    channel(rgb[2]),
+                    a,
+                ]));
             }
             if let Some(uv) = &uv {
                 // PLY counts v from the bottom of the image.
@@ -131,7 +142,9 @@ impl Faces<'_> {
             texture.clear();
             for property in &self.element.properties {
                 match property.length {
-                    Some(_) if is_ids(property) => self.read_ids(input, body, property, strips, &mut ids)?,
+                    Some(_) if is_ids(property) => {
+                        self.read_ids(input, body, property, strips, &mut ids)?
+                    }
                     Some(length) if property.name == "texcoord" && !self.vertex_uvs => {
                         let n_items = body.length(length, property.scalar)?;
                         for _ in 0..n_items {
@@ -168,7 +181,11 @@ impl Faces<'_> {
                 ids.push(RESTART);
                 continue;
             }
-            if given < 0.0 || given >= self.n_vertices as f64 || given.fract() != 0.0 || given.is_nan() {
+            if given < 0.0
+                || given >= self.n_vertices as f64
+                || given.fract() != 0.0
+                || given.is_nan()
+            {
                 let expected = format!("one of the {} vertices, from 0", self.n_vertices);
                 return Err(input.error(body.place(), expected, given.to_string()));
             }
@@ -212,14 +229,15 @@ fn push_strips(polygons: &mut Polygons, ids: &[u32], vertex_uvs: bool) {
 
 /// The columns with these names, if all are there and none is a list.
 fn columns(element: &Element, names: &[&str]) -> Option<Vec<usize>> {
-    let column = |name: &&str| {
-        element.properties.iter().position(|p| p.name == *name && p.length.is_none())
-    };
+    let column =
+        |name: &&str| element.properties.iter().position(|p| p.name == *name && p.length.is_none());
     names.iter().map(column).collect()
 }
 
 fn uv_columns(element: &Element) -> Option<Vec<usize>> {
-    [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]].iter().find_map(|names| columns(element, names))
+    [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]]
+        .iter()
+        .find_map(|names| columns(element, names))
 }
 
 fn skip_rows(body: &mut Body<'_>, element: &Element) -> Result<()> {
