@@ -5,10 +5,11 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::Mesh;
+use crate::math::DVec3;
 
 /// What is regular and what is not about the connectivity of a mesh.
 ///
-/// An edge is a pair of different vertices that some triangle joins. Counts are of the mesh as it
+/// An edge is a pair of vertices that a triangle with three different vertices joins. Counts are of the mesh as it
 /// stands: vertices at the same place are different vertices until somebody merges them.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeshReport {
@@ -175,12 +176,13 @@ impl HalfEdges {
     fn new(mesh: &Mesh) -> Self {
         let mut sides = Vec::with_capacity(3 * mesh.n_faces());
         for (face, ids) in mesh.faces().iter().enumerate() {
+            if names_twice(ids) {
+                continue;
+            }
             for side in 0..3 {
                 let (a, b) = (ids[side], ids[(side + 1) % 3]);
-                if a != b {
-                    let edge = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
-                    sides.push(HalfEdge { edge, corner: (3 * face + side) as u32 });
-                }
+                let edge = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
+                sides.push(HalfEdge { edge, corner: (3 * face + side) as u32 });
             }
         }
         sides.sort_unstable();
@@ -209,6 +211,9 @@ fn non_manifold_vertices(mesh: &Mesh, half_edges: &HalfEdges) -> usize {
     }
     let mut fan_of = vec![u32::MAX; mesh.n_vertices()];
     for (corner, &id) in mesh.faces().as_flattened().iter().enumerate() {
+        if names_twice(&mesh.faces()[corner / 3]) {
+            continue;
+        }
         let fan = fans.root(corner as u32);
         let known = &mut fan_of[id as usize];
         bad[id as usize] |= *known != u32::MAX && *known != fan;
@@ -218,8 +223,11 @@ fn non_manifold_vertices(mesh: &Mesh, half_edges: &HalfEdges) -> usize {
 }
 
 fn is_degenerate(mesh: &Mesh, face: usize) -> bool {
-    let [a, b, c] = mesh.faces()[face];
-    a == b || b == c || c == a || mesh.face_normal_scaled(face).length_squared() == 0.0
+    names_twice(&mesh.faces()[face]) || mesh.face_normal_scaled(face) == DVec3::ZERO
+}
+
+fn names_twice(&[a, b, c]: &[u32; 3]) -> bool {
+    a == b || b == c || c == a
 }
 
 fn duplicate_faces(mesh: &Mesh) -> usize {
@@ -266,7 +274,6 @@ impl DisjointSets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DVec3;
 
     fn mesh(n_vertices: usize, faces: &[[u32; 3]]) -> Mesh {
         let place = |i: usize| DVec3::new(i as f64, (i * i) as f64, (i % 3) as f64);

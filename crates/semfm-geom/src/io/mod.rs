@@ -20,6 +20,7 @@ mod ply;
 mod polygon;
 mod stl;
 mod text;
+mod write;
 
 use std::path::Path;
 
@@ -27,6 +28,7 @@ pub use self::appearance::{Appearance, Material};
 pub use self::atomic::write_atomically;
 pub use self::image::{Texture, Wrap};
 use self::input::{Input, quote, read_file};
+pub use self::write::{Paint, write_mesh, write_painted_mesh};
 use crate::math::DVec3;
 use crate::{Error, Mesh, Result};
 

@@ -6,6 +6,10 @@ use crate::math::{DVec2, DVec3};
 /// time, and at 256 a hostile file of nothing but such polygons costs as much as its parsing.
 const MAX_EAR_CORNERS: usize = 256;
 
+/// A corner that turns the wrong way by less than this share of the polygon's area counts as
+/// straight: coordinates with six digits leave corners on straight sides that off.
+const STRAIGHT: f64 = 1e-6;
+
 /// The faces of a file before they are cut, one after the other.
 #[derive(Default)]
 pub(crate) struct Polygons {
@@ -109,13 +113,15 @@ impl PolygonCutter {
         let origin = corners[0];
         let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
         let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        let double_area = normal.length();
         let Some(normal) = normal.try_normalize() else { return false };
         let (x, y) = normal.any_orthonormal_pair();
         self.flat.clear();
         self.flat
             .extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
         let n = self.flat.len();
-        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < 0.0)
+        let reflex = -STRAIGHT * double_area;
+        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < reflex)
     }
 
     /// Cuts ears off the flat polygon; false where it runs out of them early.
