@@ -35,6 +35,8 @@ impl Hit {
 /// position ((i + ½)/per_pixel, (j + ½)/per_pixel).
 pub(crate) struct Raster {
     pub per_pixel: u32,
+    /// Pixels from one sample to the next.
+    spacing: f64,
     /// Samples in a row.
     pub width: usize,
     /// Rows of the grid that this band covers.
@@ -48,7 +50,9 @@ impl Raster {
     pub fn new(projection: &Projection<'_>, per_pixel: u32, rows: Range<usize>) -> Self {
         let width = projection.camera.width as usize * per_pixel as usize;
         let n_samples = width * rows.len();
-        let mut raster = Self { per_pixel, width, rows, hits: vec![Hit::NONE; n_samples] };
+        let spacing = 1.0 / f64::from(per_pixel);
+        let hits = vec![Hit::NONE; n_samples];
+        let mut raster = Self { per_pixel, spacing, width, rows, hits };
         for face in 0..projection.mesh.n_faces() {
             let bounds = projection.pixel_box(face);
             let columns = raster.samples_in(bounds.low[0], bounds.high[0], 0..width);
@@ -66,7 +70,7 @@ impl Raster {
 
     /// Pixel position of the centre of a grid row or column.
     pub fn position(&self, sample: usize) -> f64 {
-        (sample as f64 + 0.5) / f64::from(self.per_pixel)
+        (sample as f64 + 0.5) * self.spacing
     }
 
     /// Grid rows or columns whose positions lie within [low, high], clipped to `allowed`.
@@ -87,14 +91,14 @@ impl Raster {
         let per_pixel = f64::from(self.per_pixel);
         let edges = forms.weights.map(|weight| Edge::new(weight, per_pixel));
         let [lowest, highest] = forms.bounds;
-        let slope = forms.inverse_depth.du / per_pixel;
+        let slope = forms.inverse_depth.du * self.spacing;
         for row in rows {
             let v = self.position(row);
             let span = span(&edges, v, &columns);
             if span.is_empty() {
                 continue;
             }
-            let start = forms.inverse_depth.row(v) + forms.inverse_depth.du * 0.5 / per_pixel;
+            let start = forms.inverse_depth.row(v) + 0.5 * slope;
             let mut column = span.start as f64;
             let first = (row - self.rows.start) * self.width;
             for hit in &mut self.hits[first..][span] {

@@ -32,9 +32,9 @@ pub(crate) struct LinearForm {
 
 impl LinearForm {
     /// The form `ray(u, v) · n` for a vector in camera coordinates; odd in `n` to the last bit.
-    fn of(n: DVec3, camera: &Camera) -> Self {
-        let (du, dv) = (n.x / camera.fx, n.y / camera.fy);
-        Self { du, dv, constant: n.z - (du * camera.cx + dv * camera.cy) }
+    fn of(n: DVec3, lens: &Lens) -> Self {
+        let (du, dv) = (n.x * lens.per_fx, n.y * lens.per_fy);
+        Self { du, dv, constant: n.z - (du * lens.cx + dv * lens.cy) }
     }
 
     pub fn at(&self, u: f64, v: f64) -> f64 {
@@ -51,6 +51,15 @@ impl LinearForm {
     }
 }
 
+/// The camera's intrinsics as the forms need them: 1/fx, 1/fy, cx, cy.
+#[derive(Clone, Copy, Debug)]
+struct Lens {
+    per_fx: f64,
+    per_fy: f64,
+    cx: f64,
+    cy: f64,
+}
+
 /// A rectangle of pixel positions; empty where `low > high`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelBox {
@@ -62,6 +71,7 @@ pub(crate) struct PixelBox {
 pub(crate) struct Projection<'a> {
     pub camera: &'a Camera,
     pub mesh: &'a Mesh,
+    lens: Lens,
     points: Vec<DVec3>,
     /// Pixel position of each vertex; NaN at and behind the camera's plane.
     pixels: Vec<[f64; 2]>,
@@ -93,7 +103,9 @@ impl<'a> Projection<'a> {
             }
         };
         let pixels = points.iter().map(pixel).collect();
-        Self { camera, mesh, points, pixels }
+        let lens =
+            Lens { per_fx: 1.0 / camera.fx, per_fy: 1.0 / camera.fy, cx: camera.cx, cy: camera.cy };
+        Self { camera, mesh, lens, points, pixels }
     }
 
     /// Where triangle `face` can be in the image: everywhere, if it reaches behind the camera.
@@ -128,13 +140,13 @@ impl<'a> Projection<'a> {
         }
         let sign = volume.signum();
         let weight =
-            |from: DVec3, to: DVec3| LinearForm::of(from.cross(to), self.camera).scaled(sign);
+            |from: DVec3, to: DVec3| LinearForm::of(from.cross(to), &self.lens).scaled(sign);
         let depths = [a.z, b.z, c.z];
         let nearest = depths.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = depths.into_iter().fold(f64::NEG_INFINITY, f64::max);
         Some(TriangleForms {
             weights: [weight(b, c), weight(c, a), weight(a, b)],
-            inverse_depth: LinearForm::of(normal, self.camera).scaled(1.0 / volume),
+            inverse_depth: LinearForm::of(normal, &self.lens).scaled(1.0 / volume),
             bounds: if nearest > 0.0 {
                 [1.0 / farthest, 1.0 / nearest]
             } else {
