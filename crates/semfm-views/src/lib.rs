@@ -18,7 +18,6 @@ pub mod view;
 
 pub use camera::Camera;
 pub use embeddings::{EmbeddedView, PatchEmbeddings};
-pub use error::{Error, Result};
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
 pub use render::{Paint, RenderSettings, render};
 pub use rig::{RigSettings, rig};
