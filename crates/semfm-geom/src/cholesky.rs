@@ -82,6 +82,11 @@ impl SparseCholesky {
         self.symbolic.nrows()
     }
 
+    /// The analysis of the sparsity pattern, for further factorisations of like matrices.
+    pub(crate) fn symbolic(&self) -> &SymbolicCholesky<usize> {
+        &self.symbolic
+    }
+
     /// Numbers stored in the factor R, fill-in and supernodal padding included.
     pub fn n_stored(&self) -> usize {
         self.values.len()

@@ -130,7 +130,8 @@ pub fn moebius(n: usize, width: usize) -> Mesh {
 
 /// A book of `pages` flat sheets that share their spine: its edges have `pages` triangles each.
 pub fn book(pages: usize, nx: usize, ny: usize) -> Mesh {
-    let mut vertices: Vec<DVec3> = (0..ny).map(|j| DVec3::new(0.0, 0.0, j as f64 / (ny - 1) as f64)).collect();
+    let mut vertices: Vec<DVec3> =
+        (0..ny).map(|j| DVec3::new(0.0, 0.0, j as f64 / (ny - 1) as f64)).collect();
     let mut faces = Vec::new();
     for page in 0..pages {
         let angle = TAU * page as f64 / pages as f64 + 0.2 * page as f64;
@@ -138,10 +139,15 @@ pub fn book(pages: usize, nx: usize, ny: usize) -> Mesh {
         for j in 0..ny {
             for i in 1..nx {
                 let r = i as f64 / (nx - 1) as f64;
-                vertices.push(DVec3::new(r * angle.cos(), r * angle.sin(), j as f64 / (ny - 1) as f64));
+                vertices.push(DVec3::new(
+                    r * angle.cos(),
+                    r * angle.sin(),
+                    j as f64 / (ny - 1) as f64,
+                ));
             }
         }
-        let id = |i: u32, j: u32| if i == 0 { j } else { first as u32 + j * (nx as u32 - 1) + i - 1 };
+        let id =
+            |i: u32, j: u32| if i == 0 { j } else { first as u32 + j * (nx as u32 - 1) + i - 1 };
         let local = sheet(nx, ny, 0);
         faces.extend(local.iter().map(|f| f.map(|v| id(v % nx as u32, v / nx as u32))));
     }

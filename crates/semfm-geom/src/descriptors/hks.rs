@@ -31,7 +31,11 @@ impl Default for HksSettings {
 /// [`Error::OutOfRange`] for no times, or a basis without an eigenvalue above zero.
 pub fn hks(basis: &Eigenbasis, settings: &HksSettings) -> Result<Mat<f64>> {
     if settings.n_times == 0 {
-        return Err(Error::OutOfRange { what: "n_times", expected: "1 or more".into(), found: "0".into() });
+        return Err(Error::OutOfRange {
+            what: "n_times",
+            expected: "1 or more".into(),
+            found: "0".into(),
+        });
     }
     let (smallest, largest) = spectrum(basis)?;
     let log_time = |lambda: f64| (4.0 * LN_10 / lambda).ln();

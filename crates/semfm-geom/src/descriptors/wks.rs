@@ -35,7 +35,11 @@ const BAND: f64 = 7.0;
 pub fn wks(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
     let n = settings.n_energies;
     if n == 0 {
-        return Err(Error::OutOfRange { what: "n_energies", expected: "1 or more".into(), found: "0".into() });
+        return Err(Error::OutOfRange {
+            what: "n_energies",
+            expected: "1 or more".into(),
+            found: "0".into(),
+        });
     }
     let (smallest, largest) = spectrum(basis)?;
     let (low, high) = (smallest.ln(), largest.ln());

@@ -45,22 +45,38 @@ pub struct BridgedLaplacian {
 /// # Errors
 /// [`Error::Length`] where Laplacian and mesh differ in vertices, [`Error::OutOfRange`] for a
 /// weight that is not positive or a reach that is negative.
-pub fn bridge(laplacian: &Laplacian, mesh: &Mesh, settings: &BridgeSettings) -> Result<BridgedLaplacian> {
+pub fn bridge(
+    laplacian: &Laplacian,
+    mesh: &Mesh,
+    settings: &BridgeSettings,
+) -> Result<BridgedLaplacian> {
     let n = laplacian.n_vertices();
     if n != mesh.n_vertices() {
-        return Err(Error::Length { what: "vertices of the mesh", expected: n, found: mesh.n_vertices() });
+        return Err(Error::Length {
+            what: "vertices of the mesh",
+            expected: n,
+            found: mesh.n_vertices(),
+        });
     }
     for (what, value, valid) in [
         ("bridge weight", settings.weight, settings.weight > 0.0),
         ("bridge reach", settings.reach, settings.reach >= 0.0),
     ] {
         if !(valid && value.is_finite()) {
-            return Err(Error::OutOfRange { what, expected: "a positive number".into(), found: value.to_string() });
+            return Err(Error::OutOfRange {
+                what,
+                expected: "a positive number".into(),
+                found: value.to_string(),
+            });
         }
     }
     let (labels, n_components) = components(n, &laplacian.stiffness);
     if n_components == 1 {
-        return Ok(BridgedLaplacian { laplacian: laplacian.clone(), n_components, bridges: Vec::new() });
+        return Ok(BridgedLaplacian {
+            laplacian: laplacian.clone(),
+            n_components,
+            bridges: Vec::new(),
+        });
     }
     let mut bridges = links(mesh, labels, settings.reach * median_edge(mesh));
     bridges.sort_unstable();
@@ -202,10 +218,11 @@ mod tests {
             assert_eq!(components(n, &bridged.laplacian.stiffness).1, 1, "{name}");
             assert!(bridged.bridges.len() + 1 >= bridged.n_components, "{name}");
             assert_eq!(bridged.bridges.is_empty(), bridged.n_components == 1, "{name}");
-            let sums = bridged.laplacian.stiffness.triplet_iter().fold(vec![0.0; n], |mut sums, t| {
-                sums[t.row] += t.val;
-                sums
-            });
+            let sums =
+                bridged.laplacian.stiffness.triplet_iter().fold(vec![0.0; n], |mut sums, t| {
+                    sums[t.row] += t.val;
+                    sums
+                });
             assert!(sums.iter().all(|s: &f64| s.abs() < 1e-6), "{name}: rows sum to zero");
         }
     }
@@ -216,7 +233,8 @@ mod tests {
             let left = DVec3::X * (1.0 + gap) * i as f64;
             [left, left + DVec3::X, left + DVec3::new(0.5, 0.75f64.sqrt(), 0.0)]
         });
-        Mesh::new(corners.collect(), (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
+        Mesh::new(corners.collect(), (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+            .unwrap()
     }
 
     #[test]

@@ -33,9 +33,15 @@ impl Default for CloudSettings {
 /// [`Error::NoArea`] where no point has neighbours that span a plane, [`Error::NotFinite`] for
 /// coordinates, [`Error::OutOfRange`] for fewer than three points or neighbours.
 pub fn point_cloud_laplacian(points: &[DVec3], settings: &CloudSettings) -> Result<Laplacian> {
-    for (what, found) in [("points of a cloud", points.len()), ("n_neighbors", settings.n_neighbors)] {
+    for (what, found) in
+        [("points of a cloud", points.len()), ("n_neighbors", settings.n_neighbors)]
+    {
         if found < 3 {
-            return Err(Error::OutOfRange { what, expected: "3 or more".into(), found: found.to_string() });
+            return Err(Error::OutOfRange {
+                what,
+                expected: "3 or more".into(),
+                found: found.to_string(),
+            });
         }
     }
     let triangles = union_of_stars(points, settings.n_neighbors)?;
@@ -103,8 +109,11 @@ mod tests {
         let area: f64 = laplacian.mass.iter().sum();
         assert!((area / (4.0 * PI) - 1.0).abs() < 0.01, "area {area}");
         // z is an eigenfunction with λ = 2, and ∫ z² = 4π / 3.
-        let energy: f64 =
-            laplacian.stiffness.triplet_iter().map(|t| points[t.row].z * t.val * points[t.col].z).sum();
+        let energy: f64 = laplacian
+            .stiffness
+            .triplet_iter()
+            .map(|t| points[t.row].z * t.val * points[t.col].z)
+            .sum();
         assert!((energy / (8.0 * PI / 3.0) - 1.0).abs() < 0.01, "Dirichlet energy {energy}");
     }
 
@@ -122,8 +131,10 @@ mod tests {
         let points = zoo::spiral_cloud(500);
         let moved: Vec<DVec3> = points.iter().map(|&p| p + DVec3::new(64.0, -32.0, 16.0)).collect();
         let settings = CloudSettings::default();
-        let (here, there) =
-            (point_cloud_laplacian(&points, &settings).unwrap(), point_cloud_laplacian(&moved, &settings).unwrap());
+        let (here, there) = (
+            point_cloud_laplacian(&points, &settings).unwrap(),
+            point_cloud_laplacian(&moved, &settings).unwrap(),
+        );
         for (a, b) in here.mass.iter().zip(&there.mass) {
             assert!((a - b).abs() < 1e-9 * a.abs().max(1e-3), "{a} here, {b} there");
         }
@@ -136,9 +147,15 @@ mod tests {
         let doubled = point_cloud_laplacian(&points, &CloudSettings::default()).unwrap();
         assert!(doubled.mass.iter().all(|&m| m > 0.0));
         let line: Vec<DVec3> = (0..50).map(|i| DVec3::X * f64::from(i)).collect();
-        assert!(matches!(point_cloud_laplacian(&line, &CloudSettings::default()), Err(Error::NoArea { .. })));
+        assert!(matches!(
+            point_cloud_laplacian(&line, &CloudSettings::default()),
+            Err(Error::NoArea { .. })
+        ));
         let two = [DVec3::ZERO, DVec3::X];
-        assert!(matches!(point_cloud_laplacian(&two, &CloudSettings::default()), Err(Error::OutOfRange { .. })));
+        assert!(matches!(
+            point_cloud_laplacian(&two, &CloudSettings::default()),
+            Err(Error::OutOfRange { .. })
+        ));
         let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let laplacian = point_cloud_laplacian(&triangle, &CloudSettings::default()).unwrap();
         assert!((laplacian.mass.iter().sum::<f64>() - 0.5).abs() < 1e-4);

@@ -141,7 +141,12 @@ fn glue(cover: &mut IntrinsicTriangulation, fan: &[u32], tail: u32) {
 ///
 /// Copies of one triangle have the same angle. Their order decides what is glued to what, so it
 /// is fixed: the first, then from the last to the second, as the authors' code meets them.
-fn sort_by_angle(points: &[DVec3], faces: &[[u32; 3]], fan: &[u32], by_angle: &mut Vec<(f64, u32)>) {
+fn sort_by_angle(
+    points: &[DVec3],
+    faces: &[[u32; 3]],
+    fan: &[u32],
+    by_angle: &mut Vec<(f64, u32)>,
+) {
     let corner = |h: u32, k: usize| points[faces[h as usize / 3][(h as usize + k) % 3] as usize];
     let (tail, tip) = (corner(fan[0], 0), corner(fan[0], 1));
     let axis = (tip - tail).normalize_or(DVec3::Z);

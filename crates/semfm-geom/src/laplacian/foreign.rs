@@ -65,10 +65,15 @@ impl ForeignIndex {
         }
         for at in (0..self.nodes.len()).rev() {
             self.nodes[at].label = match self.nodes[at].halves {
-                Some([left, right]) => self.nodes[left].label.filter(|_| self.nodes[left].label == self.nodes[right].label),
+                Some([left, right]) => self.nodes[left]
+                    .label
+                    .filter(|_| self.nodes[left].label == self.nodes[right].label),
                 None => {
                     let labels = &self.labels[self.nodes[at].range.clone()];
-                    labels.first().copied().filter(|first| labels.iter().all(|label| label == first))
+                    labels
+                        .first()
+                        .copied()
+                        .filter(|first| labels.iter().all(|label| label == first))
                 }
             };
         }
@@ -138,7 +143,8 @@ mod tests {
     #[test]
     fn it_finds_what_a_full_search_finds_before_and_after_relabelling() {
         let points = zoo::spiral_cloud(700);
-        let mut labels: Vec<u32> = points.iter().map(|p| u32::from(p.z > 0.3) + u32::from(p.x > 0.0)).collect();
+        let mut labels: Vec<u32> =
+            points.iter().map(|p| u32::from(p.z > 0.3) + u32::from(p.x > 0.0)).collect();
         let mut index = ForeignIndex::new(&points, &labels);
         for _ in 0..2 {
             for (i, &point) in points.iter().enumerate() {

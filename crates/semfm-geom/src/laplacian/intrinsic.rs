@@ -112,14 +112,16 @@ impl IntrinsicTriangulation {
         }
         let (near, far) = (self.corner(h), self.corner(other));
         // (cot α + cot β) / 2 < −ε, without the divisions.
-        let (sum, product) = (near.cosine * far.sine + far.cosine * near.sine, near.sine * far.sine);
+        let (sum, product) =
+            (near.cosine * far.sine + far.cosine * near.sine, near.sine * far.sine);
         if sum >= -2.0 * DELAUNAY_TOLERANCE * product {
             return false;
         }
         // Lay both triangles out along the edge: their apexes are the ends of the new edge.
         let length = self.length[h];
         let square = |h: usize| self.length[h] * self.length[h];
-        let along = |from_tail: f64, from_tip: f64| (square(h) + from_tail - from_tip) / (2.0 * length);
+        let along =
+            |from_tail: f64, from_tip: f64| (square(h) + from_tail - from_tip) / (2.0 * length);
         let above = along(square(previous(h)), square(next(h)));
         let below = along(square(next(other)), square(previous(other)));
         let height = (near.sine + far.sine) / (2.0 * length);
@@ -150,7 +152,8 @@ impl IntrinsicTriangulation {
             s if s == bc => db,
             s => s,
         };
-        let sides = [bc, ca, ad, db].map(|s| (moved(s), moved(self.twin[s] as usize), self.length[s]));
+        let sides =
+            [bc, ca, ad, db].map(|s| (moved(s), moved(self.twin[s] as usize), self.length[s]));
         for (slot, twin, side_length) in sides {
             self.twin[slot] = twin as u32;
             self.twin[twin] = slot as u32;

@@ -109,7 +109,11 @@ mod tests {
             (0..i).for_each(|j| assert_eq!(dense[(i, j)], dense[(j, i)], "{name}: ({i}, {j})"));
         }
         let eigen = dense.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
-        assert!(eigen[0] >= -1e-12 * scale * n as f64, "{name}: smallest eigenvalue {:.1e}", eigen[0]);
+        assert!(
+            eigen[0] >= -1e-12 * scale * n as f64,
+            "{name}: smallest eigenvalue {:.1e}",
+            eigen[0]
+        );
         assert!(laplacian.mass.iter().all(|&m| m > 0.0), "{name}: a mass is not positive");
     }
 
@@ -122,7 +126,10 @@ mod tests {
                 let (total, area) = (laplacian.mass.iter().sum::<f64>(), mesh.area());
                 // Mollification lengthens every edge by as little as it can: at most 1e-5 of the
                 // mean edge, which the million-to-one slivers feel most.
-                assert!((total / area - 1.0).abs() < 1e-3, "{name} {kind:?}: mass {total}, area {area}");
+                assert!(
+                    (total / area - 1.0).abs() < 1e-3,
+                    "{name} {kind:?}: mass {total}, area {area}"
+                );
             }
         }
     }
@@ -135,7 +142,8 @@ mod tests {
             let root: Vec<f64> = laplacian.mass.iter().map(|m| m.sqrt()).collect();
             let pieces = bridges::components(n, &laplacian.stiffness).1;
             // Vertices without mass would hide the scale of the spectrum.
-            let keep: Vec<usize> = (0..n).filter(|&i| laplacian.mass[i] > 1e-6 * mesh.area() / n as f64).collect();
+            let keep: Vec<usize> =
+                (0..n).filter(|&i| laplacian.mass[i] > 1e-6 * mesh.area() / n as f64).collect();
             let isolated = n - keep.len();
             let mut dense = Mat::<f64>::zeros(keep.len(), keep.len());
             for (a, &i) in keep.iter().enumerate() {
@@ -145,7 +153,8 @@ mod tests {
                 }
             }
             let eigen = dense.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
-            let zeros = eigen.iter().filter(|&&value| value < 1e-9 * eigen[eigen.len() - 1]).count();
+            let zeros =
+                eigen.iter().filter(|&&value| value < 1e-9 * eigen[eigen.len() - 1]).count();
             assert_eq!(zeros, pieces - isolated, "{name}: null space against pieces with area");
         }
     }

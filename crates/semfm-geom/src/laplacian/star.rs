@@ -63,7 +63,8 @@ impl StarFinder {
         let reach = neighbours.iter().map(|q| q.position.length()).fold(0.0, f64::max);
         if reach > 0.0 {
             let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-            let corner = |(x, y)| CellCorner { position: DVec2::new(x, y) * FAR * reach, neighbour: None };
+            let corner =
+                |(x, y)| CellCorner { position: DVec2::new(x, y) * FAR * reach, neighbour: None };
             self.cell.extend(square.map(corner));
         }
         for (i, q) in neighbours.iter().enumerate() {
@@ -74,9 +75,7 @@ impl StarFinder {
         }
         let n = self.cell.len();
         // Two bisectors that meet at a corner: the one that ends there and the one that starts.
-        (0..n).filter_map(move |k| {
-            self.cell[(k + n - 1) % n].neighbour.zip(self.cell[k].neighbour)
-        })
+        (0..n).filter_map(move |k| self.cell[(k + n - 1) % n].neighbour.zip(self.cell[k].neighbour))
     }
 
     /// Keeps the side x · q ≤ `limit` of the bisector towards neighbour `id` at q.
@@ -114,8 +113,9 @@ mod tests {
 
     fn star(positions: impl IntoIterator<Item = DVec2>) -> Vec<(u32, u32)> {
         let positions = positions.into_iter().enumerate();
-        let neighbours: Vec<_> =
-            positions.map(|(i, position)| Neighbour { position, lift: lift(i + 1) - lift(0) }).collect();
+        let neighbours: Vec<_> = positions
+            .map(|(i, position)| Neighbour { position, lift: lift(i + 1) - lift(0) })
+            .collect();
         let mut star: Vec<_> = StarFinder::default().star(&neighbours).collect();
         star.sort_unstable();
         star

@@ -37,7 +37,10 @@ pub fn tufted_laplacian(mesh: &Mesh, settings: &TuftedSettings) -> Result<Laplac
 }
 
 /// The intrinsic Delaunay triangulation of a mesh's tufted cover.
-pub(super) fn delaunay_cover(mesh: &Mesh, settings: &TuftedSettings) -> Result<IntrinsicTriangulation> {
+pub(super) fn delaunay_cover(
+    mesh: &Mesh,
+    settings: &TuftedSettings,
+) -> Result<IntrinsicTriangulation> {
     let whole = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
     if mesh.faces().iter().all(whole) {
         return delaunay_cover_of_soup(mesh.vertices(), mesh.faces(), settings.mollify_factor);
@@ -56,8 +59,8 @@ pub(super) fn delaunay_cover_of_soup(
         let (what, expected) = ("mollify_factor", "a number of mean edges, 0 or more".into());
         return Err(Error::OutOfRange { what, expected, found: mollify_factor.to_string() });
     }
-    let mut cover =
-        tufted_cover(points, faces, mollify_factor).ok_or(Error::NoArea { n_faces: faces.len() })?;
+    let mut cover = tufted_cover(points, faces, mollify_factor)
+        .ok_or(Error::NoArea { n_faces: faces.len() })?;
     cover.flip_to_delaunay();
     Ok(cover)
 }
@@ -83,11 +86,19 @@ mod tests {
     #[test]
     fn on_a_delaunay_mesh_it_is_the_cotangent_laplacian() {
         let sphere = zoo::icosphere(3);
-        let (tufted, cotan) =
-            (tufted_laplacian(&sphere, &TuftedSettings::default()).unwrap(), cotan_laplacian(&sphere).unwrap());
+        let (tufted, cotan) = (
+            tufted_laplacian(&sphere, &TuftedSettings::default()).unwrap(),
+            cotan_laplacian(&sphere).unwrap(),
+        );
         for t in cotan.stiffness.triplet_iter() {
             let other = tufted.stiffness.get(t.row, t.col).copied().unwrap_or(0.0);
-            assert!((t.val - other).abs() < 1e-12, "({}, {}): {} against {other}", t.row, t.col, t.val);
+            assert!(
+                (t.val - other).abs() < 1e-12,
+                "({}, {}): {} against {other}",
+                t.row,
+                t.col,
+                t.val
+            );
         }
     }
 
@@ -109,6 +120,9 @@ mod tests {
         let line = Mesh::new(vec![DVec3::ZERO, DVec3::X], vec![[0, 1, 1]]).unwrap();
         assert!(matches!(tufted_laplacian(&line, &settings), Err(Error::NoArea { .. })));
         let bad = TuftedSettings { mollify_factor: f64::NAN };
-        assert!(matches!(tufted_laplacian(&zoo::tetrahedron(), &bad), Err(Error::OutOfRange { .. })));
+        assert!(matches!(
+            tufted_laplacian(&zoo::tetrahedron(), &bad),
+            Err(Error::OutOfRange { .. })
+        ));
     }
 }
