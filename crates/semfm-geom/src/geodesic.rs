@@ -25,7 +25,8 @@ impl Default for HeatSettings {
     }
 }
 
-/// Right-hand sides solved together: blocks of 16 cost a third of single solves each.
+/// Right-hand sides solved together. Measured gain per source: 1.05 (23 k vertices) to 1.2 (5 k); the
+/// block mainly bounds the memory.
 const BLOCK: usize = 16;
 
 /// Geodesic distances on one mesh: two matrices are factorised once, then every set of sources
@@ -110,8 +111,8 @@ impl HeatGeodesics {
         Ok(distances.col(0).iter().copied().collect())
     }
 
-    /// Distances (n × s) from each of s sources alone, one column each: several times faster than
-    /// asking one by one.
+    /// Distances (n × s) from each of s sources alone, one column each: a little faster
+    /// than asking one by one.
     ///
     /// # Errors
     /// As [`distances`](Self::distances).
@@ -152,7 +153,7 @@ impl HeatGeodesics {
         Ok(phi)
     }
 
-    /// Integrated −∇ · X around each vertex (Crane et al. 2013, §3.2.1), X = −∇u / |∇u|.
+    /// Integrated −∇ · X around each vertex (Crane et al. 2013), X = −∇u / |∇u|.
     fn negative_divergence(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         let mut sum = Mat::zeros(u.nrows(), u.ncols());
         for j in 0..u.ncols() {

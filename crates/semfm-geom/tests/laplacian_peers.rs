@@ -83,8 +83,7 @@ fn tufted_laplacians_agree_with_robust_laplacian() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The peer's tangent planes depend on where the cloud lies (its centroid is divided by one more
-/// than it sums): moving `cloud_ball` by 10 changes its own entries by 37 % of the largest and its
+/// The peer's tangent planes depend on where the cloud lies (measured): moving `cloud_ball` by 10 changes its own entries by 37 % of the largest and its
 /// area by 1 %. Ours do not move, so no more than that order of agreement can be asked. Measured:
 /// 86 % of the masses equal to 1e-6 on the ball, 70 % on the sheet.
 #[test]
@@ -115,8 +114,8 @@ fn geodesics_agree_with_potpourri3d() {
         let reached: Vec<usize> = (0..ours.len()).filter(|&i| ours[i].is_finite()).collect();
         let longest = reached.iter().map(|&i| theirs[i]).fold(0.0, f64::max);
         let worst = reached.iter().map(|&i| (ours[i] - theirs[i]).abs()).fold(0.0, f64::max);
-        // Measured 4e-6 on the grid: the peer's Poisson system is singular and it factorises it as
-        // it stands, ours is grounded at one vertex.
+        // Measured 4e-6 on the grid. Ours grounds the singular Poisson system at one vertex, the
+        // peer does not; the difference has not been traced further.
         assert!(worst < 1e-4 * longest, "{name}: {worst:.1e} of {longest}");
         assert_eq!(reached.len(), if name == "components" { 63 } else { ours.len() });
     }

@@ -24,7 +24,7 @@ impl Default for HksSettings {
 /// How much heat is left at each vertex after each time, (n × n_times): Σ exp(−λt) φ², divided by
 /// the heat trace Σ exp(−λt) so that all times weigh alike.
 ///
-/// Times run from 4 ln 10 / λ_max to 4 ln 10 / λ_min, as in the paper's section 5, with λ_min the
+/// Times run from 4 ln 10 / λ_max to 4 ln 10 / λ_min, as in the paper, with λ_min the
 /// smallest eigenvalue above zero.
 ///
 /// # Errors
