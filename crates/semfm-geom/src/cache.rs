@@ -12,7 +12,7 @@
 //! | 5 × 8 | n original vertices, n working vertices, m triangles, k, length of the report |
 //! | 24 n_w + 12 m | working mesh |
 //! | 4 n + 4 n_w | `of_original`, `to_original` |
-//! | 36 n | carriers: three ids, three weights |
+//! | 36 n | carriers: weights of all, then corners of all |
 //! | 8 k + 8 n_w k + 8 n_w + 8 k | eigenvalues, eigenfunctions by column, mass, residuals |
 //! | report | JSON |
 //! | 32 | BLAKE3 of everything before |
@@ -196,22 +196,23 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
     bytes.extend(MAGIC);
     bytes.extend(key);
     bytes.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
-    let mut floats = |values: &mut dyn Iterator<Item = f64>, ids: &mut dyn Iterator<Item = u32>| {
+    let mut put = |values: &mut dyn Iterator<Item = f64>, ids: &mut dyn Iterator<Item = u32>| {
         values.for_each(|x| bytes.extend(x.to_le_bytes()));
         ids.for_each(|id| bytes.extend(id.to_le_bytes()));
     };
     let mesh = &working.mesh;
     let ids = [&working.of_original, &working.to_original].into_iter().flatten().copied();
-    floats(
+    put(
         &mut mesh.vertices().iter().flat_map(|p| p.to_array()),
         &mut mesh.faces().iter().flatten().copied().chain(ids),
     );
-    for carrier in &working.carriers {
-        floats(&mut carrier.weights.into_iter(), &mut carrier.corners.into_iter());
-    }
+    put(
+        &mut working.carriers.iter().flat_map(|carrier| carrier.weights),
+        &mut working.carriers.iter().flat_map(|carrier| carrier.corners),
+    );
     let functions = (0..basis.k()).flat_map(|j| basis.functions.col(j).iter().copied());
     let rest = basis.mass.iter().chain(&basis.residuals).copied();
-    floats(
+    put(
         &mut basis.values.iter().copied().chain(functions).chain(rest),
         &mut std::iter::empty(),
     );
@@ -253,15 +254,15 @@ fn decode(
         return None;
     }
     let [n, n_working, m, k, n_report] = counts;
-    let points = reader.floats(3 * n_working)?.as_chunks::<3>().0.iter().map(|&p| p.into());
-    let points: Vec<DVec3> = points.collect();
+    let coordinates = reader.floats(3 * n_working)?;
+    let points = coordinates.as_chunks::<3>().0.iter().map(|&p| DVec3::from_array(p)).collect();
     let faces = reader.ids(3 * m)?.as_chunks::<3>().0.to_vec();
     let (of_original, to_original) = (reader.ids(n)?, reader.ids(n_working)?);
-    let carrier = |reader: &mut Reader<'_>| {
-        let weights = reader.floats(3)?.try_into().ok()?;
-        Some(Carrier { corners: reader.ids(3)?.try_into().ok()?, weights })
-    };
-    let carriers: Vec<Carrier> = (0..n).map(|_| carrier(&mut reader)).collect::<Option<_>>()?;
+    let (weights, corners) = (reader.floats(3 * n)?, reader.ids(3 * n)?);
+    let carriers: Vec<Carrier> = (weights.as_chunks::<3>().0.iter())
+        .zip(corners.as_chunks::<3>().0)
+        .map(|(&weights, &corners)| Carrier { corners, weights })
+        .collect();
     let values = reader.floats(k)?;
     let functions = reader.floats(n_working * k)?;
     let functions = Mat::from_fn(n_working, k, |i, j| functions[j * n_working + i]);
