@@ -5,6 +5,7 @@
 //! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
 //! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
 
+pub mod cholesky;
 pub mod cloud;
 pub mod connectivity;
 pub mod eigenbasis;
