@@ -187,7 +187,7 @@ impl Faces<'_> {
                 || given.is_nan()
             {
                 let expected = format!("one of the {} vertices, from 0", self.n_vertices);
-                return Err(input.error(body.place(), expected, given.to_string()));
+                return Err(input.error(body.place(), expected, format!("{given:?}")));
             }
             ids.push(given as u32);
         }
