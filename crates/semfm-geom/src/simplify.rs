@@ -159,7 +159,8 @@ fn closest_points(
 /// One run of the collapse: the simpler mesh and, for each of its vertices, the vertex before.
 fn on_fewer(mesh: &Mesh, target: usize, task: &Task) -> Result<(Mesh, Vec<u32>)> {
     let Collapsed { faces, kept } = collapse(mesh, target, task)?;
-    let to_before: Vec<u32> = (0..mesh.n_vertices() as u32).filter(|&id| kept[id as usize]).collect();
+    let to_before: Vec<u32> =
+        (0..mesh.n_vertices() as u32).filter(|&id| kept[id as usize]).collect();
     let mut new_id = vec![u32::MAX; mesh.n_vertices()];
     for (new, &before) in (0u32..).zip(&to_before) {
         new_id[before as usize] = new;
