@@ -23,7 +23,12 @@ impl Default for EigenSettings {
 ///
 /// # Errors
 /// [`Error::TooManyEigenpairs`] for k above the vertex count, [`Error::Cancelled`].
-pub fn eigenbasis(laplacian: &Laplacian, k: usize, settings: &EigenSettings, task: &Task) -> Result<Eigenbasis> {
+pub fn eigenbasis(
+    laplacian: &Laplacian,
+    k: usize,
+    settings: &EigenSettings,
+    task: &Task,
+) -> Result<Eigenbasis> {
     let n_vertices = laplacian.n_vertices();
     if k == 0 || k > n_vertices {
         return Err(Error::TooManyEigenpairs { asked: k, n_vertices });

@@ -49,7 +49,8 @@ impl Shape {
     /// [`Error::NoArea`], whatever the eigensolver reports, [`Error::Cancelled`].
     pub fn new(original: Mesh, settings: &ShapeSettings, task: &Task) -> Result<Self> {
         let ids: Vec<u32> = (0..original.n_vertices() as u32).collect();
-        let working = WorkingMesh { mesh: original.clone(), of_original: ids.clone(), to_original: ids };
+        let working =
+            WorkingMesh { mesh: original.clone(), of_original: ids.clone(), to_original: ids };
         let side = working.mesh.area().sqrt();
         if side <= 0.0 {
             return Err(Error::NoArea { n_faces: original.n_faces() });

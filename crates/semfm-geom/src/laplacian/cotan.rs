@@ -26,7 +26,8 @@ pub fn cotan_laplacian(mesh: &Mesh) -> Result<Laplacian> {
         }
         for k in 0..3 {
             let (i, j) = (ids[(k + 1) % 3] as usize, ids[(k + 2) % 3] as usize);
-            let (to_i, to_j) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            let (to_i, to_j) =
+                (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
             let weight = 0.5 * to_i.dot(to_j) / double_area;
             triplets.push(Triplet::new(i, i, weight));
             triplets.push(Triplet::new(j, j, weight));
