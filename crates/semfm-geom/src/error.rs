@@ -122,6 +122,14 @@ pub enum Error {
         /// What stands there.
         found: String,
     },
+    /// A file that follows its format holds something that is not a mesh.
+    #[error("{}: {cause}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its contents; [`Error::code`] and [`Error::place`] are those of it.
+        cause: Box<Error>,
+    },
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
@@ -136,4 +144,39 @@ pub enum Error {
     /// The caller asked the work to stop.
     #[error("cancelled")]
     Cancelled,
+}
+
+impl Error {
+    /// A stable name for the kind of failure, for scripts: kebab-case, one per variant.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::EmptyMesh { .. } => "no-faces",
+            Self::NotFinite { .. } => "non-finite",
+            Self::VertexOutOfRange { .. } => "index-out-of-range",
+            Self::NoArea { .. } => "no-area",
+            Self::Length { .. } => "length",
+            Self::OutOfRange { .. } => "out-of-range",
+            Self::TooManyEigenpairs { .. } => "too-many-eigenpairs",
+            Self::NotConverged { .. } => "not-converged",
+            Self::NotPositiveDefinite { .. } => "not-positive-definite",
+            Self::LinearAlgebra(_) => "linear-algebra",
+            Self::Format { .. } => "format",
+            Self::InFile { cause, .. } => cause.code(),
+            Self::Io { .. } => "io",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Where it went wrong: a line, a byte offset, an element, a vertex; `None` where the failure
+    /// has no place.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::NotFinite { vertex, .. } => Some(format!("vertex {vertex}")),
+            Self::VertexOutOfRange { face, .. } => Some(format!("triangle {face}")),
+            Self::NotPositiveDefinite { row, .. } => Some(format!("row {row}")),
+            Self::Format { place, .. } => Some(place.clone()),
+            Self::InFile { cause, .. } => cause.place(),
+            _ => None,
+        }
+    }
 }

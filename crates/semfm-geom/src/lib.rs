@@ -5,18 +5,28 @@
 //! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
 //! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
 
+pub mod cholesky;
+pub mod clean;
 pub mod cloud;
+mod collapse;
 pub mod connectivity;
+pub mod descriptors;
 pub mod eigenbasis;
 pub mod eigensolver;
 mod error;
+pub mod io;
+pub mod geodesic;
 pub mod laplacian;
 pub mod math;
 pub mod mesh;
 pub mod nearest;
 pub mod sampling;
 pub mod shape;
+pub mod simplify;
+pub mod surface;
 pub mod task;
+#[cfg(any(test, feature = "zoo"))]
+pub mod zoo;
 
 pub use cloud::SemanticCloud;
 pub use eigenbasis::Eigenbasis;
@@ -25,4 +35,5 @@ pub use laplacian::Laplacian;
 pub use mesh::{Mesh, MeshHash};
 pub use nearest::PointIndex;
 pub use shape::{Shape, ShapeSettings};
+pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::Task;

@@ -1,0 +1,68 @@
+//! What can go wrong between two shapes.
+
+/// Result of a call of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Every way in which a pair, a region or a setting can fail to be what it should.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The ground floor refused: a mesh, an eigenbasis, a cancelled task.
+    #[error(transparent)]
+    Geom(#[from] semfm_geom::Error),
+    /// Two arrays that belong together differ in length.
+    #[error("{what}: expected {expected}, found {found}")]
+    Length {
+        /// What was counted.
+        what: &'static str,
+        /// Count expected.
+        expected: usize,
+        /// Count found.
+        found: usize,
+    },
+    /// A number outside its allowed range.
+    #[error("{what}: expected {expected}, found {found}")]
+    OutOfRange {
+        /// Name of the argument.
+        what: &'static str,
+        /// The allowed range, in words.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// A region without a vertex cannot be carried anywhere.
+    #[error("the region is empty: none of {n_vertices} vertices has a weight of at least 0.5")]
+    EmptyRegion {
+        /// Vertices of the mesh it belongs to.
+        n_vertices: usize,
+    },
+    /// A map of this size needs more eigenpairs than the shape's basis holds.
+    #[error("{what} asks for {asked} eigenpairs, but the basis of the {side} holds {available}")]
+    BasisTooSmall {
+        /// Which step.
+        what: &'static str,
+        /// `source` or `target`.
+        side: &'static str,
+        /// Eigenpairs asked.
+        asked: usize,
+        /// Eigenpairs there are.
+        available: usize,
+    },
+    /// Dense linear algebra failed for a reason of its own.
+    #[error("linear algebra failed in {0}")]
+    LinearAlgebra(&'static str),
+}
+
+impl Error {
+    pub(crate) fn length(what: &'static str, expected: usize, found: usize) -> Result<()> {
+        if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }
+    }
+
+    pub(crate) fn out_of_range<T>(
+        what: &'static str,
+        expected: impl Into<String>,
+        found: impl std::fmt::Display,
+    ) -> Result<T> {
+        Err(Self::OutOfRange { what, expected: expected.into(), found: found.to_string() })
+    }
+}

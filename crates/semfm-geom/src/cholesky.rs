@@ -1,0 +1,182 @@
+//! Sparse Cholesky factorisation, made once and asked for many solutions.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot;
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::{Conj, MatMut, Par, Side};
+
+use crate::{Error, Result};
+
+/// The factorisation P A Pᵀ = R Rᵀ of a symmetric positive definite sparse matrix A (n × n).
+///
+/// P is the approximate-minimum-degree ordering (Amestoy, Davis & Duff 1996); R is stored by
+/// supernodes where that saves work (Chen, Davis, Hager & Rajamanickam 2008) and by columns
+/// elsewhere. Everything runs on the calling thread: a triangular solve with a few right-hand sides
+/// is too short to share, so parallel callers share out shapes or blocks instead.
+///
+/// ```
+/// use faer::sparse::{SparseColMat, Triplet};
+/// use semfm_geom::cholesky::SparseCholesky;
+/// let path = [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -1.0), (1, 0, -1.0)];
+/// let a = SparseColMat::<usize, f64>::try_new_from_triplets(
+///     2, 2, &path.map(|(i, j, v)| Triplet::new(i, j, v)))?;
+/// let factor = SparseCholesky::new(a.as_ref())?;
+/// let mut x = faer::mat![[1.0], [0.0]];
+/// factor.solve_in_place(x.as_mut());
+/// assert!((x[(0, 0)] - 2.0 / 3.0).abs() < 1e-15 && (x[(1, 0)] - 1.0 / 3.0).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct SparseCholesky {
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<f64>,
+}
+
+impl SparseCholesky {
+    /// Factorises `matrix` (n × n), of which only the lower triangle is read.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] with the row of `matrix` at which a pivot was not positive;
+    /// [`Error::Length`] for a matrix that is not square; [`Error::LinearAlgebra`] where the
+    /// factor does not fit into memory.
+    pub fn new(matrix: SparseColMatRef<'_, usize, f64>) -> Result<Self> {
+        if matrix.nrows() != matrix.ncols() {
+            let (expected, found) = (matrix.nrows(), matrix.ncols());
+            return Err(Error::Length { what: "columns of a square matrix", expected, found });
+        }
+        let failed = |_| Error::LinearAlgebra("the sparse Cholesky factorisation");
+        let symbolic = factorize_symbolic_cholesky(
+            matrix.symbolic(),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(failed)?;
+        let mut values = vec![0.0; symbolic.len_val()];
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let outcome = symbolic
+            .factorize_numeric_llt(
+                &mut values,
+                matrix,
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut MemBuffer::new(scratch)),
+                Default::default(),
+            )
+            .map(|_| ());
+        match outcome {
+            Ok(()) => Ok(Self { symbolic, values }),
+            Err(NonPositivePivot { index }) => {
+                let row = symbolic.perm().map_or(index, |perm| perm.arrays().0[index]);
+                Err(Error::NotPositiveDefinite { what: "the sparse matrix", row })
+            }
+        }
+    }
+
+    /// Number of rows n.
+    pub fn n_rows(&self) -> usize {
+        self.symbolic.nrows()
+    }
+
+    /// The analysis of the sparsity pattern, for further factorisations of like matrices.
+    pub(crate) fn symbolic(&self) -> &SymbolicCholesky<usize> {
+        &self.symbolic
+    }
+
+    /// Numbers stored in the factor R, fill-in and supernodal padding included.
+    pub fn n_stored(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Replaces the right-hand sides (n × any number of columns) by the solutions A⁻¹ rhs.
+    ///
+    /// Eight to thirty-two columns at once cost three to five times less each than one alone.
+    ///
+    /// # Panics
+    /// Where `rhs` has another number of rows than the matrix.
+    pub fn solve_in_place(&self, rhs: MatMut<'_, f64>) {
+        assert_eq!(rhs.nrows(), self.n_rows(), "one row per unknown");
+        let scratch = self.symbolic.solve_in_place_scratch::<f64>(rhs.ncols(), Par::Seq);
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            rhs,
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use faer::sparse::{SparseColMat, Triplet};
+    use faer::{Mat, mat};
+
+    use super::*;
+
+    /// Five-point Laplacian of a `side × side` grid, plus `shift` on the diagonal.
+    fn grid(side: usize, shift: f64) -> SparseColMat<usize, f64> {
+        let n = side * side;
+        let mut triplets = Vec::new();
+        for i in 0..n {
+            triplets.push(Triplet::new(i, i, shift));
+            let right = (i % side + 1 < side).then_some(i + 1);
+            let below = (i + side < n).then_some(i + side);
+            for j in [right, below].into_iter().flatten() {
+                let square = [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)];
+                triplets.extend(square.map(|(r, c, v)| Triplet::new(r, c, v)));
+            }
+        }
+        SparseColMat::try_new_from_triplets(n, n, &triplets).unwrap()
+    }
+
+    #[test]
+    fn solutions_satisfy_the_equations_for_one_and_many_right_hand_sides() {
+        // A tiny grid stays simplicial, a large one becomes supernodal.
+        for (side, columns) in [(1, 1), (3, 1), (7, 5), (90, 19)] {
+            let a = grid(side, 0.1);
+            let factor = SparseCholesky::new(a.as_ref()).unwrap();
+            let rhs = Mat::from_fn(side * side, columns, |i, j| ((7 * i + 13 * j) % 101) as f64);
+            let mut x = rhs.clone();
+            factor.solve_in_place(x.as_mut());
+            let residual = (&a * &x - &rhs).norm_max() / rhs.norm_max().max(1.0);
+            assert!(residual < 1e-12, "residual {residual:.1e} on the {side}×{side} grid");
+        }
+    }
+
+    #[test]
+    fn the_row_of_a_bad_pivot_is_named_in_the_callers_order() {
+        let mut triplets: Vec<_> = (0..9).map(|i| Triplet::new(i, i, 1.0)).collect();
+        triplets[5] = Triplet::new(5, 5, -1.0);
+        let a = SparseColMat::<usize, f64>::try_new_from_triplets(9, 9, &triplets).unwrap();
+        match SparseCholesky::new(a.as_ref()) {
+            Err(Error::NotPositiveDefinite { row, .. }) => assert_eq!(row, 5),
+            other => panic!("expected NotPositiveDefinite, found {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_singular_and_an_oblong_matrix_are_refused() {
+        let a = grid(1, 0.0);
+        assert!(matches!(
+            SparseCholesky::new(a.as_ref()),
+            Err(Error::NotPositiveDefinite { row: 0, .. })
+        ));
+        let oblong =
+            SparseColMat::<usize, f64>::try_new_from_triplets(2, 3, &[Triplet::new(0, 0, 1.0)])
+                .unwrap();
+        assert!(matches!(SparseCholesky::new(oblong.as_ref()), Err(Error::Length { .. })));
+    }
+
+    #[test]
+    fn the_upper_triangle_is_not_read() {
+        let lower = [Triplet::new(0, 0, 4.0), Triplet::new(1, 0, 2.0), Triplet::new(1, 1, 3.0)];
+        let a = SparseColMat::<usize, f64>::try_new_from_triplets(2, 2, &lower).unwrap();
+        let mut x = mat![[8.0], [7.0]];
+        SparseCholesky::new(a.as_ref()).unwrap().solve_in_place(x.as_mut());
+        assert!((x - mat![[1.25], [1.5]]).norm_max() < 1e-15);
+    }
+}

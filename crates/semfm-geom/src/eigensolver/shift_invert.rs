@@ -1,0 +1,76 @@
+//! The operator whose largest eigenvalues are the Laplacian's smallest.
+
+use faer::sparse::{SparseColMat, Triplet};
+use faer::reborrow::ReborrowMut;
+use faer::{Mat, MatRef};
+
+use crate::cholesky::SparseCholesky;
+use crate::{Error, Laplacian, Result};
+
+/// The shift s, times the surface's area.
+///
+/// s must be positive, so that L + sM can be factorised, and small against λ_k ≈ 4πk / area
+/// (Weyl), so that 1 / (λ + s) keeps the wanted end of the spectrum well apart. Tried from 0.01 to
+/// 30 at k = 30 to 200: from 0.01 to 3 the number of solves is the same; 0.01 loses two digits of
+/// the solutions, 30 costs 5 % more solves at k = 30.
+const SHIFT_TIMES_AREA: f64 = 1.0;
+
+/// A⁻¹ = M^{1/2} (L + sM)⁻¹ M^{1/2}: symmetric, with eigenvalues μ = 1 / (λ + s) and, where φ solves
+/// L φ = λ M φ, eigenvectors y = M^{1/2} φ.
+pub(super) struct ShiftInvert {
+    pub factor: SparseCholesky,
+    /// M^{1/2}, its diagonal (n).
+    pub root_mass: Vec<f64>,
+    /// s > 0, in the units of the eigenvalues.
+    pub shift: f64,
+}
+
+impl ShiftInvert {
+    /// Factorises L + sM with a shift that follows the scale of the surface.
+    pub fn new(laplacian: &Laplacian) -> Result<Self> {
+        let shift = SHIFT_TIMES_AREA / laplacian.mass.iter().sum::<f64>();
+        let factor = SparseCholesky::new(shifted(laplacian, shift)?.as_ref())?;
+        let root_mass = laplacian.mass.iter().map(|m| m.sqrt()).collect();
+        Ok(Self { factor, root_mass, shift })
+    }
+
+    /// Writes A⁻¹ `block` (n × b) to `image`.
+    pub fn apply(&self, block: MatRef<'_, f64>, image: &mut Mat<f64>) {
+        image.as_mut().copy_from(block);
+        self.scale_rows(image);
+        self.factor.solve_in_place(image.as_mut());
+        self.scale_rows(image);
+    }
+
+    fn scale_rows(&self, block: &mut Mat<f64>) {
+        for j in 0..block.ncols() {
+            let column = block.col_as_slice_mut(j).iter_mut();
+            column.zip(&self.root_mass).for_each(|(x, root)| *x *= root);
+        }
+    }
+
+    /// λ of a μ.
+    pub fn eigenvalue(&self, mu: f64) -> f64 {
+        1.0 / mu - self.shift
+    }
+}
+
+/// L + `shift` · M, with every diagonal entry stored.
+pub(super) fn shifted(laplacian: &Laplacian, shift: f64) -> Result<SparseColMat<usize, f64>> {
+    let mut matrix = laplacian.stiffness.clone();
+    let mut missing = Vec::new();
+    for (j, m) in laplacian.mass.iter().enumerate() {
+        let diagonal = matrix.as_ref().row_idx_of_col_raw(j).iter().position(|&i| i == j);
+        match diagonal {
+            Some(position) => matrix.rb_mut().val_of_col_mut(j)[position] += shift * m,
+            None => missing.push(Triplet::new(j, j, shift * m)),
+        }
+    }
+    if missing.is_empty() {
+        return Ok(matrix);
+    }
+    let stored = matrix.triplet_iter().map(|t| Triplet::new(t.row, t.col, *t.val));
+    let all: Vec<_> = stored.chain(missing).collect();
+    SparseColMat::try_new_from_triplets(matrix.nrows(), matrix.ncols(), &all)
+        .map_err(|_| Error::LinearAlgebra("assembling the shifted stiffness"))
+}

@@ -1,0 +1,205 @@
+//! Polygons to triangles, without new vertices.
+
+use crate::math::{DVec2, DVec3};
+
+/// Above this many corners a polygon is fanned even if it is concave: ear clipping takes quadratic
+/// time, and at 256 a hostile file of nothing but such polygons costs as much as its parsing.
+const MAX_EAR_CORNERS: usize = 256;
+
+/// A corner that turns the wrong way by less than this share of the polygon's area counts as
+/// straight: coordinates with six digits leave corners on straight sides that off.
+const STRAIGHT: f64 = 1e-6;
+
+/// The faces of a file before they are cut, one after the other.
+#[derive(Default)]
+pub(crate) struct Polygons {
+    /// Vertex ids of all corners.
+    ids: Vec<u32>,
+    /// Which texture coordinate each corner has, [`NO_UV`] for none; empty while no corner has one.
+    uv_ids: Vec<u32>,
+    /// For each face, one past its last corner.
+    ends: Vec<usize>,
+}
+
+/// Marks a corner without a texture coordinate.
+pub(crate) const NO_UV: u32 = u32::MAX;
+
+impl Polygons {
+    /// Adds a corner to the face that [`close`](Self::close) will end.
+    pub fn push(&mut self, vertex: u32, uv: u32) {
+        if uv != NO_UV && self.uv_ids.is_empty() {
+            self.uv_ids.resize(self.ids.len(), NO_UV);
+        }
+        if uv != NO_UV || !self.uv_ids.is_empty() {
+            self.uv_ids.push(uv);
+        }
+        self.ids.push(vertex);
+    }
+
+    /// Ends the face. One or two corners are a point or an edge, which formats allow among their
+    /// faces: they are dropped, since they have no surface.
+    pub fn close(&mut self) {
+        let start = self.ends.last().copied().unwrap_or(0);
+        if self.ids.len() - start >= 3 {
+            self.ends.push(self.ids.len());
+        } else {
+            self.ids.truncate(start);
+            self.uv_ids.truncate(start);
+        }
+    }
+
+    /// Faces closed so far.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// How many corners name a texture coordinate from `n_uvs` on.
+    pub fn count_uvs_from(&self, n_uvs: u32) -> usize {
+        self.uv_ids.iter().filter(|&&id| id != NO_UV && id >= n_uvs).count()
+    }
+
+    /// All faces as triangles, and the texture coordinate of each of their corners if there are
+    /// any. Every id must be one of `vertices`.
+    pub fn triangles(&self, vertices: &[DVec3]) -> (Vec<[u32; 3]>, Option<Vec<[u32; 3]>>) {
+        let n_triangles = self.ids.len() - 2 * self.ends.len();
+        let mut faces = Vec::with_capacity(n_triangles);
+        let mut uv_ids = Vec::with_capacity(if self.uv_ids.is_empty() { 0 } else { n_triangles });
+        let mut cutter = PolygonCutter::default();
+        let mut corners = Vec::new();
+        let mut start = 0;
+        for &end in &self.ends {
+            let ids = &self.ids[start..end];
+            corners.clear();
+            corners.extend(ids.iter().map(|&id| vertices[id as usize]));
+            let cut = cutter.cut(&corners);
+            faces.extend(cut.iter().map(|triangle| triangle.map(|i| ids[i as usize])));
+            if !self.uv_ids.is_empty() {
+                let uvs = &self.uv_ids[start..end];
+                uv_ids.extend(cut.iter().map(|triangle| triangle.map(|i| uvs[i as usize])));
+            }
+            start = end;
+        }
+        (faces, (!self.uv_ids.is_empty()).then_some(uv_ids))
+    }
+}
+
+/// Cuts one polygon after the other, keeping the scratch space.
+#[derive(Default)]
+struct PolygonCutter {
+    flat: Vec<DVec2>,
+    ring: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl PolygonCutter {
+    /// The n − 2 triangles of a polygon with n ≥ 3 corners, as numbers of its corners, with its
+    /// winding. A convex polygon becomes the fan around its first corner, which is what most
+    /// readers do; a concave one is cut at its ears (G. H. Meisters, *Polygons have ears*, 1975),
+    /// since its fan would fold over. Where no ear is left (the polygon crosses itself or repeats
+    /// corners) it is fanned as well.
+    fn cut(&mut self, corners: &[DVec3]) -> &[[u32; 3]] {
+        self.triangles.clear();
+        let n = corners.len() as u32;
+        let simple = corners.len() <= 3 || corners.len() > MAX_EAR_CORNERS;
+        if simple || !self.flatten_if_concave(corners) || !self.clip_ears() {
+            self.triangles.clear();
+            self.triangles.extend((1..n.saturating_sub(1)).map(|i| [0, i, i + 1]));
+        }
+        &self.triangles
+    }
+
+    /// Projects the polygon along its Newell normal; false where it is convex or has no area.
+    fn flatten_if_concave(&mut self, corners: &[DVec3]) -> bool {
+        let origin = corners[0];
+        let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
+        let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        let double_area = normal.length();
+        let Some(normal) = normal.try_normalize() else { return false };
+        let (x, y) = normal.any_orthonormal_pair();
+        self.flat.clear();
+        self.flat
+            .extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
+        let n = self.flat.len();
+        let reflex = -STRAIGHT * double_area;
+        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < reflex)
+    }
+
+    /// Cuts ears off the flat polygon; false where it runs out of them early.
+    fn clip_ears(&mut self) -> bool {
+        self.ring.clear();
+        self.ring.extend(0..self.flat.len() as u32);
+        while self.ring.len() > 3 {
+            let Some(ear) = (0..self.ring.len()).find(|&at| self.is_ear(at)) else { return false };
+            self.triangles.push(self.around(ear));
+            self.ring.remove(ear);
+        }
+        self.triangles.push([self.ring[0], self.ring[1], self.ring[2]]);
+        true
+    }
+
+    /// Corner `at` of the ring between its neighbours.
+    fn around(&self, at: usize) -> [u32; 3] {
+        let n = self.ring.len();
+        [self.ring[(at + n - 1) % n], self.ring[at], self.ring[(at + 1) % n]]
+    }
+
+    fn is_ear(&self, at: usize) -> bool {
+        let ids = self.around(at);
+        let [a, b, c] = ids.map(|i| self.flat[i as usize]);
+        turn(a, b, c) > 0.0
+            && !self.ring.iter().any(|&i| {
+                let p = self.flat[i as usize];
+                let outside = turn(a, b, p) < 0.0 || turn(b, c, p) < 0.0 || turn(c, a, p) < 0.0;
+                !ids.contains(&i) && !outside
+            })
+    }
+}
+
+/// Twice the signed area of a triangle: positive for a left turn.
+fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    (b - a).perp_dot(c - a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(points: &[(f64, f64)]) -> Vec<DVec3> {
+        // Tilted out of the coordinate planes on purpose.
+        points.iter().map(|&(x, y)| DVec3::new(x, y, 2.0 * x - y)).collect()
+    }
+
+    fn area(corners: &[DVec3], triangle: [u32; 3]) -> f64 {
+        let [a, b, c] = triangle.map(|i| corners[i as usize]);
+        (b - a).cross(c - a).length() / 2.0
+    }
+
+    #[test]
+    fn a_convex_polygon_is_fanned() {
+        let corners = polygon(&[(0.0, 0.0), (2.0, 0.0), (3.0, 1.0), (1.0, 3.0), (0.0, 2.0)]);
+        assert_eq!(PolygonCutter::default().cut(&corners), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+    }
+
+    #[test]
+    fn the_triangles_of_a_concave_polygon_do_not_overlap() {
+        // An arrowhead whose fan around corner 0 would leave it.
+        let corners = polygon(&[(0.0, 0.0), (4.0, -3.0), (1.0, 0.0), (4.0, 3.0)]);
+        let fan = area(&corners, [0, 1, 2]) + area(&corners, [0, 2, 3]);
+        for shift in 0..4 {
+            let mut turned = corners.clone();
+            turned.rotate_left(shift);
+            let mut cutter = PolygonCutter::default();
+            let triangles = cutter.cut(&turned);
+            let total: f64 = triangles.iter().map(|&t| area(&turned, t)).sum();
+            assert_eq!(triangles.len(), 2);
+            assert!((total - fan).abs() < 1e-12, "{total} {fan}");
+        }
+    }
+
+    #[test]
+    fn repeated_corners_still_give_two_less_than_corners() {
+        let corners =
+            polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
+        assert_eq!(PolygonCutter::default().cut(&corners).len(), 4);
+    }
+}
