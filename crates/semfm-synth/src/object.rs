@@ -9,7 +9,9 @@ use isosurface::math::Vec3;
 use isosurface::sampler::Sampler;
 use isosurface::source::ScalarSource;
 use rayon::prelude::*;
-use semfm_geom::Mesh;
+use semfm_geom::connectivity::components;
+use semfm_geom::simplify::{SimplifySettings, simplify};
+use semfm_geom::{Mesh, Task};
 use semfm_geom::math::{DMat3, DVec3, bounds};
 
 use crate::sdf::smooth_min;
@@ -141,6 +143,8 @@ const COARSE: f64 = 0.05;
 const VERTICES_PER_SQUARE: f64 = 1.5;
 /// Finer than aimed at by this factor, then thinned out: evener triangles than marching cubes'.
 const OVERSAMPLING: f64 = 1.6;
+/// Thinning may move the surface by this share of the object's diagonal; no blueprint comes near.
+const FARTHEST_FROM_LATTICE: f64 = 0.05;
 /// Finest and coarsest lattice: thin blades need .03, memory forbids less than .008.
 const SPACING: (f64, f64) = (0.008, 0.03);
 
@@ -223,12 +227,20 @@ impl Grid {
     }
 }
 
+/// The component with most vertices: thin parts of a coarse lattice may leave crumbs.
 fn largest_component(mesh: &Mesh) -> Result<Mesh> {
-    Ok(mesh.clone())
+    let components = components(mesh);
+    let mut sizes = vec![0usize; components.count];
+    components.of_vertex.iter().for_each(|&component| sizes[component as usize] += 1);
+    let largest = (0..sizes.len()).rev().max_by_key(|&component| sizes[component]).unwrap_or(0);
+    keep(mesh, |face| components.of_vertex[mesh.faces()[face][0] as usize] as usize == largest)
 }
 
-fn thin_out(mesh: &Mesh, _n_vertices: usize) -> Result<Mesh> {
-    Ok(mesh.clone())
+/// Collapses edges until `n_vertices` are left.
+fn thin_out(mesh: &Mesh, n_vertices: usize) -> Result<Mesh> {
+    let settings =
+        SimplifySettings { target_vertices: n_vertices, most_distance: FARTHEST_FROM_LATTICE };
+    Ok(simplify(mesh, &settings, &Task::default())?.mesh)
 }
 
 /// Tears `count` round holes of 4 to 9 % of the world into the surface.
@@ -237,25 +249,20 @@ fn tear(mesh: &Mesh, count: usize, draw: &mut Draw) -> Result<Mesh> {
     let holes: Vec<(DVec3, f64)> = (0..count)
         .map(|_| (centre(draw.below(mesh.n_faces())), draw.between(0.04, 0.09)))
         .collect();
-    let faces: Vec<[u32; 3]> = (0..mesh.n_faces())
-        .filter(|&face| holes.iter().all(|&(hole, radius)| centre(face).distance(hole) >= radius))
-        .map(|face| mesh.faces()[face])
-        .collect();
-    let mut id = vec![u32::MAX; mesh.n_vertices()];
-    let mut vertices = Vec::new();
-    let faces = faces
-        .into_iter()
-        .map(|face| {
-            face.map(|old| {
-                let new = &mut id[old as usize];
-                if *new == u32::MAX {
-                    *new = vertices.len() as u32;
-                    vertices.push(mesh.vertices()[old as usize]);
-                }
-                *new
-            })
-        })
-        .collect();
+    keep(mesh, |face| holes.iter().all(|&(hole, radius)| centre(face).distance(hole) >= radius))
+}
+
+/// The triangles that `wanted` names, with the vertices that they use, in the same order.
+fn keep(mesh: &Mesh, wanted: impl Fn(usize) -> bool) -> Result<Mesh> {
+    let faces: Vec<[u32; 3]> =
+        (0..mesh.n_faces()).filter(|&face| wanted(face)).map(|face| mesh.faces()[face]).collect();
+    let mut used: Vec<u32> = faces.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut new_id = vec![u32::MAX; mesh.n_vertices()];
+    (0..).zip(&used).for_each(|(new, &old)| new_id[old as usize] = new);
+    let vertices = used.iter().map(|&old| mesh.vertices()[old as usize]).collect();
+    let faces = faces.iter().map(|ids| ids.map(|id| new_id[id as usize])).collect();
     Ok(Mesh::new(vertices, faces)?)
 }
 
