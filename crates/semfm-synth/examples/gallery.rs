@@ -9,6 +9,7 @@ use std::error::Error;
 use semfm_geom::Task;
 use semfm_geom::math::DVec3;
 use semfm_synth::{Category, ObjectSettings, SynthObject, make_object};
+use semfm_views::frame::principal_frame;
 use semfm_views::rig::camera_towards;
 use semfm_views::{Paint, RenderSettings, RigSettings, render};
 
@@ -53,14 +54,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The object from where it shows most of itself, with a colour for each vertex.
+/// The object broadside from above, with a colour for each vertex.
 fn picture(
     object: &SynthObject,
     colours: Vec<[f32; 3]>,
 ) -> Result<image::RgbImage, Box<dyn Error>> {
     let rig = RigSettings { size: SIDE, ..RigSettings::default() };
-    let frame = semfm_views::frame::principal_frame(&object.mesh)?;
-    let seen_from = frame.transpose() * DVec3::new(0.4, -1.0, 0.5);
+    let longest = principal_frame(&object.mesh)?.row(2);
+    let seen_from = longest.cross(DVec3::Z).normalize() + 0.3 * longest + 0.7 * DVec3::Z;
     let camera = camera_towards(&object.mesh, seen_from, DVec3::Z, &rig)?;
     let paint = Paint::Vertices(&colours);
     let views =
