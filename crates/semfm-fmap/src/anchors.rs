@@ -36,7 +36,11 @@ impl Anchors {
     /// embeddings, by an exact assignment; fewer where there are fewer clusters.
     ///
     /// The clouds must have features of the same dimension and the clusters be theirs.
-    pub fn select(source: (&SemanticCloud, &Clusters), target: (&SemanticCloud, &Clusters), alpha: usize) -> Self {
+    pub fn select(
+        source: (&SemanticCloud, &Clusters),
+        target: (&SemanticCloud, &Clusters),
+        alpha: usize,
+    ) -> Self {
         let unit_means = |(cloud, clusters): (&SemanticCloud, &Clusters)| -> Vec<Vec<f64>> {
             let mut means = clusters.means(cloud);
             for mean in &mut means {
@@ -65,7 +69,10 @@ impl Anchors {
     /// The same anchors seen from the target.
     pub fn swapped(&self) -> Self {
         let swap = |a: &Anchor| Anchor { source: a.target, target: a.source, ..*a };
-        Self { pairs: self.pairs.iter().map(swap).collect(), cosines: self.cosines.transpose().to_owned() }
+        Self {
+            pairs: self.pairs.iter().map(swap).collect(),
+            cosines: self.cosines.transpose().to_owned(),
+        }
     }
 
     /// The source's labels, in the order of the pairs.

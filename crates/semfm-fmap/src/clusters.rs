@@ -84,7 +84,11 @@ impl Clusters {
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for no clusters or no neighbours, whatever the eigensolver reports.
-pub fn spectral_clusters(cloud: &SemanticCloud, settings: &ClusterSettings, task: &Task) -> Result<Clusters> {
+pub fn spectral_clusters(
+    cloud: &SemanticCloud,
+    settings: &ClusterSettings,
+    task: &Task,
+) -> Result<Clusters> {
     let (n, k) = (cloud.n_points(), settings.n_clusters);
     if k == 0 || settings.neighbours == 0 {
         let found = format!("{k} clusters, {} neighbours", settings.neighbours);
@@ -96,7 +100,8 @@ pub fn spectral_clusters(cloud: &SemanticCloud, settings: &ClusterSettings, task
     let laplacian = graph_laplacian(cloud, &neighbour_edges(cloud, settings.neighbours)?)?;
     let eigen = EigenSettings { seed: settings.seed, ..EigenSettings::default() };
     let basis = eigenbasis(&laplacian, k, &eigen, task)?;
-    let rows: Vec<f64> = (0..n).flat_map(|i| basis.functions.row(i).iter().copied().collect::<Vec<_>>()).collect();
+    let rows: Vec<f64> =
+        (0..n).flat_map(|i| basis.functions.row(i).iter().copied().collect::<Vec<_>>()).collect();
     Ok(Clusters::from_labels(&k_means(&rows, k, k, settings.starts, settings.seed)))
 }
 
@@ -115,7 +120,8 @@ fn neighbour_edges(cloud: &SemanticCloud, neighbours: usize) -> Result<Vec<(u32,
     let mut pieces = Pieces::new(points.len());
     let joined = edges.iter().filter(|&&(i, j)| pieces.join(i, j)).count();
     if joined + 1 < points.len() {
-        let bridges: Vec<_> = spanning_tree(cloud).into_iter().filter(|&(i, j)| pieces.join(i, j)).collect();
+        let bridges: Vec<_> =
+            spanning_tree(cloud).into_iter().filter(|&(i, j)| pieces.join(i, j)).collect();
         edges.extend(bridges);
     }
     Ok(edges)
@@ -124,12 +130,13 @@ fn neighbour_edges(cloud: &SemanticCloud, neighbours: usize) -> Result<Vec<(u32,
 /// Edges (i < j) of the Euclidean minimum spanning tree, shortest first (Prim 1957, dense).
 fn spanning_tree(cloud: &SemanticCloud) -> Vec<(u32, u32)> {
     let points = cloud.points();
-    let mut nearest: Vec<(f64, u32)> = points.iter().map(|p| (p.distance_squared(points[0]), 0)).collect();
+    let mut nearest: Vec<(f64, u32)> =
+        points.iter().map(|p| (p.distance_squared(points[0]), 0)).collect();
     let mut outside: Vec<u32> = (1..points.len() as u32).collect();
     let mut tree = Vec::with_capacity(outside.len());
-    while let Some(at) = (0..outside.len()).min_by(|&a, &b| {
-        nearest[outside[a] as usize].0.total_cmp(&nearest[outside[b] as usize].0)
-    }) {
+    while let Some(at) = (0..outside.len())
+        .min_by(|&a, &b| nearest[outside[a] as usize].0.total_cmp(&nearest[outside[b] as usize].0))
+    {
         let new = outside.swap_remove(at);
         let (length, parent) = nearest[new as usize];
         tree.push((length, new.min(parent), new.max(parent)));
@@ -205,11 +212,14 @@ mod tests {
     /// A strip of points along x in three equal thirds with features of their own; `gap` tears it.
     fn strip(n: usize, gap: f64) -> SemanticCloud {
         let third = |i: usize| 3 * i / n;
-        let points =
-            (0..n).map(|i| DVec3::new(i as f64 + gap * third(i) as f64, (i % 7) as f64, 0.0)).collect();
+        let points = (0..n)
+            .map(|i| DVec3::new(i as f64 + gap * third(i) as f64, (i % 7) as f64, 0.0))
+            .collect();
         let wobble = |i: usize, c: usize| 0.02 * ((i * 7 + c * 13) as f32).sin();
         let features = (0..n)
-            .flat_map(|i| (0..4).map(move |c| (if third(i) == c { 1.0 } else { 0.0 }) + wobble(i, c)))
+            .flat_map(|i| {
+                (0..4).map(move |c| (if third(i) == c { 1.0 } else { 0.0 }) + wobble(i, c))
+            })
             .collect();
         SemanticCloud::new(points, features, 4, vec![1; n]).unwrap()
     }
@@ -218,9 +228,11 @@ mod tests {
     fn three_kinds_of_surface_become_three_parts_torn_or_not() {
         for gap in [0.0, 1000.0] {
             let settings = ClusterSettings { n_clusters: 3, ..ClusterSettings::default() };
-            let clusters = spectral_clusters(&strip(150, gap), &settings, &Task::default()).unwrap();
+            let clusters =
+                spectral_clusters(&strip(150, gap), &settings, &Task::default()).unwrap();
             assert_eq!(clusters.n_clusters(), 3);
-            let wrong = (0..150).filter(|&i| clusters.labels()[i] != clusters.labels()[50 * (i / 50) + 25]);
+            let wrong =
+                (0..150).filter(|&i| clusters.labels()[i] != clusters.labels()[50 * (i / 50) + 25]);
             assert!(wrong.count() <= 3, "gap {gap}");
         }
     }
@@ -229,7 +241,9 @@ mod tests {
     fn neighbour_graphs_are_connected_even_when_the_cloud_is_not() {
         let edges = neighbour_edges(&strip(60, 1000.0), 4).unwrap();
         let mut pieces = Pieces::new(60);
-        edges.iter().for_each(|&(i, j)| { pieces.join(i, j); });
+        edges.iter().for_each(|&(i, j)| {
+            pieces.join(i, j);
+        });
         assert!((0..60).all(|i| pieces.of(i) == 0));
     }
 

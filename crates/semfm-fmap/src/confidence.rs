@@ -64,7 +64,13 @@ pub struct Hypothesis {
 /// of all votes (by area) is a hypothesis: its vertices that reach half of the island's own peak.
 /// Islands are alternatives only where the demonstrated region was in one piece: if `one_piece` is
 /// false they belong together, and the vote as it stands is the single hypothesis.
-pub(crate) fn islands(mesh: &Mesh, votes: &[f64], areas: &[f64], one_piece: bool, count: usize) -> Vec<(Vec<f64>, f64)> {
+pub(crate) fn islands(
+    mesh: &Mesh,
+    votes: &[f64],
+    areas: &[f64],
+    one_piece: bool,
+    count: usize,
+) -> Vec<(Vec<f64>, f64)> {
     let level = ISLAND_LEVEL * Region::COUNTS;
     let mut pieces = Pieces::new(votes.len());
     for &[a, b, c] in mesh.faces() {
@@ -83,8 +89,11 @@ pub(crate) fn islands(mesh: &Mesh, votes: &[f64], areas: &[f64], one_piece: bool
         island.1 = island.1.max(votes[v as usize]);
     }
     let total: f64 = islands.values().map(|island| island.0).sum();
-    let mut kept: Vec<(u32, f64, f64)> =
-        islands.into_iter().map(|(root, (sum, peak))| (root, sum, peak)).filter(|i| i.1 >= LEAST_SHARE * total).collect();
+    let mut kept: Vec<(u32, f64, f64)> = islands
+        .into_iter()
+        .map(|(root, (sum, peak))| (root, sum, peak))
+        .filter(|i| i.1 >= LEAST_SHARE * total)
+        .collect();
     kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     kept.truncate(count);
     let total: f64 = kept.iter().map(|island| island.1).sum();
@@ -92,7 +101,8 @@ pub(crate) fn islands(mesh: &Mesh, votes: &[f64], areas: &[f64], one_piece: bool
     for (root, sum, peak) in kept {
         let mut weights = vec![0.0; votes.len()];
         for &v in land.iter().filter(|&&v| !one_piece || pieces.of(v) == root) {
-            weights[v as usize] = if one_piece { votes[v as usize] / peak } else { votes[v as usize] };
+            weights[v as usize] =
+                if one_piece { votes[v as usize] / peak } else { votes[v as usize] };
         }
         out.push((weights, sum / total));
     }
@@ -124,8 +134,10 @@ mod tests {
 
     /// A strip of ten squares.
     fn strip() -> Mesh {
-        let vertices = (0..11).flat_map(|i| [DVec3::new(f64::from(i), 0.0, 0.0), DVec3::new(f64::from(i), 1.0, 0.0)]);
-        let faces = (0..10u32).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 1], [2 * i + 1, 2 * i + 2, 2 * i + 3]]);
+        let vertices = (0..11)
+            .flat_map(|i| [DVec3::new(f64::from(i), 0.0, 0.0), DVec3::new(f64::from(i), 1.0, 0.0)]);
+        let faces = (0..10u32)
+            .flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 1], [2 * i + 1, 2 * i + 2, 2 * i + 3]]);
         Mesh::new(vertices.collect(), faces.collect()).unwrap()
     }
 
@@ -133,7 +145,13 @@ mod tests {
     fn two_handles_are_two_hypotheses_unless_both_were_shown() {
         let mesh = strip();
         let areas = mesh.vertex_areas();
-        let votes: Vec<f64> = (0..22).map(|v| match v / 2 { 0..=2 => 0.9, 8..=10 => 0.4, _ => 0.0 }).collect();
+        let votes: Vec<f64> = (0..22)
+            .map(|v| match v / 2 {
+                0..=2 => 0.9,
+                8..=10 => 0.4,
+                _ => 0.0,
+            })
+            .collect();
         let found = islands(&mesh, &votes, &areas, true, 3);
         assert_eq!(found.len(), 2);
         assert!(found[0].0[0] >= Region::COUNTS && found[0].0[20] == 0.0);
@@ -157,6 +175,9 @@ mod tests {
     #[test]
     fn verdicts_follow_the_bands() {
         use Verdict::{Accept, Check, Refuse};
-        assert_eq!([0.0, 0.39, 0.4, 0.59, 0.6, 1.0].map(Verdict::of), [Refuse, Refuse, Check, Check, Accept, Accept]);
+        assert_eq!(
+            [0.0, 0.39, 0.4, 0.59, 0.6, 1.0].map(Verdict::of),
+            [Refuse, Refuse, Check, Check, Accept, Accept]
+        );
     }
 }

@@ -39,7 +39,9 @@ pub fn diffused_indicators(
         }
         let square: f64 = match norm {
             DescriptorNorm::Surface => coefficients.iter().map(|a| a * a).sum(),
-            DescriptorNorm::Vertices => basis.reconstruct(&coefficients).iter().map(|f| f * f).sum(),
+            DescriptorNorm::Vertices => {
+                basis.reconstruct(&coefficients).iter().map(|f| f * f).sum()
+            }
         };
         if square > 0.0 {
             let scale = square.sqrt().recip();
@@ -51,7 +53,11 @@ pub fn diffused_indicators(
 
 /// Spectral coefficients (k × p) of functions given on the vertices (n × p), each scaled to unit
 /// norm over the surface (within the whole basis).
-pub fn normalised_coefficients(basis: &Eigenbasis, functions: MatRef<'_, f64>, k: usize) -> Mat<f64> {
+pub fn normalised_coefficients(
+    basis: &Eigenbasis,
+    functions: MatRef<'_, f64>,
+    k: usize,
+) -> Mat<f64> {
     let mut out = Mat::zeros(k, functions.ncols());
     for c in 0..functions.ncols() {
         let function: Vec<f64> = functions.col(c).iter().copied().collect();
@@ -72,13 +78,16 @@ mod tests {
     #[test]
     fn descriptors_have_unit_norm_in_the_sense_that_was_asked_for() {
         let shape = shape(&blob(1.0), 30);
-        let labels: Vec<u32> = shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
+        let labels: Vec<u32> =
+            shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
         let basis = shape.basis();
-        let surface = diffused_indicators(basis, &labels, &[1, 0, 7], 0.005, DescriptorNorm::Surface, 30);
+        let surface =
+            diffused_indicators(basis, &labels, &[1, 0, 7], 0.005, DescriptorNorm::Surface, 30);
         assert!((surface.col(0).squared_norm_l2() - 1.0).abs() < 1e-12);
         assert!((surface.col(1).squared_norm_l2() - 1.0).abs() < 1e-12);
         assert_eq!(surface.col(2).norm_l2(), 0.0, "nobody bears label 7");
-        let vertices = diffused_indicators(basis, &labels, &[1], 0.005, DescriptorNorm::Vertices, 30);
+        let vertices =
+            diffused_indicators(basis, &labels, &[1], 0.005, DescriptorNorm::Vertices, 30);
         let coefficients: Vec<f64> = vertices.col(0).iter().copied().collect();
         let sum: f64 = basis.reconstruct(&coefficients).iter().map(|f| f * f).sum();
         assert!((sum - 1.0).abs() < 1e-12);
@@ -87,9 +96,11 @@ mod tests {
     #[test]
     fn heat_flattens_and_keeps_the_total() {
         let shape = shape(&blob(1.0), 30);
-        let labels: Vec<u32> = shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
+        let labels: Vec<u32> =
+            shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
         let roughness = |t| {
-            let d = diffused_indicators(shape.basis(), &labels, &[1], t, DescriptorNorm::Surface, 30);
+            let d =
+                diffused_indicators(shape.basis(), &labels, &[1], t, DescriptorNorm::Surface, 30);
             d.col(0).iter().zip(&shape.basis().values).map(|(a, l)| l * a * a).sum::<f64>()
         };
         assert!(roughness(0.05) < 0.5 * roughness(0.0));

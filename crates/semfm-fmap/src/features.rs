@@ -51,7 +51,11 @@ impl CentredFeatures {
             }
         }
         for j in 0..m {
-            columns.col_as_slice_mut(j).iter_mut().zip(&mean).for_each(|(x, mean)| *x -= *mean as f32);
+            columns
+                .col_as_slice_mut(j)
+                .iter_mut()
+                .zip(&mean)
+                .for_each(|(x, mean)| *x -= *mean as f32);
         }
         let directions = principal(&columns)?;
         Ok(Self { columns, directions })
@@ -82,7 +86,14 @@ impl JointFeatures {
         let directions = unit_directions(&both, dims)?;
         let project = |columns: &Mat<f32>| {
             let mut rows = Mat::<f32>::zeros(columns.ncols(), directions.ncols());
-            matmul(rows.as_mut(), Accum::Replace, columns.transpose(), directions.as_ref(), 1.0, Par::Seq);
+            matmul(
+                rows.as_mut(),
+                Accum::Replace,
+                columns.transpose(),
+                directions.as_ref(),
+                1.0,
+                Par::Seq,
+            );
             Mat::from_fn(rows.nrows(), rows.ncols(), |i, j| f64::from(rows[(i, j)]))
         };
         let (mut on_source, mut on_target) = (project(&source.columns), project(&target.columns));
@@ -121,7 +132,9 @@ fn principal(columns: &Mat<f32>) -> Result<Mat<f32>> {
 /// Eigenvectors of X Xᵀ times the root of their eigenvalues, strongest first (rows × at most `keep`).
 fn scaled_directions(columns: &Mat<f32>, keep: usize) -> Result<Mat<f32>> {
     let (vectors, strengths) = left_singular(columns, keep)?;
-    Ok(Mat::from_fn(vectors.nrows(), vectors.ncols(), |i, j| (vectors[(i, j)] * strengths[j]) as f32))
+    Ok(Mat::from_fn(vectors.nrows(), vectors.ncols(), |i, j| {
+        (vectors[(i, j)] * strengths[j]) as f32
+    }))
 }
 
 fn unit_directions(columns: &Mat<f32>, keep: usize) -> Result<Mat<f32>> {
@@ -133,18 +146,26 @@ fn unit_directions(columns: &Mat<f32>, keep: usize) -> Result<Mat<f32>> {
 /// Directions below 1e-5 of the strongest are noise of f32 and dropped.
 fn left_singular(columns: &Mat<f32>, keep: usize) -> Result<(Mat<f64>, Vec<f64>)> {
     let (d, m) = (columns.nrows(), columns.ncols());
+    if d.min(m) == 0 {
+        return Ok((Mat::zeros(d, 0), Vec::new())); // features that all agree have no directions
+    }
     let wide = m > d;
     let mut gram = Mat::<f32>::zeros(d.min(m), d.min(m));
     let (x, xt) = (columns.as_ref(), columns.transpose());
     let (left, right) = if wide { (x, xt) } else { (xt, x) };
     matmul(gram.as_mut(), Accum::Replace, left, right, 1.0, Par::Seq);
     let gram = Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| f64::from(gram[(i, j)]));
-    let eigen = gram.self_adjoint_eigen(Side::Lower).map_err(|_| Error::LinearAlgebra("the principal directions"))?;
+    let eigen = gram
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| Error::LinearAlgebra("the principal directions"))?;
     let values = eigen.S().column_vector();
     let n = values.nrows();
     let largest = values[n - 1].max(0.0);
-    let kept: Vec<usize> =
-        (0..n).rev().take(keep).filter(|&i| values[i] > 1e-10 * largest && values[i] > 0.0).collect();
+    let kept: Vec<usize> = (0..n)
+        .rev()
+        .take(keep)
+        .filter(|&i| values[i] > 1e-10 * largest && values[i] > 0.0)
+        .collect();
     let strengths: Vec<f64> = kept.iter().map(|&i| values[i].sqrt()).collect();
     let chosen = Mat::from_fn(n, kept.len(), |i, j| eigen.U()[(i, kept[j])]);
     if wide {
@@ -168,10 +189,13 @@ mod tests {
     fn cloud(m: usize, d: usize, rank: usize, seed: u64) -> SemanticCloud {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut shared = ChaCha8Rng::seed_from_u64(99);
-        let axes = Mat::from_fn(rank, d, |i, _| (shared.random::<f64>() - 0.5) * 0.9f64.powi(i as i32));
+        let axes =
+            Mat::from_fn(rank, d, |i, _| (shared.random::<f64>() - 0.5) * 0.9f64.powi(i as i32));
         let weights = Mat::from_fn(m, rank, |_, _| rng.random::<f64>() - 0.5);
         let rows = weights * axes;
-        let features = (0..m).flat_map(|i| (0..d).map(|c| (rows[(i, c)] + 0.1) as f32).collect::<Vec<_>>()).collect();
+        let features = (0..m)
+            .flat_map(|i| (0..d).map(|c| (rows[(i, c)] + 0.1) as f32).collect::<Vec<_>>())
+            .collect();
         SemanticCloud::new(vec![DVec3::ZERO; m], features, d, vec![1; m]).unwrap()
     }
 
@@ -191,7 +215,10 @@ mod tests {
             for (i, j) in [(0, 0), (3, 40), (17, 5), (59, 69)] {
                 let found = (joint.source.row(i) - joint.target.row(j)).norm_l2();
                 let expected = (projected.col(i) - projected.col(m + j)).norm_l2() / rms;
-                assert!((found - expected).abs() < tolerance * expected, "{found} against {expected}");
+                assert!(
+                    (found - expected).abs() < tolerance * expected,
+                    "{found} against {expected}"
+                );
             }
         }
     }
@@ -203,6 +230,9 @@ mod tests {
         let joint = JointFeatures::new(&features, &features, 32).unwrap();
         assert!(joint.source.norm_l2().is_finite());
         let other = CentredFeatures::new(&cloud(5, 4, 2, 1)).unwrap();
-        assert!(matches!(JointFeatures::new(&features, &other, 32), Err(Error::Length { expected: 3, found: 4, .. })));
+        assert!(matches!(
+            JointFeatures::new(&features, &other, 32),
+            Err(Error::Length { expected: 3, found: 4, .. })
+        ));
     }
 }

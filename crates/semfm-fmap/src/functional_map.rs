@@ -24,7 +24,12 @@ impl FunctionalMap {
     /// # Errors
     /// [`Error::BasisTooSmall`] where a basis holds fewer than `k` pairs, [`Error::Length`] where
     /// the point map is not one of the target.
-    pub fn from_point_map(map: &PointMap, source: &Eigenbasis, target: &Eigenbasis, k: usize) -> Result<Self> {
+    pub fn from_point_map(
+        map: &PointMap,
+        source: &Eigenbasis,
+        target: &Eigenbasis,
+        k: usize,
+    ) -> Result<Self> {
         Error::length("point map (target vertices)", target.n_vertices(), map.n_target())?;
         check_size("the functional map", k, source, target)?;
         let mut pulled = map.pull_back_basis(source, k); // (n_target × k)
@@ -34,7 +39,14 @@ impl FunctionalMap {
             }
         }
         let mut matrix = Mat::zeros(k, k);
-        matmul(matrix.as_mut(), Accum::Replace, target.first(k).transpose(), pulled.as_ref(), 1.0, Par::Seq);
+        matmul(
+            matrix.as_mut(),
+            Accum::Replace,
+            target.first(k).transpose(),
+            pulled.as_ref(),
+            1.0,
+            Par::Seq,
+        );
         Ok(Self { matrix })
     }
 
@@ -92,7 +104,12 @@ impl FunctionalMap {
     }
 }
 
-pub(crate) fn check_size(what: &'static str, asked: usize, source: &Eigenbasis, target: &Eigenbasis) -> Result<()> {
+pub(crate) fn check_size(
+    what: &'static str,
+    asked: usize,
+    source: &Eigenbasis,
+    target: &Eigenbasis,
+) -> Result<()> {
     for (side, basis) in [("source", source), ("target", target)] {
         let available = basis.k();
         if asked > available {
@@ -112,14 +129,17 @@ mod tests {
         let shape = shape(&blob(1.0), 20);
         let n = shape.mesh().n_vertices() as u32;
         let identity = PointMap { source_of: (0..n).collect() };
-        let map = FunctionalMap::from_point_map(&identity, shape.basis(), shape.basis(), 20).unwrap();
+        let map =
+            FunctionalMap::from_point_map(&identity, shape.basis(), shape.basis(), 20).unwrap();
         for i in 0..20 {
             for j in 0..20 {
                 let expected = f64::from(u8::from(i == j));
                 assert!((map.matrix()[(i, j)] - expected).abs() < 1e-9, "C[{i}, {j}]");
             }
         }
-        assert!(map.orthogonality() < 1e-9 && map.commutativity(shape.basis(), shape.basis()) < 1e-9);
+        assert!(
+            map.orthogonality() < 1e-9 && map.commutativity(shape.basis(), shape.basis()) < 1e-9
+        );
         assert_eq!(map.point_map(shape.basis(), shape.basis()), identity);
         assert_eq!(map.adjoint_point_map(shape.basis(), shape.basis()), identity);
     }
@@ -128,7 +148,8 @@ mod tests {
     fn a_map_larger_than_a_basis_is_refused() {
         let shape = shape(&blob(1.0), 10);
         let map = PointMap { source_of: vec![0; shape.mesh().n_vertices()] };
-        let error = FunctionalMap::from_point_map(&map, shape.basis(), shape.basis(), 11).unwrap_err();
+        let error =
+            FunctionalMap::from_point_map(&map, shape.basis(), shape.basis(), 11).unwrap_err();
         assert!(matches!(error, Error::BasisTooSmall { asked: 11, available: 10, .. }), "{error}");
     }
 }

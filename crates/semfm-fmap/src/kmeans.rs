@@ -31,14 +31,21 @@ fn plus_plus(points: &[f64], dim: usize, k: usize, rng: &mut ChaCha8Rng) -> Vec<
         let total: f64 = left.iter().sum();
         let draw = |rng: &mut ChaCha8Rng| {
             let mut pick = rng.random::<f64>() * total;
-            left.iter().position(|&d| { pick -= d; pick < 0.0 }).unwrap_or(n - 1)
+            left.iter()
+                .position(|&d| {
+                    pick -= d;
+                    pick < 0.0
+                })
+                .unwrap_or(n - 1)
         };
         let candidates: Vec<usize> = (0..trials).map(|_| draw(rng)).collect();
         let remainders = candidates.iter().map(|&c| -> (usize, Vec<f64>) {
             (c, left.iter().enumerate().map(|(i, &d)| d.min(squared(row(i), row(c)))).collect())
         });
         let sum = |r: &(usize, Vec<f64>)| r.1.iter().sum::<f64>();
-        let Some((chosen, remainder)) = remainders.min_by(|a, b| sum(a).total_cmp(&sum(b))) else { break };
+        let Some((chosen, remainder)) = remainders.min_by(|a, b| sum(a).total_cmp(&sum(b))) else {
+            break;
+        };
         centres.extend_from_slice(row(chosen));
         left = remainder;
     }

@@ -50,7 +50,8 @@ pub fn geodesic_error(
     source_area: f64,
 ) -> Result<f64> {
     Error::length("target vertices of the found map", truth.n_target(), found.n_target())?;
-    let total: f64 = found.source_of.iter().zip(&truth.source_of).map(|(&a, &b)| distance(a, b)).sum();
+    let total: f64 =
+        found.source_of.iter().zip(&truth.source_of).map(|(&a, &b)| distance(a, b)).sum();
     Ok(100.0 * total / (truth.n_target().max(1) as f64 * source_area.sqrt()))
 }
 
@@ -119,14 +120,18 @@ mod tests {
     fn overlap_counts_vertices_or_areas() {
         let region = |ids: &[u32]| Region::from_vertices(4, ids).unwrap();
         assert_eq!(iou(&region(&[0, 1]), &region(&[1, 2])).unwrap(), 1.0 / 3.0);
-        assert_eq!(area_iou(&region(&[0, 1]), &region(&[1, 2]), &[1.0, 2.0, 1.0, 9.0]).unwrap(), 0.5);
+        assert_eq!(
+            area_iou(&region(&[0, 1]), &region(&[1, 2]), &[1.0, 2.0, 1.0, 9.0]).unwrap(),
+            0.5
+        );
         assert_eq!(iou(&region(&[]), &region(&[])).unwrap(), 0.0);
         assert!(iou(&region(&[]), &Region::from_vertices(5, &[]).unwrap()).is_err());
     }
 
     #[test]
     fn geodesic_error_is_in_hundredths_of_the_side() {
-        let (found, truth) = (PointMap { source_of: vec![0, 3] }, PointMap { source_of: vec![0, 1] });
+        let (found, truth) =
+            (PointMap { source_of: vec![0, 3] }, PointMap { source_of: vec![0, 1] });
         let along = |a: u32, b: u32| f64::from(a.abs_diff(b)) * 0.1;
         assert!((geodesic_error(&found, &truth, along, 4.0).unwrap() - 5.0).abs() < 1e-12);
     }

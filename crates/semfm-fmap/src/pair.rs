@@ -61,7 +61,11 @@ impl<'a> PreparedShape<'a> {
     ///
     /// # Errors
     /// Whatever clustering reports; cancellation.
-    pub fn new(semantic: SemanticShape<'a>, settings: &ClusterSettings, task: &Task) -> Result<Self> {
+    pub fn new(
+        semantic: SemanticShape<'a>,
+        settings: &ClusterSettings,
+        task: &Task,
+    ) -> Result<Self> {
         let clusters = spectral_clusters(semantic.cloud, settings, task)?;
         Self::with_clusters(semantic, Cow::Owned(clusters), task)
     }
@@ -70,7 +74,11 @@ impl<'a> PreparedShape<'a> {
     ///
     /// # Errors
     /// [`Error::Length`] where there is not one label per cloud point; cancellation.
-    pub fn with_clusters(semantic: SemanticShape<'a>, clusters: Cow<'a, Clusters>, task: &Task) -> Result<Self> {
+    pub fn with_clusters(
+        semantic: SemanticShape<'a>,
+        clusters: Cow<'a, Clusters>,
+        task: &Task,
+    ) -> Result<Self> {
         task.check()?;
         let SemanticShape { shape, cloud } = semantic;
         Error::length("cluster labels", cloud.n_points(), clusters.labels().len())?;
@@ -90,7 +98,16 @@ impl<'a> PreparedShape<'a> {
         masses.iter_mut().for_each(|m| *m /= total);
         let samples = farthest_points(vertices, MAP_SAMPLES);
         let features = CentredFeatures::new(cloud)?;
-        Ok(Self { semantic, point_of_vertex, vertex_of_point, mix, masses, samples, features, clusters })
+        Ok(Self {
+            semantic,
+            point_of_vertex,
+            vertex_of_point,
+            mix,
+            masses,
+            samples,
+            features,
+            clusters,
+        })
     }
 
     /// The shape.
@@ -148,7 +165,8 @@ impl<'a> PreparedShape<'a> {
         let mut out = Mat::zeros(self.point_of_vertex.len(), on_points.ncols());
         for c in 0..on_points.ncols() {
             let column = on_points.col(c);
-            let mixed = self.mix.points.chunks(self.mix.count).zip(self.mix.weights.chunks(self.mix.count));
+            let mixed =
+                self.mix.points.chunks(self.mix.count).zip(self.mix.weights.chunks(self.mix.count));
             for (x, (points, weights)) in out.col_mut(c).iter_mut().zip(mixed) {
                 *x = points.iter().zip(weights).map(|(&j, w)| w * column[j as usize]).sum();
             }
@@ -160,7 +178,8 @@ impl<'a> PreparedShape<'a> {
     /// simplification left none of its vertices keeps the working vertices nearest to it.
     pub(crate) fn region_on_working(&self, inside: &[bool]) -> Vec<bool> {
         let working = self.shape().working();
-        let mut on_working: Vec<bool> = working.to_original.iter().map(|&v| inside[v as usize]).collect();
+        let mut on_working: Vec<bool> =
+            working.to_original.iter().map(|&v| inside[v as usize]).collect();
         if !on_working.contains(&true) {
             for (&w, _) in working.of_original.iter().zip(inside).filter(|(_, inside)| **inside) {
                 on_working[w as usize] = true;
@@ -207,8 +226,16 @@ pub(crate) mod tests {
     /// times, put on a sphere and pulled about. `stretch` lengthens it along x.
     pub(crate) fn blob(stretch: f64) -> Mesh {
         let mut vertices = vec![DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
-        let mut faces: Vec<[u32; 3]> =
-            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let mut faces: Vec<[u32; 3]> = vec![
+            [0, 2, 4],
+            [2, 1, 4],
+            [1, 3, 4],
+            [3, 0, 4],
+            [2, 0, 5],
+            [1, 2, 5],
+            [3, 1, 5],
+            [0, 3, 5],
+        ];
         for _ in 0..3 {
             let mut middles = std::collections::BTreeMap::new();
             let mut middle = |a: u32, b: u32| {
@@ -224,14 +251,18 @@ pub(crate) mod tests {
             faces = cut.collect();
         }
         for p in &mut vertices {
-            let swell = 1.0 + 0.25 * (2.0 * p.x + 1.0).sin() + 0.2 * (3.0 * p.y - p.z).cos() + 0.15 * p.z * p.x;
+            let swell = 1.0
+                + 0.25 * (2.0 * p.x + 1.0).sin()
+                + 0.2 * (3.0 * p.y - p.z).cos()
+                + 0.15 * p.z * p.x;
             *p = DVec3::new(p.x * 1.8 * stretch, p.y, p.z * 0.8) * swell;
         }
         Mesh::new(vertices, faces).unwrap()
     }
 
     pub(crate) fn shape(mesh: &Mesh, k: usize) -> Shape {
-        Shape::new(mesh.clone(), &ShapeSettings { k, ..ShapeSettings::default() }, &Task::default()).unwrap()
+        Shape::new(mesh.clone(), &ShapeSettings { k, ..ShapeSettings::default() }, &Task::default())
+            .unwrap()
     }
 
     /// A cloud of every third vertex. Its features say where along x the point is (three soft
@@ -241,7 +272,13 @@ pub(crate) mod tests {
         let part = |x: f64, centre: f64| (-((x / stretch - centre) / 0.8).powi(2)).exp() as f32;
         let features = points.iter().enumerate().flat_map(|(i, p)| {
             let noise = |c: usize| 0.03 * ((i * 31 + c * 17) as f32).sin();
-            [part(p.x, -1.5) + noise(0), part(p.x, 0.0) + noise(1), part(p.x, 1.5) + noise(2), offset, noise(3)]
+            [
+                part(p.x, -1.5) + noise(0),
+                part(p.x, 0.0) + noise(1),
+                part(p.x, 1.5) + noise(2),
+                offset,
+                noise(3),
+            ]
         });
         let n = points.len();
         SemanticCloud::new(points.clone(), features.collect(), 5, vec![1; n]).unwrap()
@@ -252,7 +289,8 @@ pub(crate) mod tests {
         let mesh = blob(1.0);
         let (shape, cloud) = (shape(&mesh, 10), cloud(&mesh, 1.0, 0.5));
         let semantic = SemanticShape { shape: &shape, cloud: &cloud };
-        let prepared = PreparedShape::new(semantic, &ClusterSettings::default(), &Task::default()).unwrap();
+        let prepared =
+            PreparedShape::new(semantic, &ClusterSettings::default(), &Task::default()).unwrap();
         assert!((prepared.masses().iter().sum::<f64>() - 1.0).abs() < 1e-12);
         let ones = prepared.onto_vertices(&vec![1.0; cloud.n_points()]);
         assert!(ones.iter().all(|x| (x - 1.0).abs() < 1e-12));

@@ -44,7 +44,11 @@ impl Region {
         let mut weights = vec![0.0; n_vertices];
         for &v in vertices {
             let Some(weight) = weights.get_mut(v as usize) else {
-                return Error::out_of_range("region vertex", format!("an id below {n_vertices}"), v);
+                return Error::out_of_range(
+                    "region vertex",
+                    format!("an id below {n_vertices}"),
+                    v,
+                );
             };
             *weight = 1.0;
         }

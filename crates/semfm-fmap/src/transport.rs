@@ -97,9 +97,12 @@ struct Costs {
 impl Costs {
     fn new(source: MatRef<'_, f64>, target: MatRef<'_, f64>) -> Self {
         let (n_source, n_target) = (source.nrows(), target.nrows());
-        let as_f32 = |m: MatRef<'_, f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
+        let as_f32 =
+            |m: MatRef<'_, f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] as f32);
         let (source, target) = (as_f32(source), as_f32(target));
-        let squares = |m: &Mat<f32>| -> Vec<f32> { (0..m.nrows()).map(|i| m.row(i).squared_norm_l2()).collect() };
+        let squares = |m: &Mat<f32>| -> Vec<f32> {
+            (0..m.nrows()).map(|i| m.row(i).squared_norm_l2()).collect()
+        };
         let (source_squares, target_squares) = (squares(&source), squares(&target));
         let mut distances = vec![0.0f32; n_source * n_target];
         distances.par_chunks_mut(ROWS * n_source).enumerate().for_each(|(chunk, block)| {
@@ -114,7 +117,9 @@ impl Costs {
         });
         let scale = median(&distances).recip();
         if scale.is_finite() {
-            distances.par_chunks_mut(1 << 14).for_each(|block| block.iter_mut().for_each(|d| *d *= scale));
+            distances
+                .par_chunks_mut(1 << 14)
+                .for_each(|block| block.iter_mut().for_each(|d| *d *= scale));
         }
         Self { distances, n_source }
     }
@@ -152,12 +157,20 @@ impl Costs {
     }
 
     /// The scaling in f32; `None` where a kernel sum underflows.
-    fn scale(&self, p_source: &[f64], p_target: &[f64], settings: &TransportSettings, task: &Task) -> Result<Option<Plan>> {
+    fn scale(
+        &self,
+        p_source: &[f64],
+        p_target: &[f64],
+        settings: &TransportSettings,
+        task: &Task,
+    ) -> Result<Option<Plan>> {
         let n = self.n_source;
         let (blur, tau) = (settings.blur as f32, settings.kl_weight as f32);
         let exponent = if tau.is_finite() { tau / (tau + blur) } else { 1.0 };
         let (kernel, a, b) = self.kernel(blur);
-        let absorbed = |least: &[f32]| -> Vec<f32> { least.iter().map(|c| (-c / (tau + blur)).exp()).collect() };
+        let absorbed = |least: &[f32]| -> Vec<f32> {
+            least.iter().map(|c| (-c / (tau + blur)).exp()).collect()
+        };
         let (absorbed_target, absorbed_source) = (absorbed(&a), absorbed(&b));
         let mut u = vec![1.0f32; p_target.len()];
         let mut v: Vec<f32> = b.iter().map(|c| (-c / blur).exp().max(1e-20)).collect();
@@ -171,13 +184,15 @@ impl Costs {
                 .enumerate()
                 .map(|(chunk, (u, kernel))| {
                     let (p, factor) = (&p_target[chunk * ROWS..], &absorbed_target[chunk * ROWS..]);
-                    pulp::Arch::new().dispatch(|| walk(kernel, &v, u, |i, sum| {
-                        (p[i] as f32 / sum).powf(exponent) * factor[i]
-                    }))
+                    pulp::Arch::new().dispatch(|| {
+                        walk(kernel, &v, u, |i, sum| (p[i] as f32 / sum).powf(exponent) * factor[i])
+                    })
                 })
                 .collect();
             let Some(columns) = add_up(shares, n) else { return Ok(None) };
-            for (((v, sum), p), factor) in v.iter_mut().zip(&columns).zip(p_source).zip(&absorbed_source) {
+            for (((v, sum), p), factor) in
+                v.iter_mut().zip(&columns).zip(p_source).zip(&absorbed_source)
+            {
                 if *sum < UNDERFLOW {
                     return Ok(None);
                 }
@@ -186,13 +201,22 @@ impl Costs {
             if u.iter().chain(&v).any(|x| !x.is_finite()) {
                 return Ok(None);
             }
-            change = u.iter().zip(&before).fold(0.0, |m, (x, y)| f64::from((x - y).abs() / x.max(1e-30)).max(m));
+            change = u
+                .iter()
+                .zip(&before)
+                .fold(0.0, |m, (x, y)| f64::from((x - y).abs() / x.max(1e-30)).max(m));
         }
         Ok(Some(Plan { kernel, on_target: u, on_source: v, change, log_domain: false }))
     }
 
     /// The same scaling on logarithms in f64: a hundred times slower, and never out of range.
-    fn scale_in_logs(&self, p_source: &[f64], p_target: &[f64], settings: &TransportSettings, task: &Task) -> Result<Plan> {
+    fn scale_in_logs(
+        &self,
+        p_source: &[f64],
+        p_target: &[f64],
+        settings: &TransportSettings,
+        task: &Task,
+    ) -> Result<Plan> {
         let (n, blur, tau) = (self.n_source, settings.blur, settings.kl_weight);
         let exponent = if tau.is_finite() { tau / (tau + blur) } else { 1.0 };
         let cost = |i: usize, j: usize| f64::from(self.distances[i * n + j]) / blur;
@@ -203,20 +227,34 @@ impl Costs {
             task.step("transport", iteration, settings.iterations)?;
             let next: Vec<f64> = (0..p_target.len())
                 .into_par_iter()
-                .map(|i| exponent * (p_target[i].ln() - log_sum((0..n).map(|j| log_v[j] - cost(i, j)))))
+                .map(|i| {
+                    exponent * (p_target[i].ln() - log_sum((0..n).map(|j| log_v[j] - cost(i, j))))
+                })
                 .collect();
             change = next.iter().zip(&log_u).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
             log_u = next;
             log_v = (0..n)
                 .into_par_iter()
-                .map(|j| exponent * (p_source[j].ln() - log_sum((0..log_u.len()).map(|i| log_u[i] - cost(i, j)))))
+                .map(|j| {
+                    exponent
+                        * (p_source[j].ln()
+                            - log_sum((0..log_u.len()).map(|i| log_u[i] - cost(i, j))))
+                })
                 .collect();
         }
         let mut kernel = vec![0.0; self.distances.len()];
         kernel.par_chunks_mut(n).enumerate().for_each(|(i, row)| {
-            row.iter_mut().enumerate().for_each(|(j, k)| *k = (log_u[i] + log_v[j] - cost(i, j)).exp() as f32);
+            row.iter_mut()
+                .enumerate()
+                .for_each(|(j, k)| *k = (log_u[i] + log_v[j] - cost(i, j)).exp() as f32);
         });
-        Ok(Plan { kernel, on_target: vec![1.0; p_target.len()], on_source: vec![1.0; n], change, log_domain: true })
+        Ok(Plan {
+            kernel,
+            on_target: vec![1.0; p_target.len()],
+            on_source: vec![1.0; n],
+            change,
+            log_domain: true,
+        })
     }
 }
 
@@ -240,7 +278,8 @@ impl Plan {
     /// A function on the source's points (M_source) as each target point (M_target) receives it: the
     /// mean over where its mass comes from, 0 where no mass arrives.
     pub fn vote(&self, on_source: &[f64]) -> Vec<f64> {
-        let weighted: Vec<f32> = self.on_source.iter().zip(on_source).map(|(v, f)| v * *f as f32).collect();
+        let weighted: Vec<f32> =
+            self.on_source.iter().zip(on_source).map(|(v, f)| v * *f as f32).collect();
         let rows = self.kernel.par_chunks(self.n_source());
         rows.map(|row| {
             pulp::Arch::new().dispatch(|| {
@@ -274,7 +313,12 @@ impl Plan {
 /// One pass over some rows of the kernel: u from K v, and this block's share of Kᵀ u. `None` where
 /// a sum underflows.
 #[inline(always)]
-fn walk(kernel: &[f32], v: &[f32], u: &mut [f32], scale: impl Fn(usize, f32) -> f32) -> Option<Vec<f32>> {
+fn walk(
+    kernel: &[f32],
+    v: &[f32],
+    u: &mut [f32],
+    scale: impl Fn(usize, f32) -> f32,
+) -> Option<Vec<f32>> {
     let mut share = vec![0.0f32; v.len()];
     for (i, row) in kernel.chunks_exact(v.len()).enumerate() {
         let sum = dot(row, v);
@@ -320,8 +364,11 @@ fn exp_of_negative(x: f32) -> f32 {
     let shifted = scaled + 12_582_912.0;
     let whole = shifted - 12_582_912.0;
     let r = (x - whole * 0.693_359_4) + whole * 2.121_944_4e-4; // ln 2 in two parts
-    let series = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
-    let power = f32::from_bits((shifted.to_bits().wrapping_sub(0x4B40_0000).wrapping_add(127)) << 23);
+    let series = 1.0
+        + r * (1.0
+            + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
+    let power =
+        f32::from_bits((shifted.to_bits().wrapping_sub(0x4B40_0000).wrapping_add(127)) << 23);
     if x <= -87.0 { 0.0 } else { series * power }
 }
 
@@ -364,7 +411,11 @@ mod tests {
         (Mat::from_fn(n, 3, |_, _| rng.random::<f64>() * spread), vec![1.0 / n as f64; n])
     }
 
-    fn both_ways(a: &(Mat<f64>, Vec<f64>), b: &(Mat<f64>, Vec<f64>), settings: &TransportSettings) -> (Plan, Plan) {
+    fn both_ways(
+        a: &(Mat<f64>, Vec<f64>),
+        b: &(Mat<f64>, Vec<f64>),
+        settings: &TransportSettings,
+    ) -> (Plan, Plan) {
         let task = Task::default();
         let costs = Costs::new(a.0.as_ref(), b.0.as_ref());
         let fast = couple((a.0.as_ref(), &a.1), (b.0.as_ref(), &b.1), settings, &task).unwrap();
@@ -376,7 +427,10 @@ mod tests {
         for i in 0..8700 {
             let x = -0.01 * i as f32;
             let (found, expected) = (exp_of_negative(x), f64::from(x).exp());
-            assert!((f64::from(found) - expected).abs() <= 3e-7 * expected + 1e-38, "exp({x}) = {found}");
+            assert!(
+                (f64::from(found) - expected).abs() <= 3e-7 * expected + 1e-38,
+                "exp({x}) = {found}"
+            );
         }
         assert_eq!(exp_of_negative(-1e9), 0.0);
     }
@@ -418,7 +472,8 @@ mod tests {
         a.0[(7, 0)] = 1e4;
         b.0[(9, 1)] = -1e4;
         let settings = TransportSettings::default();
-        let plan = couple((a.0.as_ref(), &a.1), (b.0.as_ref(), &b.1), &settings, &Task::default()).unwrap();
+        let plan = couple((a.0.as_ref(), &a.1), (b.0.as_ref(), &b.1), &settings, &Task::default())
+            .unwrap();
         assert!((0..60).all(|i| (0..60).all(|j| plan.mass(i, j).is_finite())));
         assert!(plan.vote(&[1.0; 60]).iter().all(|&v| v == 0.0 || (v - 1.0).abs() < 1e-5));
     }
@@ -427,7 +482,8 @@ mod tests {
     fn a_cloud_moved_onto_itself_is_matched_to_itself() {
         let a = cloud(80, 7, 1.0);
         let settings = TransportSettings { blur: 0.002, ..TransportSettings::default() };
-        let plan = couple((a.0.as_ref(), &a.1), (a.0.as_ref(), &a.1), &settings, &Task::default()).unwrap();
+        let plan = couple((a.0.as_ref(), &a.1), (a.0.as_ref(), &a.1), &settings, &Task::default())
+            .unwrap();
         let identity: Vec<u32> = (0..80).collect();
         assert_eq!(plan.source_of(), identity);
         assert_eq!(plan.target_of(), identity);

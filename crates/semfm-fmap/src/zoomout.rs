@@ -76,7 +76,12 @@ pub fn zoomout(
         let matches = search(&map, source, target, settings.feature_weight, target.samples);
         k = (k + settings.step).min(settings.k_final);
         map = if target.samples.is_empty() {
-            FunctionalMap::from_point_map(&PointMap { source_of: matches }, source.basis, target.basis, k)?
+            FunctionalMap::from_point_map(
+                &PointMap { source_of: matches },
+                source.basis,
+                target.basis,
+                k,
+            )?
         } else {
             let on_target = rows_of(target.basis.first(k), target.samples);
             let on_source = rows_of(source.basis.first(k), &matches);
@@ -125,7 +130,12 @@ pub fn zoomout_bidirectional(
 }
 
 /// The point map target → source of a functional map, in the space of basis and features.
-pub fn point_map(map: &FunctionalMap, source: &MapSide<'_>, target: &MapSide<'_>, feature_weight: f64) -> PointMap {
+pub fn point_map(
+    map: &FunctionalMap,
+    source: &MapSide<'_>,
+    target: &MapSide<'_>,
+    feature_weight: f64,
+) -> PointMap {
     PointMap { source_of: search(map, source, target, feature_weight, &[]) }
 }
 
@@ -140,7 +150,13 @@ pub fn reverse_point_map(
 }
 
 /// For each of the target's `rows` (all, where empty) the nearest source vertex.
-fn search(map: &FunctionalMap, source: &MapSide<'_>, target: &MapSide<'_>, weight: f64, rows: &[u32]) -> Vec<u32> {
+fn search(
+    map: &FunctionalMap,
+    source: &MapSide<'_>,
+    target: &MapSide<'_>,
+    weight: f64,
+    rows: &[u32],
+) -> Vec<u32> {
     let carried = map.carried_deltas(source.basis.first(map.k_source()));
     let scale = weight * (map.k_target() as f64).sqrt();
     let points = with_features(carried.as_ref(), source.features, scale, &[]);
@@ -149,7 +165,13 @@ fn search(map: &FunctionalMap, source: &MapSide<'_>, target: &MapSide<'_>, weigh
 }
 
 /// For each of the source's `rows` (all, where empty) the nearest target vertex.
-fn search_back(map: &FunctionalMap, source: &MapSide<'_>, target: &MapSide<'_>, weight: f64, rows: &[u32]) -> Vec<u32> {
+fn search_back(
+    map: &FunctionalMap,
+    source: &MapSide<'_>,
+    target: &MapSide<'_>,
+    weight: f64,
+    rows: &[u32],
+) -> Vec<u32> {
     let carried = map.carried_deltas(source.basis.first(map.k_source()));
     let scale = weight * (map.k_target() as f64).sqrt();
     let points = with_features(target.basis.first(map.k_target()), target.features, scale, &[]);
@@ -158,8 +180,15 @@ fn search_back(map: &FunctionalMap, source: &MapSide<'_>, target: &MapSide<'_>, 
 }
 
 /// \[spectral, scale · features\] on the chosen rows, or on all of them where none is chosen.
-fn with_features(spectral: MatRef<'_, f64>, features: Option<MatRef<'_, f64>>, scale: f64, rows: &[u32]) -> Mat<f64> {
-    let chosen = |matrix: MatRef<'_, f64>| if rows.is_empty() { matrix.to_owned() } else { rows_of(matrix, rows) };
+fn with_features(
+    spectral: MatRef<'_, f64>,
+    features: Option<MatRef<'_, f64>>,
+    scale: f64,
+    rows: &[u32],
+) -> Mat<f64> {
+    let chosen = |matrix: MatRef<'_, f64>| {
+        if rows.is_empty() { matrix.to_owned() } else { rows_of(matrix, rows) }
+    };
     let left = chosen(spectral);
     match features.filter(|_| scale > 0.0) {
         None => left,
@@ -177,7 +206,8 @@ fn with_features(spectral: MatRef<'_, f64>, features: Option<MatRef<'_, f64>>, s
 /// C of least Σ ‖Aᵢ C − Bᵢ‖² + ridge ‖C‖² over stacked blocks (Aᵢ, Bᵢ).
 fn least_squares(blocks: &[(MatRef<'_, f64>, MatRef<'_, f64>)]) -> Result<FunctionalMap> {
     let (k_target, k_source) = (blocks[0].0.ncols(), blocks[0].1.ncols());
-    let (mut gram, mut right) = (Mat::<f64>::zeros(k_target, k_target), Mat::<f64>::zeros(k_target, k_source));
+    let (mut gram, mut right) =
+        (Mat::<f64>::zeros(k_target, k_target), Mat::<f64>::zeros(k_target, k_source));
     let mut rows = 0;
     for (a, b) in blocks {
         matmul(gram.as_mut(), Accum::Add, a.transpose(), *a, 1.0, Par::Seq);
@@ -206,13 +236,16 @@ mod tests {
     /// Share of vertices that the map sends to themselves or to somewhere very near.
     fn right(map: &PointMap, shape: &semfm_geom::Shape) -> f64 {
         let points = shape.mesh().vertices();
-        let near = |(&i, p): (&u32, &semfm_geom::math::DVec3)| points[i as usize].distance(*p) < 0.2;
+        let near =
+            |(&i, p): (&u32, &semfm_geom::math::DVec3)| points[i as usize].distance(*p) < 0.2;
         map.source_of.iter().zip(points).filter(|x| near(*x)).count() as f64 / points.len() as f64
     }
 
     /// The true 6 × 6 map of a lumpy blob onto itself, somewhat spoiled.
     fn spoiled_start() -> FunctionalMap {
-        FunctionalMap::new(Mat::from_fn(6, 6, |i, j| if i == j { 0.9 } else { 0.05 * (i as f64 - j as f64).sin() }))
+        FunctionalMap::new(Mat::from_fn(6, 6, |i, j| {
+            if i == j { 0.9 } else { 0.05 * (i as f64 - j as f64).sin() }
+        }))
     }
 
     #[test]
@@ -224,7 +257,11 @@ mod tests {
             let side = MapSide { basis: shape.basis(), features: None, samples };
             let map = zoomout(spoiled_start(), &side, &side, &settings, &Task::default()).unwrap();
             let share = right(&point_map(&map, &side, &side, 0.0), &shape);
-            assert!(share > 0.98, "{share} of the vertices are right with {} samples", samples.len());
+            assert!(
+                share > 0.98,
+                "{share} of the vertices are right with {} samples",
+                samples.len()
+            );
         }
     }
 
@@ -234,13 +271,22 @@ mod tests {
         let points = shape.mesh().vertices();
         let samples = semfm_geom::sampling::farthest_points(points, 150);
         // Every fourth sample is matched to a wrong vertex.
-        let wrong = |(i, &v): (usize, &u32)| if i % 4 == 0 { samples[(i * 7 + 3) % 150] } else { v };
+        let wrong =
+            |(i, &v): (usize, &u32)| if i % 4 == 0 { samples[(i * 7 + 3) % 150] } else { v };
         let matches: Vec<u32> = samples.iter().enumerate().map(wrong).collect();
         let positions = Mat::from_fn(points.len(), 3, |i, c| points[i][c]);
-        let side = MapSide { basis: shape.basis(), features: Some(positions.as_ref()), samples: &samples };
+        let side =
+            MapSide { basis: shape.basis(), features: Some(positions.as_ref()), samples: &samples };
         let settings = ZoomOutSettings { k_start: 10, k_final: 30, step: 5, feature_weight: 1.0 };
-        let map =
-            zoomout_bidirectional(matches.clone(), matches, &side, &side, &settings, &Task::default()).unwrap();
+        let map = zoomout_bidirectional(
+            matches.clone(),
+            matches,
+            &side,
+            &side,
+            &settings,
+            &Task::default(),
+        )
+        .unwrap();
         let forth = point_map(&map, &side, &side, 1.0);
         let back = PointMap { source_of: reverse_point_map(&map, &side, &side, 1.0) };
         assert!(right(&forth, &shape) > 0.99, "{}", right(&forth, &shape));

@@ -46,17 +46,17 @@ pub struct MeshReport {
 impl MeshReport {
     /// Looks at a mesh.
     pub fn new(mesh: &Mesh) -> Self {
-        let half_edges = HalfEdges::new(mesh);
+        let sides = Sides::new(mesh);
         let mut used = vec![false; mesh.n_vertices()];
         mesh.faces().iter().flatten().for_each(|&id| used[id as usize] = true);
         let isolated_vertices = used.iter().filter(|&&used| !used).count();
         let (mut n_edges, mut boundary_edges, mut non_manifold_edges) = (0, 0, 0);
         let mut oriented = true;
-        for edge in half_edges.by_edge() {
+        for edge in sides.by_edge() {
             n_edges += 1;
             boundary_edges += usize::from(edge.len() == 1);
             non_manifold_edges += usize::from(edge.len() > 2);
-            let forward = edge.iter().filter(|half| half.is_forward(mesh)).count();
+            let forward = edge.iter().filter(|&&side| sides.is_forward(side)).count();
             oriented &= edge.len() == 1 || (edge.len() == 2 && forward == 1);
         }
         Self {
@@ -66,7 +66,7 @@ impl MeshReport {
             components: components(mesh).count - isolated_vertices,
             boundary_edges,
             non_manifold_edges,
-            non_manifold_vertices: non_manifold_vertices(mesh, &half_edges),
+            non_manifold_vertices: non_manifold_vertices(mesh, &sides),
             degenerate_faces: (0..mesh.n_faces()).filter(|&face| is_degenerate(mesh, face)).count(),
             duplicate_faces: duplicate_faces(mesh),
             isolated_vertices,
@@ -80,7 +80,8 @@ impl MeshReport {
 
 /// The edges of a mesh, each once, lower id first, sorted.
 pub fn edges(mesh: &Mesh) -> Vec<[u32; 2]> {
-    HalfEdges::new(mesh).by_edge().map(|edge| edge[0].ends()).collect()
+    let sides = Sides::new(mesh);
+    sides.by_edge().map(|edge| sides.ends(edge[0])).collect()
 }
 
 /// Which part of the mesh each vertex belongs to.
@@ -144,69 +145,80 @@ impl VertexAdjacency {
     }
 }
 
-/// One triangle's side of an edge.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct HalfEdge {
-    /// Lower id in the upper half, so that sorting groups the sides of an edge.
-    edge: u64,
-    /// 3 × triangle + corner at which the side starts.
-    corner: u32,
+/// The sides of all triangles that name three different vertices, grouped by edge.
+///
+/// A side is named by the corner it starts at: 3 × triangle + corner. That takes 12 bytes a
+/// triangle, where keeping each side's ends for the sorting would take 48.
+struct Sides<'a> {
+    corners: &'a [u32],
+    sorted: Vec<u32>,
 }
 
-impl HalfEdge {
-    fn ends(self) -> [u32; 2] {
-        [(self.edge >> 32) as u32, self.edge as u32]
-    }
-
-    /// The two corners of its triangle that it joins, that of the lower id first.
-    fn corners(self, mesh: &Mesh) -> [u32; 2] {
-        let next = self.corner - self.corner % 3 + (self.corner + 1) % 3;
-        if self.is_forward(mesh) { [self.corner, next] } else { [next, self.corner] }
-    }
-
-    fn is_forward(self, mesh: &Mesh) -> bool {
-        mesh.faces().as_flattened()[self.corner as usize] == self.ends()[0]
-    }
-}
-
-/// All sides of all edges, grouped by edge.
-struct HalfEdges(Vec<HalfEdge>);
-
-impl HalfEdges {
-    fn new(mesh: &Mesh) -> Self {
-        let mut sides = Vec::with_capacity(3 * mesh.n_faces());
-        for (face, ids) in mesh.faces().iter().enumerate() {
-            if names_twice(ids) {
-                continue;
-            }
-            for side in 0..3 {
-                let (a, b) = (ids[side], ids[(side + 1) % 3]);
-                let edge = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
-                sides.push(HalfEdge { edge, corner: (3 * face + side) as u32 });
-            }
+impl<'a> Sides<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        let corners = mesh.faces().as_flattened();
+        let mut sides = Self { corners, sorted: Vec::new() };
+        let faces = || mesh.faces().iter().enumerate().filter(|(_, ids)| !names_twice(ids));
+        let all = || faces().flat_map(|(face, _)| (0..3).map(move |side| (3 * face + side) as u32));
+        // Counting sort by the lower end, then a comparison sort among the few that share it.
+        let mut starts = vec![0; mesh.n_vertices() + 1];
+        all().for_each(|side| starts[sides.ends(side)[0] as usize + 1] += 1);
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
         }
-        sides.sort_unstable();
-        Self(sides)
+        let mut sorted = vec![0; starts[mesh.n_vertices()]];
+        let mut next = starts.clone();
+        for side in all() {
+            let slot = &mut next[sides.ends(side)[0] as usize];
+            sorted[*slot] = side;
+            *slot += 1;
+        }
+        for range in starts.windows(2) {
+            sorted[range[0]..range[1]].sort_unstable_by_key(|&side| (sides.ends(side)[1], side));
+        }
+        sides.sorted = sorted;
+        sides
     }
 
-    fn by_edge(&self) -> impl Iterator<Item = &[HalfEdge]> {
-        self.0.chunk_by(|a, b| a.edge == b.edge)
+    /// Corner at which a side ends.
+    fn end(side: u32) -> u32 {
+        side - side % 3 + (side + 1) % 3
+    }
+
+    /// The two vertices of a side, lower id first.
+    fn ends(&self, side: u32) -> [u32; 2] {
+        let (a, b) = (self.corners[side as usize], self.corners[Self::end(side) as usize]);
+        [a.min(b), a.max(b)]
+    }
+
+    /// The two corners of a side, that of the lower vertex first.
+    fn corners_by_vertex(&self, side: u32) -> [u32; 2] {
+        if self.is_forward(side) { [side, Self::end(side)] } else { [Self::end(side), side] }
+    }
+
+    /// Whether its triangle runs through the side from the lower vertex to the upper.
+    fn is_forward(&self, side: u32) -> bool {
+        self.corners[side as usize] < self.corners[Self::end(side) as usize]
+    }
+
+    fn by_edge(&self) -> impl Iterator<Item = &[u32]> {
+        self.sorted.chunk_by(|&a, &b| self.ends(a) == self.ends(b))
     }
 }
 
 /// Joins triangle corners across the edges at their vertex: what stays apart are different fans.
-fn non_manifold_vertices(mesh: &Mesh, half_edges: &HalfEdges) -> usize {
+fn non_manifold_vertices(mesh: &Mesh, sides: &Sides<'_>) -> usize {
     let mut fans = DisjointSets::new(3 * mesh.n_faces());
     let mut bad = vec![false; mesh.n_vertices()];
-    for edge in half_edges.by_edge() {
-        let first = edge[0].corners(mesh);
-        for half in &edge[1..] {
-            let corners = half.corners(mesh);
+    for edge in sides.by_edge() {
+        let first = sides.corners_by_vertex(edge[0]);
+        for &side in &edge[1..] {
+            let corners = sides.corners_by_vertex(side);
             fans.join(first[0], corners[0]);
             fans.join(first[1], corners[1]);
         }
         if edge.len() > 2 {
-            edge[0].ends().iter().for_each(|&id| bad[id as usize] = true);
+            sides.ends(edge[0]).iter().for_each(|&id| bad[id as usize] = true);
         }
     }
     let mut fan_of = vec![u32::MAX; mesh.n_vertices()];

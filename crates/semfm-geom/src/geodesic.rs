@@ -25,7 +25,8 @@ impl Default for HeatSettings {
     }
 }
 
-/// Right-hand sides solved together: blocks of 16 cost a third of single solves each.
+/// Right-hand sides solved together. Measured gain per source: 1.05 (23 k vertices) to 1.2 (5 k); the
+/// block mainly bounds the memory.
 const BLOCK: usize = 16;
 
 /// Geodesic distances on one mesh: two matrices are factorised once, then every set of sources
@@ -60,10 +61,12 @@ impl HeatGeodesics {
     /// with extreme slivers.
     pub fn new(mesh: &Mesh, settings: &HeatSettings) -> Result<Self> {
         if !(settings.time > 0.0 && settings.time.is_finite()) {
-            let (what, expected) = ("heat method time", "a positive number of squared mean edges".into());
+            let (what, expected) =
+                ("heat method time", "a positive number of squared mean edges".into());
             return Err(Error::OutOfRange { what, expected, found: settings.time.to_string() });
         }
-        let (laplacian, triangles) = flat_laplacian(mesh, settings.kind, &TuftedSettings::default())?;
+        let (laplacian, triangles) =
+            flat_laplacian(mesh, settings.kind, &TuftedSettings::default())?;
         let (components, n_components) = components(laplacian.n_vertices(), &laplacian.stiffness);
         let time = settings.time * mean_edge(&triangles).powi(2);
 
@@ -108,8 +111,8 @@ impl HeatGeodesics {
         Ok(distances.col(0).iter().copied().collect())
     }
 
-    /// Distances (n × s) from each of s sources alone, one column each: several times faster than
-    /// asking one by one.
+    /// Distances (n × s) from each of s sources alone, one column each: a little faster
+    /// than asking one by one.
     ///
     /// # Errors
     /// As [`distances`](Self::distances).
@@ -150,7 +153,7 @@ impl HeatGeodesics {
         Ok(phi)
     }
 
-    /// Integrated −∇ · X around each vertex (Crane et al. 2013, §3.2.1), X = −∇u / |∇u|.
+    /// Integrated −∇ · X around each vertex (Crane et al. 2013), X = −∇u / |∇u|.
     fn negative_divergence(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         let mut sum = Mat::zeros(u.nrows(), u.ncols());
         for j in 0..u.ncols() {
@@ -215,9 +218,14 @@ mod tests {
         let sphere = zoo::icosphere(4);
         for kind in [LaplacianKind::Tufted, LaplacianKind::Cotan] {
             let settings = HeatSettings { kind, ..Default::default() };
-            let distances = HeatGeodesics::new(&sphere, &settings).unwrap().distances(&[7]).unwrap();
+            let distances =
+                HeatGeodesics::new(&sphere, &settings).unwrap().distances(&[7]).unwrap();
             let from = sphere.vertices()[7];
-            let worst = sphere.vertices().iter().zip(&distances).map(|(p, d)| (p.dot(from).clamp(-1.0, 1.0).acos() - d).abs());
+            let worst = sphere
+                .vertices()
+                .iter()
+                .zip(&distances)
+                .map(|(p, d)| (p.dot(from).clamp(-1.0, 1.0).acos() - d).abs());
             // An edge is 0.07 long; the heat method rounds off the far pole.
             let worst = worst.fold(0.0, f64::max);
             assert!(worst < 0.07, "{kind:?}: off by {worst}");
@@ -234,7 +242,10 @@ mod tests {
             for (i, d) in distances.iter().enumerate() {
                 let joined = geodesics.components[i] == geodesics.components[source as usize];
                 assert_eq!(d.is_finite(), joined, "{name}: vertex {i} at {d}");
-                assert!(*d >= 0.0 && (!joined || *d < 4.0 * mesh.diagonal()), "{name}: vertex {i} at {d}");
+                assert!(
+                    *d >= 0.0 && (!joined || *d < 4.0 * mesh.diagonal()),
+                    "{name}: vertex {i} at {d}"
+                );
             }
         }
     }
@@ -247,7 +258,9 @@ mod tests {
         let each = geodesics.distances_from_each(&sources).unwrap();
         for (j, &source) in sources.iter().enumerate() {
             let alone = geodesics.distances(&[source]).unwrap();
-            let worst = (0..torus.n_vertices()).map(|i| (alone[i] - each[(i, j)]).abs()).fold(0.0, f64::max);
+            let worst = (0..torus.n_vertices())
+                .map(|i| (alone[i] - each[(i, j)]).abs())
+                .fold(0.0, f64::max);
             assert!(worst < 1e-10, "source {source}: {worst:.1e}");
         }
         let together = geodesics.distances(&[sources[0], sources[11]]).unwrap();
@@ -264,6 +277,9 @@ mod tests {
         assert!(matches!(geodesics.distances(&[]), Err(Error::Length { found: 0, .. })));
         assert!(matches!(geodesics.distances(&[4]), Err(Error::OutOfRange { .. })));
         let spot = Mesh::new(vec![DVec3::ONE; 3], vec![[0, 1, 2]]).unwrap();
-        assert!(matches!(HeatGeodesics::new(&spot, &HeatSettings::default()), Err(Error::NoArea { .. })));
+        assert!(matches!(
+            HeatGeodesics::new(&spot, &HeatSettings::default()),
+            Err(Error::NoArea { .. })
+        ));
     }
 }

@@ -83,7 +83,8 @@ fn survey() {
         let ms = start.elapsed().as_millis();
         let name = file.file_stem().unwrap().to_string_lossy();
         eprintln!("{name}: {}", cleaned.report);
-        let Some(r) = simple.report else { continue };
+        let Some(simple) = simple else { continue };
+        let r = &simple.report;
         let (a, b) = (quality(&cleaned.mesh), quality(&simple.mesh));
         eprintln!(
             "   {} -> {} ({} tries, {ms} ms) hausdorff {:.4} components {} -> {} euler {} -> {}; \

@@ -156,12 +156,13 @@ fn thread_count_changes_nothing() {
 fn bad_embeddings_are_refused_by_name() {
     let mesh = lumpy_torus(12);
     let good = encode(&mesh, &cameras(&mesh), position);
-    let refuse = |change: &dyn Fn(&mut Vec<EmbeddedView>)| {
+    type Change = dyn Fn(&mut Vec<EmbeddedView>);
+    let refuse = |change: &Change| {
         let mut views = good.clone();
         change(&mut views);
         lift(&mesh, &views, &LiftSettings::default(), &Task::default()).unwrap_err().to_string()
     };
-    let cases: [(&dyn Fn(&mut Vec<EmbeddedView>), &str); 8] = [
+    let cases: [(&Change, &str); 8] = [
         (&|views| views.clear(), "embedded views"),
         (
             &|views| {

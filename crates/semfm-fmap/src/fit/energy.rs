@@ -50,8 +50,9 @@ impl Energy {
         source: &Eigenbasis,
         target: &Eigenbasis,
     ) {
-        let pairs: Vec<(Mat<f64>, Mat<f64>)> =
-            (0..a.ncols()).map(|d| (multiplication(a, d, source), multiplication(b, d, target))).collect();
+        let pairs: Vec<(Mat<f64>, Mat<f64>)> = (0..a.ncols())
+            .map(|d| (multiplication(a, d, source), multiplication(b, d, target)))
+            .collect();
         let size: f64 = pairs.iter().map(|(s, t)| s.squared_norm_l2() + t.squared_norm_l2()).sum();
         let mean = size / (2 * self.mask.nrows()) as f64;
         let root = (nu * self.mean_diagonal() / mean.max(f64::MIN_POSITIVE)).sqrt();

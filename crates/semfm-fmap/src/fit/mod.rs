@@ -126,7 +126,8 @@ fn solve_by_rows(energy: &Energy) -> Result<Mat<f64>> {
     for i in 0..k_target {
         let mut system = energy.gram.clone();
         (0..k_source).for_each(|j| system[(j, j)] += energy.mask[(i, j)] + FLOOR);
-        let factor = system.llt(Side::Lower).map_err(|_| Error::LinearAlgebra("the regularised fit"))?;
+        let factor =
+            system.llt(Side::Lower).map_err(|_| Error::LinearAlgebra("the regularised fit"))?;
         let row = factor.solve(energy.right.row(i).transpose());
         matrix.row_mut(i).copy_from(row.transpose());
     }
@@ -141,13 +142,15 @@ fn conjugate_gradients(energy: &Energy, start: Mat<f64>, task: &Task) -> Result<
             .multipliers
             .iter()
             .map(|(s, t)| {
-                s.row(j).squared_norm_l2() + t.col(i).squared_norm_l2() - 2.0 * s[(j, j)] * t[(i, i)]
+                s.row(j).squared_norm_l2() + t.col(i).squared_norm_l2()
+                    - 2.0 * s[(j, j)] * t[(i, i)]
             })
             .sum();
         energy.gram[(j, j)] + energy.mask[(i, j)] + commute + FLOOR
     });
     let apply = |c: &Mat<f64>| energy.apply(c.as_ref()) + c * faer::Scale(FLOOR);
-    let precondition = |r: &Mat<f64>| Mat::from_fn(k_target, k_source, |i, j| r[(i, j)] / diagonal[(i, j)]);
+    let precondition =
+        |r: &Mat<f64>| Mat::from_fn(k_target, k_source, |i, j| r[(i, j)] / diagonal[(i, j)]);
     let inner = |x: &Mat<f64>, y: &Mat<f64>| -> f64 {
         (0..k_source).map(|j| x.col(j).transpose() * y.col(j)).sum()
     };
@@ -180,7 +183,9 @@ mod tests {
 
     /// Two descriptors on the same shape, of rank 2 in a basis of 12.
     fn two_bumps(basis: &Eigenbasis) -> Mat<f64> {
-        Mat::from_fn(12, 2, |i, j| ((i + 1) as f64 * (j + 1) as f64).sin() * (-0.01 * basis.values[i]).exp())
+        Mat::from_fn(12, 2, |i, j| {
+            ((i + 1) as f64 * (j + 1) as f64).sin() * (-0.01 * basis.values[i]).exp()
+        })
     }
 
     #[test]
@@ -189,7 +194,9 @@ mod tests {
         let basis = shape.basis();
         let a = two_bumps(basis);
         let b = Mat::from_fn(12, 2, |i, j| a[(i, 1 - j)]);
-        let fit = fit((a.as_ref(), b.as_ref()), basis, basis, &FitSettings::default(), &Task::default()).unwrap();
+        let fit =
+            fit((a.as_ref(), b.as_ref()), basis, basis, &FitSettings::default(), &Task::default())
+                .unwrap();
         assert!(fit.report.minimum_norm && fit.report.rank == 2 && fit.report.residual < 1e-12);
         // Minimum norm: C lives on the span of A, so C (I − A A⁺) = 0.
         let c = fit.map.matrix();
@@ -208,7 +215,8 @@ mod tests {
             FitSettings { laplacian: 1e-3, descriptors: 0.0 },
             FitSettings { laplacian: 1e-3, descriptors: 1e-2 },
         ] {
-            let fit = fit((a.as_ref(), a.as_ref()), basis, basis, &settings, &Task::default()).unwrap();
+            let fit =
+                fit((a.as_ref(), a.as_ref()), basis, basis, &settings, &Task::default()).unwrap();
             let c = fit.map.matrix();
             let off: f64 = (0..12).map(|i| (c[(i, i)] - 1.0).abs()).fold(0.0, f64::max);
             assert!(off < 0.05, "diagonal is off by {off} with {settings:?}");
@@ -223,7 +231,9 @@ mod tests {
         let a = two_bumps(shape(&blob(1.0), 12).basis()).subrows(0, 8).to_owned();
         let b = Mat::from_fn(8, 2, |i, j| a[(i, j)] * 1.1 + 0.02 * (i as f64).cos());
         let settings = FitSettings { laplacian: 0.01, descriptors: 0.1 };
-        let fit = fit((a.as_ref(), b.as_ref()), one.basis(), other.basis(), &settings, &Task::default()).unwrap();
+        let fit =
+            fit((a.as_ref(), b.as_ref()), one.basis(), other.basis(), &settings, &Task::default())
+                .unwrap();
         let mut energy = Energy::new(a.as_ref(), b.as_ref());
         energy.commute_with_laplacian(0.01, one.basis(), other.basis());
         energy.commute_with_descriptors(0.1, (a.as_ref(), b.as_ref()), one.basis(), other.basis());

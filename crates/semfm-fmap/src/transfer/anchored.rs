@@ -9,19 +9,31 @@ use super::{Matched, Pair, Rule, Stages};
 use crate::zoomout::{point_map, reverse_point_map, zoomout};
 use crate::{Anchors, Result};
 
-pub(super) fn match_pair(pair: &Pair<'_>, anchors: &Anchors, stages: &mut Stages) -> Result<Matched> {
+pub(super) fn match_pair(
+    pair: &Pair<'_>,
+    anchors: &Anchors,
+    stages: &mut Stages,
+) -> Result<Matched> {
     let settings = pair.settings;
     let features = pair.vertex_features();
     let (source, target) = pair.sampled_sides(&features);
     let fit = stages.time("fit", || {
         let (on_source, on_target) = (pair.source.vertex_labels(), pair.target.vertex_labels());
-        anchor_fit((source.basis, &on_source), (target.basis, &on_target), anchors, settings, pair.task)
+        anchor_fit(
+            (source.basis, &on_source),
+            (target.basis, &on_target),
+            anchors,
+            settings,
+            pair.task,
+        )
     })?;
-    let map = stages.time("zoomout", || zoomout(fit.map, &source, &target, &settings.zoomout, pair.task))?;
+    let map = stages
+        .time("zoomout", || zoomout(fit.map, &source, &target, &settings.zoomout, pair.task))?;
     let weight = settings.zoomout.feature_weight;
     let start = std::time::Instant::now();
     let forth = point_map(&map, &source, &target, weight);
-    let reverse = (settings.rule == Rule::Image).then(|| reverse_point_map(&map, &source, &target, weight));
+    let reverse =
+        (settings.rule == Rule::Image).then(|| reverse_point_map(&map, &source, &target, weight));
     stages.put("point_map", start.elapsed());
     Ok(Matched { point_map: forth, reverse, map: Some(map), fit: Some(fit.report) })
 }

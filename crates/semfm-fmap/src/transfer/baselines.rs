@@ -16,7 +16,12 @@ const N_ENERGIES: usize = 100;
 /// The map of the transport plan: each vertex goes to the vertex of the source point that its own
 /// nearest point gets most of its mass from.
 pub(super) fn match_by_plan(pair: &Pair<'_>, plan: &crate::transport::Plan) -> Matched {
-    Matched { point_map: through_points(pair, &plan.source_of()), reverse: None, map: None, fit: None }
+    Matched {
+        point_map: through_points(pair, &plan.source_of()),
+        reverse: None,
+        map: None,
+        fit: None,
+    }
 }
 
 /// The nearest source points of each target point in the joint feature space, and the map to the
@@ -31,7 +36,10 @@ pub(super) fn match_by_neighbours(pair: &Pair<'_>, stages: &mut Stages) -> (Matc
             let mut squares = vec![0.0; source.nrows()];
             for c in 0..source.ncols() {
                 let x = target[(j, c)];
-                squares.iter_mut().zip(source.col_as_slice(c)).for_each(|(d, y)| *d += (x - y) * (x - y));
+                squares
+                    .iter_mut()
+                    .zip(source.col_as_slice(c))
+                    .for_each(|(d, y)| *d += (x - y) * (x - y));
             }
             let mut hits: Vec<(f64, u32)> = squares.into_iter().zip(0..).collect();
             let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
@@ -59,9 +67,12 @@ pub(super) fn match_by_wks(pair: &Pair<'_>, stages: &mut Stages) -> Result<Match
     let road = |a: &MapSide<'_>, b: &MapSide<'_>, stages: &mut Stages| -> Result<(Fit, PointMap)> {
         let k = pair.settings.zoomout.k_start;
         let start = std::time::Instant::now();
-        let describe = |basis: &Eigenbasis| normalised_coefficients(basis, wave_kernel_signature(basis).as_ref(), k);
+        let describe = |basis: &Eigenbasis| {
+            normalised_coefficients(basis, wave_kernel_signature(basis).as_ref(), k)
+        };
         let (on_a, on_b) = (describe(a.basis), describe(b.basis));
-        let mut fit = fit((on_a.as_ref(), on_b.as_ref()), a.basis, b.basis, &pair.settings.fit, pair.task)?;
+        let mut fit =
+            fit((on_a.as_ref(), on_b.as_ref()), a.basis, b.basis, &pair.settings.fit, pair.task)?;
         stages.put("fit", start.elapsed());
         let (map, points) = stages.time("zoomout", || {
             let map = zoomout(fit.map.clone(), a, b, &pair.settings.zoomout, pair.task)?;
@@ -94,7 +105,9 @@ fn wave_kernel_signature(basis: &Eigenbasis) -> Mat<f64> {
         let energy = first + (last - first) * e as f64 / (N_ENERGIES - 1) as f64;
         (-(energy - logs[i]).powi(2) / (2.0 * width * width)).exp()
     });
-    let squares = Mat::from_fn(basis.n_vertices(), logs.len(), |v, i| basis.functions[(v, constants + i)].powi(2));
+    let squares = Mat::from_fn(basis.n_vertices(), logs.len(), |v, i| {
+        basis.functions[(v, constants + i)].powi(2)
+    });
     let mut signature = squares * &bands;
     for e in 0..N_ENERGIES {
         let total: f64 = bands.col(e).iter().sum::<f64>().max(f64::MIN_POSITIVE);

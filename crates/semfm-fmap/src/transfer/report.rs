@@ -8,9 +8,9 @@ use serde::Serialize;
 use serde::ser::SerializeMap;
 
 use super::{Matching, Rule, TransferSettings, mask};
-use crate::Anchor;
 use crate::fit::FitReport;
 use crate::metrics::{AnchorError, anchor_error, dirichlet_energy};
+use crate::{Anchor, Result};
 
 /// Time per stage in milliseconds, in the order in which the stages ran; a JSON object by name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,7 +28,11 @@ impl Stages {
     }
 
     /// Runs `work` and books its time under `stage`.
-    pub(super) fn time<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+    pub(super) fn time<T>(
+        &mut self,
+        stage: &'static str,
+        work: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
         let start = Instant::now();
         let result = work();
         self.put(stage, start.elapsed());
@@ -50,7 +54,10 @@ impl Stages {
 }
 
 impl Serialize for Stages {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+    fn serialize<S: serde::Serializer>(
+        &self,
+        serializer: S,
+    ) -> std::result::Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
         for (stage, ms) in &self.0 {
             map.serialize_entry(stage, ms)?;
@@ -133,9 +140,16 @@ pub struct TransferReport {
 }
 
 impl Matching<'_> {
-    pub(super) fn report(&self, agreement: f64, other_iou: Option<f64>, votes: &[f64], inside: &[bool]) -> TransferReport {
+    pub(super) fn report(
+        &self,
+        agreement: f64,
+        other_iou: Option<f64>,
+        votes: &[f64],
+        inside: &[bool],
+    ) -> TransferReport {
         let share = |mask: &[bool], areas: &[f64]| {
-            let inside: f64 = mask.iter().zip(areas).filter(|(inside, _)| **inside).map(|(_, area)| area).sum();
+            let inside: f64 =
+                mask.iter().zip(areas).filter(|(inside, _)| **inside).map(|(_, area)| area).sum();
             inside / areas.iter().sum::<f64>()
         };
         TransferReport {
@@ -164,11 +178,18 @@ impl Matching<'_> {
         let report = |&anchor: &Anchor| {
             let from_source: Vec<bool> = carried.iter().map(|&l| l == anchor.source).collect();
             let partner: Vec<bool> = labels.iter().map(|&l| l == anchor.target).collect();
-            let points: Vec<DVec3> =
-                mesh.vertices().iter().zip(&partner).filter(|(_, inside)| **inside).map(|(p, _)| *p).collect();
+            let points: Vec<DVec3> = mesh
+                .vertices()
+                .iter()
+                .zip(&partner)
+                .filter(|(_, inside)| **inside)
+                .map(|(p, _)| *p)
+                .collect();
             let index = PointIndex::new(&points).ok(); // fails for no points: nowhere to measure to
-            let distance = |j: usize| index.as_ref().map_or(0.0, |index| index.nearest(mesh.vertices()[j]).1);
-            let error = anchor_error(&from_source, &partner, areas, distance, self.target.shape().unit());
+            let distance =
+                |j: usize| index.as_ref().map_or(0.0, |index| index.nearest(mesh.vertices()[j]).1);
+            let error =
+                anchor_error(&from_source, &partner, areas, distance, self.target.shape().unit());
             AnchorReport { anchor, error }
         };
         self.anchors.pairs.iter().map(report).collect()
@@ -176,12 +197,16 @@ impl Matching<'_> {
 
     fn map_quality(&self) -> MapQuality {
         let (source, target) = (self.source.shape(), self.target.shape());
-        let scaled: Vec<DVec3> = source.mesh().vertices().iter().map(|&p| p / source.unit()).collect();
+        let scaled: Vec<DVec3> =
+            source.mesh().vertices().iter().map(|&p| p / source.unit()).collect();
         let map = self.matched.map.as_ref();
         let mut hit = vec![false; scaled.len()];
         self.matched.point_map.source_of.iter().for_each(|&i| hit[i as usize] = true);
         MapQuality {
-            dirichlet_energy: dirichlet_energy(target.mesh(), &self.matched.point_map.pull_back(&scaled)),
+            dirichlet_energy: dirichlet_energy(
+                target.mesh(),
+                &self.matched.point_map.pull_back(&scaled),
+            ),
             orthogonality: map.map(|c| c.orthogonality()),
             commutativity: map.map(|c| c.commutativity(source.basis(), target.basis())),
             k: map.map(|c| c.k_target()),

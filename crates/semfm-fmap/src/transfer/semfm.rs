@@ -33,14 +33,30 @@ pub fn anchor_fit(
     fit((a.as_ref(), b.as_ref()), source.0, target.0, &settings.fit, task)
 }
 
-pub(super) fn match_pair(pair: &Pair<'_>, anchors: &Anchors, stages: &mut Stages) -> Result<Matched> {
+pub(super) fn match_pair(
+    pair: &Pair<'_>,
+    anchors: &Anchors,
+    stages: &mut Stages,
+) -> Result<Matched> {
     let (source, target) = pair.plain_sides();
     let (on_source, on_target) = (pair.source.vertex_labels(), pair.target.vertex_labels());
     let swapped = anchors.swapped();
     let (forth, back) = stages.time("fit", || {
         let settings = pair.settings;
-        let forth = anchor_fit((source.basis, &on_source), (target.basis, &on_target), anchors, settings, pair.task)?;
-        let back = anchor_fit((target.basis, &on_target), (source.basis, &on_source), &swapped, settings, pair.task)?;
+        let forth = anchor_fit(
+            (source.basis, &on_source),
+            (target.basis, &on_target),
+            anchors,
+            settings,
+            pair.task,
+        )?;
+        let back = anchor_fit(
+            (target.basis, &on_target),
+            (source.basis, &on_source),
+            &swapped,
+            settings,
+            pair.task,
+        )?;
         Ok((forth, back))
     })?;
     let report = forth.report.clone();
@@ -52,7 +68,12 @@ pub(super) fn match_pair(pair: &Pair<'_>, anchors: &Anchors, stages: &mut Stages
         Ok((forth?, back?))
     })?;
     let (map, forth) = forth;
-    Ok(Matched { point_map: forth, reverse: Some(back.1.source_of), map: Some(map), fit: Some(report) })
+    Ok(Matched {
+        point_map: forth,
+        reverse: Some(back.1.source_of),
+        map: Some(map),
+        fit: Some(report),
+    })
 }
 
 fn refine(

@@ -183,8 +183,15 @@ impl TransferSettings {
             clusters: ClusterSettings::default(),
             n_anchors: 2,
             heat_time: 0.005,
-            descriptor_norm: if literal { DescriptorNorm::Vertices } else { DescriptorNorm::Surface },
-            fit: FitSettings { laplacian: if method == Method::Wks { 0.01 } else { 0.0 }, descriptors: 0.0 },
+            descriptor_norm: if literal {
+                DescriptorNorm::Vertices
+            } else {
+                DescriptorNorm::Surface
+            },
+            fit: FitSettings {
+                laplacian: if method == Method::Wks { 0.01 } else { 0.0 },
+                descriptors: 0.0,
+            },
             zoomout: method.zoomout(),
             feature_dims: 32,
             transport: TransportSettings::default(),
@@ -203,8 +210,13 @@ impl TransferSettings {
             return Error::out_of_range("heat times", "numbers of at least 0", found);
         }
         if self.n_anchors == 0 || self.feature_dims == 0 || self.neighbours == 0 {
-            let found = format!("{}, {} and {}", self.n_anchors, self.feature_dims, self.neighbours);
-            return Error::out_of_range("anchors, feature dimensions, neighbours", "at least 1 of each", found);
+            let found =
+                format!("{}, {} and {}", self.n_anchors, self.feature_dims, self.neighbours);
+            return Error::out_of_range(
+                "anchors, feature dimensions, neighbours",
+                "at least 1 of each",
+                found,
+            );
         }
         if self.rule == Rule::Image && !self.method.has_map() {
             let expected = format!("preimage ({} makes no map that has an image)", self.method);
@@ -216,7 +228,8 @@ impl TransferSettings {
     /// The same with map sizes that bases of `available` pairs can serve.
     pub(super) fn clipped(&self, available: usize) -> Self {
         let k_final = self.zoomout.k_final.min(available);
-        let zoomout = ZoomOutSettings { k_final, k_start: self.zoomout.k_start.min(k_final), ..self.zoomout };
+        let zoomout =
+            ZoomOutSettings { k_final, k_start: self.zoomout.k_start.min(k_final), ..self.zoomout };
         Self { zoomout, ..self.clone() }
     }
 

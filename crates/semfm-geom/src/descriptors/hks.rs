@@ -24,14 +24,18 @@ impl Default for HksSettings {
 /// How much heat is left at each vertex after each time, (n × n_times): Σ exp(−λt) φ², divided by
 /// the heat trace Σ exp(−λt) so that all times weigh alike.
 ///
-/// Times run from 4 ln 10 / λ_max to 4 ln 10 / λ_min, as in the paper's section 5, with λ_min the
+/// Times run from 4 ln 10 / λ_max to 4 ln 10 / λ_min, as in the paper, with λ_min the
 /// smallest eigenvalue above zero.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for no times, or a basis without an eigenvalue above zero.
 pub fn hks(basis: &Eigenbasis, settings: &HksSettings) -> Result<Mat<f64>> {
     if settings.n_times == 0 {
-        return Err(Error::OutOfRange { what: "n_times", expected: "1 or more".into(), found: "0".into() });
+        return Err(Error::OutOfRange {
+            what: "n_times",
+            expected: "1 or more".into(),
+            found: "0".into(),
+        });
     }
     let (smallest, largest) = spectrum(basis)?;
     let log_time = |lambda: f64| (4.0 * LN_10 / lambda).ln();

@@ -34,7 +34,8 @@ fn weighted_squares(basis: &Eigenbasis, mut weights: Mat<f64>) -> Mat<f64> {
         let total: f64 = column.iter().sum();
         column.iter_mut().for_each(|weight| *weight /= total);
     }
-    let squares = Mat::from_fn(basis.n_vertices(), basis.k(), |i, j| basis.functions[(i, j)].powi(2));
+    let squares =
+        Mat::from_fn(basis.n_vertices(), basis.k(), |i, j| basis.functions[(i, j)].powi(2));
     let mut descriptors = Mat::zeros(basis.n_vertices(), weights.ncols());
     matmul(descriptors.as_mut(), Accum::Replace, squares.as_ref(), weights.as_ref(), 1.0, Par::Seq);
     descriptors
@@ -62,8 +63,9 @@ mod tests {
     fn every_animal_has_finite_descriptors() {
         for (name, mesh) in zoo::all() {
             let basis = basis(&mesh, 20.min(mesh.n_vertices()));
-            let [wks, hks] = [wks(&basis, &WksSettings::default()), hks(&basis, &HksSettings::default())]
-                .map(|d| d.unwrap());
+            let [wks, hks] =
+                [wks(&basis, &WksSettings::default()), hks(&basis, &HksSettings::default())]
+                    .map(|d| d.unwrap());
             assert_eq!((wks.nrows(), wks.ncols()), (mesh.n_vertices(), 100), "{name}");
             for column in wks.col_iter().chain(hks.col_iter()) {
                 assert!(column.iter().all(|d| d.is_finite() && *d >= 0.0), "{name}");

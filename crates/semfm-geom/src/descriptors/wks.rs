@@ -20,8 +20,8 @@ impl Default for WksSettings {
     }
 }
 
-/// Width σ of an energy band, in steps of the full range of log λ over `n_energies` (the paper's
-/// section 4: 7 δ); the energies keep 2 σ away from both ends.
+/// Width σ of an energy band, in steps of the full range of log λ over `n_energies`; the energies
+/// keep 2 σ away from both ends. Both numbers as in pyFM, so that descriptors can be compared.
 const BAND: f64 = 7.0;
 
 /// The probability of meeting a quantum particle of each energy at each vertex,
@@ -35,7 +35,11 @@ const BAND: f64 = 7.0;
 pub fn wks(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
     let n = settings.n_energies;
     if n == 0 {
-        return Err(Error::OutOfRange { what: "n_energies", expected: "1 or more".into(), found: "0".into() });
+        return Err(Error::OutOfRange {
+            what: "n_energies",
+            expected: "1 or more".into(),
+            found: "0".into(),
+        });
     }
     let (smallest, largest) = spectrum(basis)?;
     let (low, high) = (smallest.ln(), largest.ln());

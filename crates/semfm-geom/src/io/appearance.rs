@@ -115,12 +115,6 @@ pub(crate) fn srgb_from_linear(x: f32) -> f32 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Texture coordinates of all corners from their numbers in a table.
-pub(crate) fn uvs_of_corners(uv_ids: &[[u32; 3]], uvs: &[[f32; 2]]) -> Vec<[[f32; 2]; 3]> {
-    let uv = |id: u32| uvs.get(id as usize).copied().unwrap_or(MISSING_UV);
-    uv_ids.iter().map(|ids| ids.map(uv)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,9 +7,9 @@
 
 use std::borrow::Cow;
 
-use super::appearance::{Appearance, rgba_from_floats, uvs_of_corners};
+use super::appearance::{Appearance, rgba_from_floats};
 use super::input::{Input, quote};
-use super::polygon::{NO_UV, Polygons};
+use super::polygon::{NO_UV, Polygons, Triangles};
 use super::text::{Line, Lines, integer, number};
 use super::{MeshParts, PointCloud};
 use crate::Result;
@@ -18,15 +18,14 @@ use crate::math::DVec3;
 /// Reads the faces of an OBJ file; those with one or two corners are points and edges.
 pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
     let file = ObjFile::read(input)?;
-    let (faces, uv_ids) = file.polygons.triangles(&file.vertices);
-    let mut appearance = Appearance { vertex_colors: file.vertex_colors(), ..Default::default() };
-    if let Some(uv_ids) = uv_ids {
-        // OBJ counts v from the bottom of the image, we from the top as glTF does.
-        let uvs: Vec<_> = file.uvs.iter().map(|&[u, v]| [u, 1.0 - v]).collect();
-        appearance.corner_uvs = Some(uvs_of_corners(&uv_ids, &uvs));
-    }
-    appearance.notes = file.notes;
-    Ok(MeshParts { vertices: file.vertices, faces, n_faces: file.polygons.len(), appearance })
+    let vertex_colors = file.vertex_colors();
+    // OBJ counts v from the bottom of the image, we from the top as glTF does.
+    let uvs: Vec<_> = file.uvs.iter().map(|&[u, v]| [u, 1.0 - v]).collect();
+    let Triangles { n_faces, faces, corner_uvs } =
+        file.polygons.into_triangles(&file.vertices, &uvs);
+    let appearance =
+        Appearance { vertex_colors, corner_uvs, notes: file.notes, ..Default::default() };
+    Ok(MeshParts { vertices: file.vertices, faces, n_faces, appearance })
 }
 
 /// Reads the vertices of an OBJ file and drops its faces.

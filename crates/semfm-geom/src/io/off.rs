@@ -4,9 +4,9 @@
 //! for `N`, a colour for `C`, a texture coordinate for `ST`; a face row is its corner count, the
 //! corners and an optional colour. A `#` hides the rest of its line. The edge count may be missing.
 
-use super::appearance::{Appearance, rgba_from_floats, uvs_of_corners};
+use super::appearance::{Appearance, rgba_from_floats};
 use super::input::{Input, quote};
-use super::polygon::{NO_UV, Polygons};
+use super::polygon::{NO_UV, Polygons, Triangles};
 use super::text::{Lines, Words, number};
 use super::{MeshParts, PointCloud};
 use crate::Result;
@@ -17,13 +17,10 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
     let mut reader = Reader::open(input)?;
     let vertices = reader.vertices()?;
     let polygons = reader.polygons()?;
-    let (faces, uv_ids) = polygons.triangles(&vertices);
-    let appearance = Appearance {
-        vertex_colors: reader.vertex_colors(),
-        corner_uvs: uv_ids.map(|ids| uvs_of_corners(&ids, &reader.uvs)),
-        ..Default::default()
-    };
-    Ok(MeshParts { vertices, faces, n_faces: polygons.len(), appearance })
+    let Triangles { n_faces, faces, corner_uvs } = polygons.into_triangles(&vertices, &reader.uvs);
+    let appearance =
+        Appearance { vertex_colors: reader.vertex_colors(), corner_uvs, ..Default::default() };
+    Ok(MeshParts { vertices, faces, n_faces, appearance })
 }
 
 /// Reads the vertices alone.
@@ -147,7 +144,8 @@ impl<'a> Reader<'a> {
     }
 
     fn polygons(&mut self) -> Result<Polygons> {
-        let mut polygons = Polygons::default();
+        let mut polygons =
+            if self.has_uvs { Polygons::with_uvs_by_vertex() } else { Polygons::default() };
         for _ in 0..self.n_faces {
             let n_corners = count(self.input, &mut self.words, "the number of corners of a face")?;
             if n_corners > self.words.bytes_left() {
@@ -165,7 +163,7 @@ impl<'a> Reader<'a> {
                     let expected = format!("one of the {} vertices, from 0", self.n_vertices);
                     self.input.error(self.words.place(), expected, given.to_string())
                 })?;
-                polygons.push(id, if self.has_uvs { id } else { NO_UV });
+                polygons.push(id, NO_UV);
             }
             polygons.close();
             // What is left on the row is the colour of the face.

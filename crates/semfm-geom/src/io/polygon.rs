@@ -1,5 +1,6 @@
 //! Polygons to triangles, without new vertices.
 
+use super::appearance::MISSING_UV;
 use crate::math::{DVec2, DVec3};
 
 /// Above this many corners a polygon is fanned even if it is concave: ear clipping takes quadratic
@@ -15,8 +16,11 @@ const STRAIGHT: f64 = 1e-6;
 pub(crate) struct Polygons {
     /// Vertex ids of all corners.
     ids: Vec<u32>,
-    /// Which texture coordinate each corner has, [`NO_UV`] for none; empty while no corner has one.
+    /// Which texture coordinate each corner has, [`NO_UV`] for none; empty while no corner has one
+    /// of its own.
     uv_ids: Vec<u32>,
+    /// Texture coordinates go by vertex: those of a corner have its vertex's number.
+    uvs_by_vertex: bool,
     /// For each face, one past its last corner.
     ends: Vec<usize>,
 }
@@ -25,6 +29,11 @@ pub(crate) struct Polygons {
 pub(crate) const NO_UV: u32 = u32::MAX;
 
 impl Polygons {
+    /// No faces yet; their corners will have the texture coordinates of their vertices.
+    pub fn with_uvs_by_vertex() -> Self {
+        Self { uvs_by_vertex: true, ..Self::default() }
+    }
+
     /// Adds a corner to the face that [`close`](Self::close) will end.
     pub fn push(&mut self, vertex: u32, uv: u32) {
         if uv != NO_UV && self.uv_ids.is_empty() {
@@ -48,22 +57,20 @@ impl Polygons {
         }
     }
 
-    /// Faces closed so far.
-    pub fn len(&self) -> usize {
-        self.ends.len()
-    }
-
     /// How many corners name a texture coordinate from `n_uvs` on.
     pub fn count_uvs_from(&self, n_uvs: u32) -> usize {
         self.uv_ids.iter().filter(|&&id| id != NO_UV && id >= n_uvs).count()
     }
 
-    /// All faces as triangles, and the texture coordinate of each of their corners if there are
-    /// any. Every id must be one of `vertices`.
-    pub fn triangles(&self, vertices: &[DVec3]) -> (Vec<[u32; 3]>, Option<Vec<[u32; 3]>>) {
+    /// All faces as triangles, and the texture coordinates of their corners if there are any: NaN
+    /// for a corner without one or with one that is not in `uvs`. Every vertex id must be one of
+    /// `vertices`.
+    pub fn into_triangles(self, vertices: &[DVec3], uvs: &[[f32; 2]]) -> Triangles {
         let n_triangles = self.ids.len() - 2 * self.ends.len();
+        let uv_ids = if self.uvs_by_vertex { &self.ids } else { &self.uv_ids };
         let mut faces = Vec::with_capacity(n_triangles);
-        let mut uv_ids = Vec::with_capacity(if self.uv_ids.is_empty() { 0 } else { n_triangles });
+        let mut corner_uvs = Vec::with_capacity(if uv_ids.is_empty() { 0 } else { n_triangles });
+        let uv_of = |id: u32| uvs.get(id as usize).copied().unwrap_or(MISSING_UV);
         let mut cutter = PolygonCutter::default();
         let mut corners = Vec::new();
         let mut start = 0;
@@ -73,14 +80,29 @@ impl Polygons {
             corners.extend(ids.iter().map(|&id| vertices[id as usize]));
             let cut = cutter.cut(&corners);
             faces.extend(cut.iter().map(|triangle| triangle.map(|i| ids[i as usize])));
-            if !self.uv_ids.is_empty() {
-                let uvs = &self.uv_ids[start..end];
-                uv_ids.extend(cut.iter().map(|triangle| triangle.map(|i| uvs[i as usize])));
+            if !uv_ids.is_empty() {
+                let uv_ids = &uv_ids[start..end];
+                corner_uvs
+                    .extend(cut.iter().map(|triangle| triangle.map(|i| uv_of(uv_ids[i as usize]))));
             }
             start = end;
         }
-        (faces, (!self.uv_ids.is_empty()).then_some(uv_ids))
+        Triangles {
+            n_faces: self.ends.len(),
+            faces,
+            corner_uvs: (!uv_ids.is_empty()).then_some(corner_uvs),
+        }
     }
+}
+
+/// Faces cut to triangles.
+pub(crate) struct Triangles {
+    /// Faces there were.
+    pub n_faces: usize,
+    /// Vertex ids (m).
+    pub faces: Vec<[u32; 3]>,
+    /// Texture coordinates of the corners (m).
+    pub corner_uvs: Option<Vec<[[f32; 2]; 3]>>,
 }
 
 /// Cuts one polygon after the other, keeping the scratch space.

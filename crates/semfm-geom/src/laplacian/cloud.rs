@@ -1,4 +1,4 @@
-//! The Laplacian of points without triangles (Sharp & Crane 2020, §5.7).
+//! The Laplacian of points without triangles (Sharp & Crane 2020).
 
 use super::star::{Neighbour, StarFinder, lift};
 use super::tufted::{delaunay_cover_of_soup, laplacian_of_cover};

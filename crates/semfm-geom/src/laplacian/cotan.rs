@@ -21,7 +21,8 @@ pub fn cotan_laplacian(mesh: &Mesh) -> Result<Laplacian> {
             continue;
         }
         for k in 0..3 {
-            let (to_i, to_j) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            let (to_i, to_j) =
+                (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
             let weight = 0.5 * to_i.dot(to_j) / double_area;
             edges.push((ids[(k + 1) % 3], ids[(k + 2) % 3], weight));
         }

@@ -1,4 +1,4 @@
-//! The tufted cover: a non-manifold mesh made into a closed surface (Sharp & Crane 2020, §3.1).
+//! The tufted cover: a non-manifold mesh made into a closed surface (Sharp & Crane 2020).
 //!
 //! Every triangle becomes two, a front and a back. Around each edge of the input, sorted by angle,
 //! the side of one triangle that looks at the next is glued to the side of the next that looks
@@ -61,7 +61,7 @@ impl Fans {
 /// Every face must name three different vertices. Triangle f = a b c of the input becomes the
 /// triangles 2f = a b c (front) and 2f + 1 = b a c (back) of the cover.
 ///
-/// Mollification (§4.5 there): all edges grow by the smallest common length that gives each
+/// Mollification (ibid.): all edges grow by the smallest common length that gives each
 /// triangle a slack of `mollify_factor` mean edges in its triangle inequality.
 pub(super) fn tufted_cover(
     points: &[DVec3],

@@ -1,7 +1,8 @@
 //! Triangles laid flat: what gradients and divergences need besides the Laplacian.
 
 use super::{
-    Laplacian, LaplacianKind, TuftedSettings, cotan_laplacian, intrinsic::IntrinsicTriangulation, tufted,
+    Laplacian, LaplacianKind, TuftedSettings, cotan_laplacian, intrinsic::IntrinsicTriangulation,
+    tufted,
 };
 use crate::math::DVec2;
 use crate::{Mesh, Result};
@@ -42,7 +43,8 @@ impl FlatTriangle {
         if scale == 0.0 {
             return [0.0; 3];
         }
-        let gradient: DVec2 = hats.iter().zip(values).map(|(hat, value)| *hat * (value / scale)).sum();
+        let gradient: DVec2 =
+            hats.iter().zip(values).map(|(hat, value)| *hat * (value / scale)).sum();
         let descent = -gradient.normalize_or_zero();
         hats.map(|hat| 0.5 * self.share * hat.dot(descent))
     }

@@ -6,7 +6,7 @@
 
 use crate::math::{DVec3, bounds};
 
-/// Points in a leaf. 8 and 32 were as fast.
+/// Points in a leaf. Not tuned: 149 components of 34 k vertices take 26 ms with it.
 const LEAF: usize = 16;
 
 /// A branch of the tree over a range of the sorted points.

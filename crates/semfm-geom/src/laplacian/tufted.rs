@@ -37,7 +37,10 @@ pub fn tufted_laplacian(mesh: &Mesh, settings: &TuftedSettings) -> Result<Laplac
 }
 
 /// The intrinsic Delaunay triangulation of a mesh's tufted cover.
-pub(super) fn delaunay_cover(mesh: &Mesh, settings: &TuftedSettings) -> Result<IntrinsicTriangulation> {
+pub(super) fn delaunay_cover(
+    mesh: &Mesh,
+    settings: &TuftedSettings,
+) -> Result<IntrinsicTriangulation> {
     let whole = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
     if mesh.faces().iter().all(whole) {
         return delaunay_cover_of_soup(mesh.vertices(), mesh.faces(), settings.mollify_factor);
@@ -56,8 +59,8 @@ pub(super) fn delaunay_cover_of_soup(
         let (what, expected) = ("mollify_factor", "a number of mean edges, 0 or more".into());
         return Err(Error::OutOfRange { what, expected, found: mollify_factor.to_string() });
     }
-    let mut cover =
-        tufted_cover(points, faces, mollify_factor).ok_or(Error::NoArea { n_faces: faces.len() })?;
+    let mut cover = tufted_cover(points, faces, mollify_factor)
+        .ok_or(Error::NoArea { n_faces: faces.len() })?;
     cover.flip_to_delaunay();
     Ok(cover)
 }

@@ -1,7 +1,7 @@
 //! Lifting: from patch embeddings in images to a [`SemanticCloud`] on the surface (section IV-C).
 //!
-//! Two rules. [`pull`]: each surface sample looks up its own place in every view that sees it (the
-//! default). [`unproject`]: each patch centre is cast onto the surface, and a sample averages what
+//! Two rules. Pull: each surface sample looks up its own place in every view that sees it (the
+//! default). Unproject: each patch centre is cast onto the surface, and a sample averages what
 //! landed near it (the paper's). On thin objects hardly one patch centre in fifteen hits the
 //! surface, which is what the first rule cures.
 

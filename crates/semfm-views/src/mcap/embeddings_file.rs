@@ -169,8 +169,10 @@ fn check_grid(patches: &PatchEmbeddings, dim: usize) -> std::result::Result<(), 
         let expected = "a rectangle with left < right and top < bottom".to_owned();
         return Err((expected, format!("{:?}", patches.rect)));
     }
+    // Without an early exit, so that the compiler compares many numbers at once.
+    let is_finite = |vector: &[f32]| vector.iter().fold(true, |all, x| all & x.is_finite());
     let mut cells = patches.data.chunks_exact(dim).zip(&patches.valid);
-    match cells.position(|(vector, &valid)| valid && vector.iter().any(|x| !x.is_finite())) {
+    match cells.position(|(vector, &valid)| valid && !is_finite(vector)) {
         None => Ok(()),
         Some(patch) => {
             let (row, col) = (patch / patches.cols, patch % patches.cols);
@@ -214,29 +216,44 @@ fn count(n: usize) -> Result<u32> {
     u32::try_from(n).map_err(error)
 }
 
+/// Numbers are converted in blocks of this many, which stay in the cache.
+const BLOCK: usize = 4096;
+
 /// Vectors as little-endian bytes.
 fn encode(view: usize, patches: &PatchEmbeddings, dtype: Dtype) -> Result<Bytes> {
-    if dtype == Dtype::F32 {
-        return Ok(little_endian(&patches.data, f32::to_le_bytes));
+    let numbers = &patches.data;
+    let mut bytes = Vec::with_capacity(numbers.len() * dtype.n_bytes());
+    match dtype {
+        Dtype::F32 => extend(&mut bytes, numbers, f32::to_le_bytes),
+        Dtype::F16 => {
+            let is_over = |x: &f32| x.is_finite() && f16::from_f32(*x).is_infinite();
+            // Everything from here on rounds to infinity.
+            let any_large = numbers.iter().fold(false, |any, x| any | (x.abs() >= 65_520.0));
+            if any_large && let Some(at) = numbers.iter().position(is_over) {
+                let what = format!("view {view:03}, number {at}");
+                return Err(invalid(what, "at most 65504 for f16", numbers[at].to_string()));
+            }
+            let mut halves = [f16::ZERO; BLOCK];
+            for numbers in numbers.chunks(BLOCK) {
+                let halves = &mut halves[..numbers.len()];
+                halves.convert_from_f32_slice(numbers);
+                extend(&mut bytes, halves, f16::to_le_bytes);
+            }
+        }
     }
-    let mut halves = vec![f16::ZERO; patches.data.len()];
-    halves.convert_from_f32_slice(&patches.data);
-    let overflow = |(half, &x): (&f16, &f32)| half.is_infinite() && x.is_finite();
-    if let Some(at) = halves.iter().zip(&patches.data).position(overflow) {
-        let what = format!("view {view:03}, number {at}");
-        return Err(invalid(what, "at most 65504 for f16", patches.data[at].to_string()));
-    }
-    Ok(little_endian(&halves, f16::to_le_bytes))
+    Ok(bytes.into())
 }
 
-fn little_endian<T: bytemuck::NoUninit, const N: usize>(
+/// Appends numbers as little-endian bytes: in one go where the machine holds them so already.
+fn extend<T: bytemuck::NoUninit, const N: usize>(
+    bytes: &mut Vec<u8>,
     numbers: &[T],
-    bytes: impl Fn(T) -> [u8; N],
-) -> Bytes {
-    if cfg!(target_endian = "little") {
-        return Bytes::copy_from_slice(bytemuck::cast_slice(numbers));
+    to_le_bytes: impl Fn(T) -> [u8; N],
+) {
+    match cfg!(target_endian = "little") {
+        true => bytes.extend_from_slice(bytemuck::cast_slice(numbers)),
+        false => numbers.iter().for_each(|&x| bytes.extend(to_le_bytes(x))),
     }
-    numbers.iter().flat_map(|&x| bytes(x)).collect::<Vec<u8>>().into()
 }
 
 /// One grid, checked but for its dimension, which the first view sets.
@@ -280,9 +297,9 @@ fn decode_numbers(bytes: &[u8], dtype: Dtype) -> Vec<f32> {
         }
         Dtype::F16 => {
             // Through a small aligned block, so that the conversion can use the processor's own.
-            let mut block = [f16::ZERO; 4096];
+            let mut block = [f16::ZERO; BLOCK];
             let mut numbers = vec![0.0; bytes.len() / 2];
-            for (numbers, bytes) in numbers.chunks_mut(block.len()).zip(bytes.chunks(8192)) {
+            for (numbers, bytes) in numbers.chunks_mut(BLOCK).zip(bytes.chunks(2 * BLOCK)) {
                 let block = &mut block[..numbers.len()];
                 for (half, &bytes) in block.iter_mut().zip(bytes.as_chunks::<2>().0) {
                     *half = f16::from_le_bytes(bytes);

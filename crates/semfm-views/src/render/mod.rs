@@ -1,7 +1,7 @@
 //! The renderer: a mesh and cameras in, pictures with depth and triangle ids out.
 //!
-//! [`triangle`] turns a triangle into linear forms over the image, [`raster`] fills a z-buffer with
-//! them, [`shade`] gives its samples colours, [`probe`] asks for the depth at single positions.
+//! `triangle` turns a triangle into linear forms over the image, `raster` fills a z-buffer with
+//! them, `shade` gives its samples colours, `probe` asks for the depth at single positions.
 //! Everything is computed on the CPU, the same at every thread count.
 
 pub(crate) mod probe;

@@ -90,16 +90,12 @@ impl Cells {
 
     /// Ids of the positions in the cells that a rectangle touches.
     fn within(&self, bounds: PixelBox) -> impl Iterator<Item = usize> + '_ {
-        let columns = self.index(0, bounds.low[0])..=self.index(0, bounds.high[0]);
-        let empty = bounds.low[0] > bounds.high[0];
-        let rows = if empty {
-            1..=0
-        } else {
-            self.index(1, bounds.low[1])..=self.index(1, bounds.high[1])
-        };
+        let columns = self.index(0, bounds.low[0])..self.index(0, bounds.high[0]) + 1;
+        let rows = self.index(1, bounds.low[1])..self.index(1, bounds.high[1]) + 1;
+        let rows = if bounds.low[0] > bounds.high[0] { 0..0 } else { rows };
         rows.flat_map(move |row| {
-            let first = self.starts[row * self.side + columns.start()] as usize;
-            let last = self.starts[row * self.side + columns.end() + 1] as usize;
+            let first = self.starts[row * self.side + columns.start] as usize;
+            let last = self.starts[row * self.side + columns.end] as usize;
             self.ids[first..last].iter().map(|&id| id as usize)
         })
     }

@@ -27,7 +27,6 @@ impl<'de> Deserialize<'de> for Whole {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Root {
-    pub asset: Asset,
     pub scene: Option<Whole>,
     #[serde(default)]
     pub scenes: Vec<Scene>,
@@ -220,8 +219,14 @@ pub(crate) struct Sampler {
     pub wrap_t: Option<Whole>,
 }
 
-impl Root {
-    /// Parses the JSON and checks that no object, read or not, has a name twice, as glTF demands.
+/// What tells a glTF file's version, whatever the rest looks like in that version.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Versioned {
+    pub asset: Asset,
+}
+
+impl Versioned {
+    /// Parses the JSON and checks that no object in it has a name twice, as glTF demands.
     pub fn parse(json: &[u8]) -> serde_json::Result<Self> {
         serde_json::from_slice::<UniqueNames>(json)?;
         serde_json::from_slice(json)
@@ -306,8 +311,8 @@ mod tests {
     #[test]
     fn a_name_stands_once_in_an_object() {
         let json = |extra: &str| format!(r#"{{"asset": {{"version": "2.0"}}, "extras": {extra}}}"#);
-        assert!(Root::parse(json(r#"[{"a": 1}, {"a": 2}]"#).as_bytes()).is_ok());
-        let error = Root::parse(json(r#"[{"a": 1, "a": 2}]"#).as_bytes()).unwrap_err();
+        assert!(Versioned::parse(json(r#"[{"a": 1}, {"a": 2}]"#).as_bytes()).is_ok());
+        let error = Versioned::parse(json(r#"[{"a": 1, "a": 2}]"#).as_bytes()).unwrap_err();
         assert!(error.to_string().contains("`a` stands twice"), "{error}");
     }
 }

@@ -14,10 +14,10 @@ mod scene;
 
 use self::accessor::Accessors;
 use self::buffers::Buffers;
-use self::json::Root;
+use self::json::{Asset, Root, Versioned};
 use self::scene::SceneReader;
 use super::MeshParts;
-use super::input::Input;
+use super::input::{Input, quote};
 use crate::Result;
 
 /// Extensions that change nothing we read, or that we follow.
@@ -34,11 +34,13 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
     let is_glb =
         input.bytes.starts_with(b"glTF") || input.path.extension().is_some_and(|e| e == "glb");
     let (json, chunk) = if is_glb { glb_chunks(input)? } else { (input.bytes, None) };
-    let root = Root::parse(json).map_err(|error| {
+    let json_error = |error: serde_json::Error| {
         let place = format!("JSON line {} column {}", error.line(), error.column());
         input.error(place, "the JSON of a glTF 2.0 file", error.to_string())
-    })?;
-    check_version(input, &root)?;
+    };
+    check_version(input, &Versioned::parse(json).map_err(json_error)?.asset)?;
+    let root: Root = serde_json::from_slice(json).map_err(json_error)?;
+    check_extensions(input, &root)?;
     let buffers = Buffers::new(input, &root, chunk);
     let accessors = Accessors { input, root: &root, buffers: &buffers };
     SceneReader::new(&accessors).read()
@@ -57,7 +59,7 @@ fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
         return Err(input.error(
             "byte 0",
             "glTF and version 2",
-            input.bytes[..input.bytes.len().min(8)].escape_ascii().to_string(),
+            quote(&input.bytes[..input.bytes.len().min(8)]),
         ));
     }
     let length = word(8)?;
@@ -100,18 +102,22 @@ fn trim_padding(mut json: &[u8]) -> &[u8] {
     json
 }
 
-fn check_version(input: Input<'_>, root: &Root) -> Result<()> {
+fn check_version(input: Input<'_>, asset: &Asset) -> Result<()> {
     let parts = |version: &str| -> Option<(u32, u32)> {
         let (major, minor) = version.split_once('.')?;
         Some((major.parse().ok()?, minor.parse().ok()?))
     };
-    let needed = root.asset.min_version.as_ref().unwrap_or(&root.asset.version);
+    let needed = asset.min_version.as_ref().unwrap_or(&asset.version);
     // A later 2.x may be read by a 2.0 reader unless `minVersion` says otherwise.
-    let newest = if root.asset.min_version.is_some() { (2, 0) } else { (2, u32::MAX) };
-    let major = parts(&root.asset.version).map(|version| version.0);
+    let newest = if asset.min_version.is_some() { (2, 0) } else { (2, u32::MAX) };
+    let major = parts(&asset.version).map(|version| version.0);
     if major != Some(2) || parts(needed).is_none_or(|version| version > newest) {
-        return Err(input.error("asset", "glTF version 2", format!("`{needed}`")));
+        return Err(input.error("asset", "glTF version 2", quote(needed.as_bytes())));
     }
+    Ok(())
+}
+
+fn check_extensions(input: Input<'_>, root: &Root) -> Result<()> {
     let known = |name: &String| {
         let material = name.starts_with("KHR_materials_");
         // Image formats are a matter of appearance: a missing image is noted.
@@ -121,7 +127,7 @@ fn check_version(input: Input<'_>, root: &Root) -> Result<()> {
     };
     match root.extensions_required.iter().find(|name| !known(name)) {
         Some(name) => {
-            Err(input.error("extensionsRequired", "extensions we follow", format!("`{name}`")))
+            Err(input.error("extensionsRequired", "extensions we follow", quote(name.as_bytes())))
         }
         None => Ok(()),
     }

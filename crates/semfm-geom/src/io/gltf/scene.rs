@@ -101,7 +101,7 @@ impl<'a> SceneReader<'a> {
         // Renderers keep these in 32 bits; beyond them nothing sensible is meant.
         let in_range = |x: &&f64| x.abs() > f64::from(f32::MAX);
         if let Some(x) = numbers.find(in_range).or_else(|| more.find(in_range)) {
-            return refuse("a transform of finite 32-bit numbers", x.to_string());
+            return refuse("a transform of finite 32-bit numbers", format!("{x:e}"));
         }
         if let Some(matrix) = &node.matrix {
             let matrix = DMat4::from_cols_array(matrix);

@@ -112,7 +112,11 @@ impl<'a> Body<'a> {
         let given = self.scalar(length)?;
         let least = if matches!(self.source, Source::Text(_)) { 1 } else { item.size() };
         if given < 0.0 || given.fract() != 0.0 || given.is_nan() {
-            return Err(self.input.error(self.place(), "the length of a list", given.to_string()));
+            return Err(self.input.error(
+                self.place(),
+                "the length of a list",
+                format!("{given:?}"),
+            ));
         }
         let n_items = given as usize; // saturates, and then the next check refuses it
         if n_items.saturating_mul(least) > self.bytes_left() {

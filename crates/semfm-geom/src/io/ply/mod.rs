@@ -9,9 +9,9 @@ mod header;
 
 use self::body::Body;
 use self::header::{Element, Header, Property};
-use super::appearance::{Appearance, rgba_from_floats, uvs_of_corners};
+use super::appearance::{Appearance, rgba_from_floats};
 use super::input::Input;
-use super::polygon::{NO_UV, Polygons};
+use super::polygon::{NO_UV, Polygons, Triangles};
 use super::{MeshParts, PointCloud};
 use crate::Result;
 use crate::math::DVec3;
@@ -19,13 +19,10 @@ use crate::math::DVec3;
 /// Reads a PLY file as a mesh.
 pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
     let file = PlyFile::read(input)?;
-    let (faces, uv_ids) = file.polygons.triangles(&file.vertices);
-    let appearance = Appearance {
-        vertex_colors: file.colors,
-        corner_uvs: uv_ids.map(|ids| uvs_of_corners(&ids, &file.uvs)),
-        ..Default::default()
-    };
-    Ok(MeshParts { vertices: file.vertices, faces, n_faces: file.polygons.len(), appearance })
+    let Triangles { n_faces, faces, corner_uvs } =
+        file.polygons.into_triangles(&file.vertices, &file.uvs);
+    let appearance = Appearance { vertex_colors: file.colors, corner_uvs, ..Default::default() };
+    Ok(MeshParts { vertices: file.vertices, faces, n_faces, appearance })
 }
 
 /// Reads the vertices of a PLY file; it needs no faces.
@@ -51,6 +48,9 @@ impl PlyFile {
         let vertex_uvs = elements.iter().any(|e| e.name == "vertex" && uv_columns(e).is_some());
         let mut body = Body::new(input, header);
         let mut file = Self::default();
+        if vertex_uvs {
+            file.polygons = Polygons::with_uvs_by_vertex();
+        }
         for element in &elements {
             body.begin(element)?;
             match element.name.as_str() {
@@ -156,7 +156,7 @@ impl Faces<'_> {
             }
             body.end_row()?;
             if strips {
-                push_strips(&mut file.polygons, &ids, self.vertex_uvs);
+                push_strips(&mut file.polygons, &ids);
             } else {
                 self.push_face(file, &ids, &texture);
             }
@@ -187,7 +187,7 @@ impl Faces<'_> {
                 || given.is_nan()
             {
                 let expected = format!("one of the {} vertices, from 0", self.n_vertices);
-                return Err(input.error(body.place(), expected, given.to_string()));
+                return Err(input.error(body.place(), expected, format!("{given:?}")));
             }
             ids.push(given as u32);
         }
@@ -195,15 +195,13 @@ impl Faces<'_> {
     }
 
     fn push_face(&self, file: &mut PlyFile, ids: &[u32], texture: &[f32]) {
-        let own_uvs = !ids.is_empty() && texture.len() == 2 * ids.len() && !self.vertex_uvs;
+        let own_uvs = !ids.is_empty() && texture.len() == 2 * ids.len();
         for (corner, &id) in ids.iter().enumerate() {
-            let uv = match (own_uvs, self.vertex_uvs) {
-                (true, _) => {
-                    file.uvs.push([texture[2 * corner], 1.0 - texture[2 * corner + 1]]);
-                    file.uvs.len() as u32 - 1
-                }
-                (false, true) => id,
-                (false, false) => NO_UV,
+            let uv = if own_uvs {
+                file.uvs.push([texture[2 * corner], 1.0 - texture[2 * corner + 1]]);
+                file.uvs.len() as u32 - 1
+            } else {
+                NO_UV
             };
             file.polygons.push(id, uv);
         }
@@ -215,12 +213,12 @@ impl Faces<'_> {
 const RESTART: u32 = u32::MAX;
 
 /// Adds the triangles of strips, every other one turned so that all face the same way.
-fn push_strips(polygons: &mut Polygons, ids: &[u32], vertex_uvs: bool) {
+fn push_strips(polygons: &mut Polygons, ids: &[u32]) {
     for strip in ids.split(|&id| id == RESTART) {
         for (i, corners) in strip.windows(3).enumerate() {
             let [a, b, c] = [corners[0], corners[1], corners[2]];
             for id in if i % 2 == 0 { [a, b, c] } else { [b, a, c] } {
-                polygons.push(id, if vertex_uvs { id } else { NO_UV });
+                polygons.push(id, NO_UV);
             }
             polygons.close();
         }
