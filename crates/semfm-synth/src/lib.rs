@@ -3,11 +3,13 @@
 //! SemFM is measured on real meshes with a real encoder; this crate is what ships with it, so that
 //! a demonstration, the tests and the synthetic evaluation need no download: [`object`] builds a
 //! closed mesh with part labels and its true grip region from signed distances, [`encoder`] stands
-//! in for a vision transformer and writes ordinary patch embeddings. Nothing here knows how the
+//! in for a vision transformer and gives ordinary patch embeddings, [`files`] writes both as an
+//! evaluation reads them. Nothing here knows how the
 //! matching works, and whatever it writes says that it is simulated.
 
 pub mod encoder;
 mod error;
+pub mod files;
 pub mod object;
 mod sdf;
 mod seed;
@@ -18,6 +20,7 @@ use std::str::FromStr;
 
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};
+pub use files::{ObjectFiles, render_views, write_object};
 pub use object::{ObjectSettings, SynthObject, make_object};
 
 /// The six categories of the paper (section V-A).

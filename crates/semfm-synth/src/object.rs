@@ -89,7 +89,7 @@ pub fn make_object(
     grid.float(&mut distances, settings.floaters, &mut draw);
     let dense = grid.mesh(&distances)?;
     let whole = if settings.floaters == 0 { largest_component(&dense)? } else { dense };
-    let mut mesh = thin_out(&whole, settings.n_vertices)?;
+    let mut mesh = thin_out(whole, settings.n_vertices)?;
     if settings.holes > 0 {
         mesh = tear(&mesh, settings.holes, &mut draw)?;
     }
@@ -237,10 +237,11 @@ fn largest_component(mesh: &Mesh) -> Result<Mesh> {
 }
 
 /// Collapses edges until `n_vertices` are left.
-fn thin_out(mesh: &Mesh, n_vertices: usize) -> Result<Mesh> {
+fn thin_out(mesh: Mesh, n_vertices: usize) -> Result<Mesh> {
     let settings =
         SimplifySettings { target_vertices: n_vertices, most_distance: FARTHEST_FROM_LATTICE };
-    Ok(simplify(mesh, &settings, &Task::default())?.mesh)
+    let thinned = simplify(&mesh, &settings, &Task::default())?;
+    Ok(thinned.map_or(mesh, |thinned| thinned.mesh))
 }
 
 /// Tears `count` round holes of 4 to 9 % of the world into the surface.
