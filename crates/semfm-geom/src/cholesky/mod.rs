@@ -129,7 +129,7 @@ impl SparseCholesky {
     }
 
     /// Solves for at most N columns; lanes left over carry zeros.
-    fn solve_lanes<const N: usize>(&self, mut columns: MatMut<'_, f64>) {
+    fn solve_lanes<const N: usize>(&self, columns: MatMut<'_, f64>) {
         let n = self.n_rows();
         let identity: Vec<usize>;
         let order = match self.symbolic.perm() {
@@ -140,15 +140,15 @@ impl SparseCholesky {
             }
         };
         let mut lanes = vec![[0.0; N]; n];
-        for j in 0..columns.ncols() {
+        for (j, column) in columns.as_ref().col_iter().enumerate() {
             for (x, &row) in lanes.iter_mut().zip(order) {
-                x[j] = columns[(row, j)];
+                x[j] = column[row];
             }
         }
         self.panels.solve(&mut lanes);
-        for j in 0..columns.ncols() {
+        for (j, mut column) in columns.col_iter_mut().enumerate() {
             for (x, &row) in lanes.iter().zip(order) {
-                columns[(row, j)] = x[j];
+                column[row] = x[j];
             }
         }
     }
