@@ -12,6 +12,8 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 use std::time::Instant;
 
@@ -32,7 +34,8 @@ struct Object {
 }
 
 fn array<T: npyz::Deserialize>(folder: &Path, name: &str, what: &str) -> Outcome<(Vec<T>, usize)> {
-    let file = NpyFile::new(std::fs::File::open(folder.join(format!("{name}.{what}.npy")))?)?;
+    let file =
+        NpyFile::new(BufReader::new(File::open(folder.join(format!("{name}.{what}.npy")))?))?;
     let columns = file.shape().get(1).copied().unwrap_or(1) as usize;
     Ok((file.into_vec()?, columns))
 }
@@ -49,7 +52,8 @@ fn cloud(folder: &Path, name: &str, tag: &str) -> Outcome<SemanticCloud> {
 }
 
 fn load(folder: &Path, name: &str) -> Outcome<(Object, f64)> {
-    let faces = array::<u32>(folder, name, "faces")?.0.chunks(3).map(|f| [f[0], f[1], f[2]]).collect();
+    let faces =
+        array::<u32>(folder, name, "faces")?.0.chunks(3).map(|f| [f[0], f[1], f[2]]).collect();
     let mesh = Mesh::new(points(folder, name, "vertices")?, faces)?;
     let grip: Vec<bool> = array::<u8>(folder, name, "grip")?.0.iter().map(|&g| g == 1).collect();
     let start = Instant::now();
@@ -73,7 +77,9 @@ fn main() -> Outcome<()> {
         methods = Method::ALL.to_vec();
     }
     let mut names: Vec<String> = std::fs::read_dir(folder)?
-        .filter_map(|entry| entry.ok()?.file_name().to_str()?.strip_suffix(".vertices.npy").map(String::from))
+        .filter_map(|entry| {
+            entry.ok()?.file_name().to_str()?.strip_suffix(".vertices.npy").map(String::from)
+        })
         .collect();
     names.sort();
     let mut bases = Vec::new();
@@ -124,9 +130,13 @@ fn main() -> Outcome<()> {
         }
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         println!("{method:9} IoU {mean:.3}  {line}");
-        let stages: Vec<String> = stages.into_iter().map(|(s, mut ms)| format!("{s} {:.1}", median(&mut ms))).collect();
+        let stages: Vec<String> =
+            stages.into_iter().map(|(s, mut ms)| format!("{s} {:.1}", median(&mut ms))).collect();
         let (prepare, warm) = (median(&mut prepare_ms), median(&mut warm_ms));
-        println!("          ms: prepare {prepare:.1} an object, warm {warm:.1} ({})", stages.join(", "));
+        println!(
+            "          ms: prepare {prepare:.1} an object, warm {warm:.1} ({})",
+            stages.join(", ")
+        );
     }
     Ok(())
 }

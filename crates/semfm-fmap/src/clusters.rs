@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::kmeans::k_means;
 use crate::{Error, Result};
 
-/// An edge never weighs less: a point whose features resemble no neighbour's would otherwise make
-/// the graph fall apart numerically.
-const LEAST_WEIGHT: f64 = 1e-6;
+/// An edge never weighs less: a part whose features resemble no neighbour's would otherwise fall off
+/// numerically, and eigenvalues that close to zero leave their vectors undetermined (1e-6 was seen
+/// to). Beside the typical e⁻¹ a thousandth cuts as well.
+const LEAST_WEIGHT: f64 = 1e-3;
 
 /// How the graph is made and cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -12,6 +12,8 @@ use rayon::prelude::*;
 const QUERY_BLOCK: usize = 96;
 /// Points per product: 96 × 2048 scores fill 768 kB.
 const POINT_BLOCK: usize = 2048;
+/// Rows transposed together.
+const STRIP: usize = 64;
 /// Scores looked at together: a group whose largest is beaten is never read again.
 const GROUP: usize = 32;
 
@@ -47,9 +49,14 @@ impl<'a> Search<'a> {
             (0..k).map(|c| points.col(c).iter().sum::<f64>() / points.nrows() as f64).collect();
         let centred = |rows: MatRef<'_, f64>| {
             let mut out = Mat::<f32>::zeros(k + 1, rows.nrows());
-            for c in 0..k {
-                for (i, x) in rows.col(c).iter().enumerate() {
-                    out[(c, i)] = (x - mean[c]) as f32;
+            // Transposed in strips that stay in the L1 cache.
+            for start in (0..rows.nrows()).step_by(STRIP) {
+                let n = STRIP.min(rows.nrows() - start);
+                let mut strip = out.as_mut().subcols_mut(start, n);
+                for c in 0..k {
+                    for (i, x) in rows.col(c).subrows(start, n).iter().enumerate() {
+                        strip[(c, i)] = (x - mean[c]) as f32;
+                    }
                 }
             }
             out
@@ -87,8 +94,15 @@ impl<'a> Search<'a> {
             let mut block = scores.as_mut().subrows_mut(0, m);
             matmul(block.as_mut(), Accum::Replace, points.transpose(), queries, 1.0, Par::Seq);
             for j in 0..n {
-                let column = scores.col_as_slice(j);
-                gather(&column[..m], first as u32, slack[j], &mut best[j], &mut close[j]);
+                let scores = &scores.col_as_slice(j)[..m];
+                let (best, close) = (&mut best[j], &mut close[j]);
+                pulp::Arch::new().dispatch(Gather {
+                    scores,
+                    first: first as u32,
+                    slack: slack[j],
+                    best,
+                    close,
+                });
             }
         }
         (0..n).map(|j| self.decide(start + j, best[j] - slack[j], &close[j])).collect()
@@ -115,23 +129,39 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Keeps the points whose score comes within `slack` of the best so far.
-fn gather(scores: &[f32], first: u32, slack: f32, best: &mut f32, close: &mut Vec<(f32, u32)>) {
-    for (g, group) in scores.chunks(GROUP).enumerate() {
-        let top = largest(group);
-        if top < *best - slack {
-            continue;
-        }
-        *best = best.max(top);
-        for (i, &score) in group.iter().enumerate() {
-            if score >= *best - slack {
-                close.push((score, first + (g * GROUP + i) as u32));
+/// Keeps the points whose score comes within `slack` of the best so far. A value and not a
+/// closure, so that it is inlined where the wide registers are switched on.
+struct Gather<'a> {
+    scores: &'a [f32],
+    /// Id of the first point scored.
+    first: u32,
+    slack: f32,
+    best: &'a mut f32,
+    close: &'a mut Vec<(f32, u32)>,
+}
+
+impl pulp::WithSimd for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for (g, group) in self.scores.chunks(GROUP).enumerate() {
+            let top = largest(group);
+            if top < *self.best - self.slack {
+                continue;
+            }
+            *self.best = if top > *self.best { top } else { *self.best };
+            for (i, &score) in group.iter().enumerate() {
+                if score >= *self.best - self.slack {
+                    self.close.push((score, self.first + (g * GROUP + i) as u32));
+                }
             }
         }
     }
 }
 
 /// Largest of a group, eight lanes at a time (a plain `f32::max` fold cannot be reordered).
+#[inline(always)]
 fn largest(group: &[f32]) -> f32 {
     let mut lanes = [f32::NEG_INFINITY; 8];
     let (eights, rest) = group.as_chunks::<8>();
@@ -140,7 +170,8 @@ fn largest(group: &[f32]) -> f32 {
             *lane = if x > *lane { x } else { *lane };
         }
     }
-    lanes.iter().chain(rest).fold(f32::NEG_INFINITY, |a, &b| a.max(b))
+    let larger = |a: f32, &b: &f32| if b > a { b } else { a };
+    rest.iter().fold(lanes.iter().fold(f32::NEG_INFINITY, larger), larger)
 }
 
 #[cfg(test)]

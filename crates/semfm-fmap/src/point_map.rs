@@ -57,8 +57,12 @@ pub(crate) fn rows_of(matrix: MatRef<'_, f64>, ids: &[u32]) -> Mat<f64> {
     let mut out = Mat::zeros(ids.len(), matrix.ncols());
     for c in 0..matrix.ncols() {
         let column = matrix.col(c);
-        for (row, &i) in ids.iter().enumerate() {
-            out[(row, c)] = column[i as usize];
+        let fill = |column: &[f64], out: &mut [f64]| {
+            out.iter_mut().zip(ids).for_each(|(x, &i)| *x = column[i as usize]);
+        };
+        match column.try_as_col_major() {
+            Some(column) => fill(column.as_slice(), out.col_as_slice_mut(c)),
+            None => fill(&column.iter().copied().collect::<Vec<_>>(), out.col_as_slice_mut(c)),
         }
     }
     out

@@ -146,11 +146,13 @@ impl Costs {
         }
         let mut kernel = vec![0.0f32; self.distances.len()];
         let rows = kernel.par_chunks_mut(n).zip(self.distances.par_chunks(n)).zip(&least_of_row);
-        rows.for_each(|((out, row), a)| {
-            pulp::Arch::new().dispatch(|| {
-                for ((k, d), b) in out.iter_mut().zip(row).zip(&least_of_column) {
-                    *k = exp_of_negative((a + b - d) / blur);
-                }
+        rows.for_each(|((kernel, costs), &least)| {
+            pulp::Arch::new().dispatch(Exponentiate {
+                kernel,
+                costs,
+                least,
+                least_of_column: &least_of_column,
+                blur,
             });
         });
         (kernel, least_of_row, least_of_column)
@@ -183,10 +185,9 @@ impl Costs {
                 .zip(kernel.par_chunks(ROWS * n))
                 .enumerate()
                 .map(|(chunk, (u, kernel))| {
-                    let (p, factor) = (&p_target[chunk * ROWS..], &absorbed_target[chunk * ROWS..]);
-                    pulp::Arch::new().dispatch(|| {
-                        walk(kernel, &v, u, |i, sum| (p[i] as f32 / sum).powf(exponent) * factor[i])
-                    })
+                    let (mass, factor) =
+                        (&p_target[chunk * ROWS..], &absorbed_target[chunk * ROWS..]);
+                    pulp::Arch::new().dispatch(Walk { kernel, v: &v, u, mass, factor, exponent })
                 })
                 .collect();
             let Some(columns) = add_up(shares, n) else { return Ok(None) };
@@ -282,10 +283,9 @@ impl Plan {
             self.on_source.iter().zip(on_source).map(|(v, f)| v * *f as f32).collect();
         let rows = self.kernel.par_chunks(self.n_source());
         rows.map(|row| {
-            pulp::Arch::new().dispatch(|| {
-                let (vote, all) = (dot(row, &weighted), dot(row, &self.on_source));
-                if all > UNDERFLOW { f64::from(vote) / f64::from(all) } else { 0.0 }
-            })
+            let vote = pulp::Arch::new().dispatch(Dot(row, &weighted));
+            let all = pulp::Arch::new().dispatch(Dot(row, &self.on_source));
+            if all > UNDERFLOW { f64::from(vote) / f64::from(all) } else { 0.0 }
         })
         .collect()
     }
@@ -310,26 +310,69 @@ impl Plan {
     }
 }
 
+// The inner loops are values and not closures, so that they are inlined where the wide registers
+// are switched on.
+
 /// One pass over some rows of the kernel: u from K v, and this block's share of Kᵀ u. `None` where
 /// a sum underflows.
-#[inline(always)]
-fn walk(
-    kernel: &[f32],
-    v: &[f32],
-    u: &mut [f32],
-    scale: impl Fn(usize, f32) -> f32,
-) -> Option<Vec<f32>> {
-    let mut share = vec![0.0f32; v.len()];
-    for (i, row) in kernel.chunks_exact(v.len()).enumerate() {
-        let sum = dot(row, v);
-        if sum < UNDERFLOW {
-            return None;
+struct Walk<'a> {
+    kernel: &'a [f32],
+    v: &'a [f32],
+    u: &'a mut [f32],
+    mass: &'a [f64],
+    /// What u absorbs of the row's least cost.
+    factor: &'a [f32],
+    exponent: f32,
+}
+
+impl pulp::WithSimd for Walk<'_> {
+    type Output = Option<Vec<f32>>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Option<Vec<f32>> {
+        let mut share = vec![0.0f32; self.v.len()];
+        for (i, row) in self.kernel.chunks_exact(self.v.len()).enumerate() {
+            let sum = dot(row, self.v);
+            if sum < UNDERFLOW {
+                return None;
+            }
+            let u = (self.mass[i] as f32 / sum).powf(self.exponent) * self.factor[i];
+            self.u[i] = u;
+            share.iter_mut().zip(row).for_each(|(s, k)| *s += u * k);
         }
-        u[i] = scale(i, sum);
-        let factor = u[i];
-        share.iter_mut().zip(row).for_each(|(s, k)| *s += factor * k);
+        Some(share)
     }
-    Some(share)
+}
+
+/// One row of the kernel from one row of costs.
+struct Exponentiate<'a> {
+    kernel: &'a mut [f32],
+    costs: &'a [f32],
+    least: f32,
+    least_of_column: &'a [f32],
+    blur: f32,
+}
+
+impl pulp::WithSimd for Exponentiate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for ((k, d), b) in self.kernel.iter_mut().zip(self.costs).zip(self.least_of_column) {
+            *k = exp_of_negative((self.least + b - d) / self.blur);
+        }
+    }
+}
+
+struct Dot<'a>(&'a [f32], &'a [f32]);
+
+impl pulp::WithSimd for Dot<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> f32 {
+        dot(self.0, self.1)
+    }
 }
 
 fn add_up(shares: Vec<Option<Vec<f32>>>, n: usize) -> Option<Vec<f32>> {

@@ -197,8 +197,8 @@ impl Matching<'_> {
 
     fn map_quality(&self) -> MapQuality {
         let (source, target) = (self.source.shape(), self.target.shape());
-        let scaled: Vec<DVec3> =
-            source.mesh().vertices().iter().map(|&p| p / source.unit()).collect();
+        let unit = source.unit();
+        let scaled: Vec<DVec3> = source.mesh().vertices().iter().map(|&p| p / unit).collect();
         let map = self.matched.map.as_ref();
         let mut hit = vec![false; scaled.len()];
         self.matched.point_map.source_of.iter().for_each(|&i| hit[i as usize] = true);
