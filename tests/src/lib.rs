@@ -1,1 +1,3 @@
-//! Roads through the built binary.
+//! Roads through the built binary, and what they share.
+
+pub mod calibration;
