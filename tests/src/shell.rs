@@ -1,4 +1,5 @@
 //! The built binary, and the data that only some machines have.
+#![allow(clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
