@@ -110,7 +110,8 @@ impl ShapeCache {
             return Ok(CachedShape { shape, hit: false, not_kept: None });
         };
         let key = key(mesh.hash(), settings);
-        let path = folder.join(blake3::Hash::from_bytes(key).to_hex().as_str()).with_extension(SUFFIX);
+        let path =
+            folder.join(blake3::Hash::from_bytes(key).to_hex().as_str()).with_extension(SUFFIX);
         task.check()?;
         let mesh = match read(&path, &key, mesh) {
             Ok(shape) => return Ok(CachedShape { shape, hit: true, not_kept: None }),
@@ -161,7 +162,8 @@ fn write(folder: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
     let io = |source| Error::Io { path: path.into(), source };
     fs::create_dir_all(folder).map_err(io)?;
     // No fsync: after a power cut the checksum tells, and the entry is made again.
-    let mut file = tempfile::Builder::new().suffix(".partial.shape").tempfile_in(folder).map_err(io)?;
+    let mut file =
+        tempfile::Builder::new().suffix(".partial.shape").tempfile_in(folder).map_err(io)?;
     file.write_all(bytes).map_err(io)?;
     file.persist(path).map_err(|failed| io(failed.error))?;
     Ok(())
@@ -181,10 +183,8 @@ fn read(path: &Path, key: &[u8; 32], mesh: Mesh) -> std::result::Result<Shape, B
 
 fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
     let (working, basis) = (shape.working(), shape.basis());
-    let report = serde_json::to_vec(shape.report()).map_err(|source| Error::Io {
-        path: "the shape's report".into(),
-        source: source.into(),
-    })?;
+    let report = serde_json::to_vec(shape.report())
+        .map_err(|source| Error::Io { path: "the shape's report".into(), source: source.into() })?;
     let counts = [
         working.of_original.len(),
         working.mesh.n_vertices(),
@@ -212,10 +212,7 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
     );
     let functions = (0..basis.k()).flat_map(|j| basis.functions.col(j).iter().copied());
     let rest = basis.mass.iter().chain(&basis.residuals).copied();
-    put(
-        &mut basis.values.iter().copied().chain(functions).chain(rest),
-        &mut std::iter::empty(),
-    );
+    put(&mut basis.values.iter().copied().chain(functions).chain(rest), &mut std::iter::empty());
     bytes.extend(report);
     bytes.extend(blake3::hash(&bytes).as_bytes());
     Ok(bytes)

@@ -37,18 +37,22 @@ pub(crate) fn collapse(mesh: &Mesh, target: usize, task: &Task) -> Result<Collap
     // edges again until a pass changes nothing.
     loop {
         let n_before = n_vertices;
-        let mut queue = state.all_edges();
+        let ids = 0..mesh.n_vertices() as u32;
+        let mut queue: BinaryHeap<Edge> = ids.filter_map(|id| state.next_edge(id, None)).collect();
         while n_vertices > target {
             let Some(edge) = queue.pop() else { break };
-            if state.stamp[edge.from as usize] != edge.stamps[0]
-                || state.stamp[edge.to as usize] != edge.stamps[1]
-                || !state.keeps_topology(edge.from, edge.to)
-                || !state.keeps_shape(edge.from, edge.to)
-            {
+            if edge.stamp != state.stamp[edge.from as usize] {
                 continue;
             }
-            state.collapse(edge.from, edge.to);
-            state.push_edges_of(edge.to, &mut queue);
+            if !(state.keeps_shape(edge.from, edge.to) && state.keeps_topology(edge.from, edge.to))
+            {
+                queue.extend(state.next_edge(edge.from, Some(&edge)));
+                continue;
+            }
+            for id in state.collapse(edge.from, edge.to) {
+                state.stamp[id as usize] += 1;
+                queue.extend(state.next_edge(id, None));
+            }
             n_vertices -= 1;
             if n_vertices.is_multiple_of(1024) {
                 task.check()?;
@@ -79,7 +83,7 @@ struct State {
     faces_of: Vec<Vec<u32>>,
     kind: Vec<Kind>,
     quadric: Vec<Quadric>,
-    /// Grows whenever the costs of the edges of a vertex change.
+    /// Grows whenever the collapse of a vertex that waits in the queue becomes void.
     stamp: Vec<u32>,
     /// Scratch: how often a vertex was met, all 0 between calls.
     met: Vec<u32>,
@@ -182,33 +186,23 @@ impl State {
         }
     }
 
-    fn all_edges(&mut self) -> BinaryHeap<Edge> {
-        let mut queue = BinaryHeap::new();
-        for id in 0..self.points.len() as u32 {
-            for (other, _) in self.ring(id) {
-                self.push(id, other, &mut queue);
-            }
-        }
-        queue
-    }
-
-    fn push_edges_of(&mut self, id: u32, queue: &mut BinaryHeap<Edge>) {
-        self.stamp[id as usize] += 1;
-        for (other, _) in self.ring(id) {
-            self.push(id, other, queue);
-            self.push(other, id, queue);
-        }
-    }
-
-    fn push(&self, from: u32, to: u32, queue: &mut BinaryHeap<Edge>) {
+    /// The cheapest collapse of `from` that comes after `last`; each vertex has one in the queue.
+    ///
+    /// What it costs depends on positions and on the quadric of `from` alone, so that it stays right
+    /// until another vertex is merged into `from` or its neighbours change.
+    fn next_edge(&mut self, from: u32, last: Option<&Edge>) -> Option<Edge> {
         if self.kind[from as usize] == Kind::Locked {
-            return;
+            return None;
         }
-        let (start, end) = (self.points[from as usize], self.points[to as usize]);
-        let cost = self.quadric[from as usize].squared_distance(end)
-            + EVENNESS * EVENNESS * start.distance_squared(end);
-        let stamps = [self.stamp[from as usize], self.stamp[to as usize]];
-        queue.push(Edge { cost, from, to, stamps });
+        let (start, stamp) = (self.points[from as usize], self.stamp[from as usize]);
+        let ring = self.ring(from);
+        let edges = ring.into_iter().map(|(to, _)| {
+            let end = self.points[to as usize];
+            let cost = self.quadric[from as usize].squared_distance(end)
+                + EVENNESS * EVENNESS * start.distance_squared(end);
+            Edge { cost, from, to, stamp }
+        });
+        edges.filter(|edge| last.is_none_or(|last| edge < last)).max()
     }
 
     /// The link condition lk(from) ∩ lk(to) = lk(edge), with every border edge closed by a triangle
@@ -272,7 +266,9 @@ impl State {
         least_after >= LEAST_QUALITY || least_after > least_before
     }
 
-    fn collapse(&mut self, from: u32, to: u32) {
+    /// Moves `from` onto `to`; returns the vertices whose cheapest collapse may now be another.
+    fn collapse(&mut self, from: u32, to: u32) -> Vec<u32> {
+        let affected = self.ring(from).into_iter().map(|(id, _)| id).collect();
         for face in std::mem::take(&mut self.faces_of[from as usize]) {
             let ids = self.faces[face as usize];
             if ids.contains(&to) {
@@ -288,6 +284,7 @@ impl State {
         let moved = self.quadric[from as usize];
         self.quadric[to as usize].add(&moved);
         self.stamp[from as usize] += 1;
+        affected
     }
 }
 
@@ -357,7 +354,7 @@ struct Edge {
     cost: f64,
     from: u32,
     to: u32,
-    stamps: [u32; 2],
+    stamp: u32,
 }
 
 impl Eq for Edge {}

@@ -157,26 +157,15 @@ struct Sides<'a> {
 impl<'a> Sides<'a> {
     fn new(mesh: &'a Mesh) -> Self {
         let corners = mesh.faces().as_flattened();
-        let mut sides = Self { corners, sorted: Vec::new() };
-        let faces = || mesh.faces().iter().enumerate().filter(|(_, ids)| !names_twice(ids));
-        let all = || faces().flat_map(|(face, _)| (0..3).map(move |side| (3 * face + side) as u32));
-        // Counting sort by the lower end, then a comparison sort among the few that share it.
-        let mut starts = vec![0; mesh.n_vertices() + 1];
-        all().for_each(|side| starts[sides.ends(side)[0] as usize + 1] += 1);
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
+        let faces = mesh.faces().iter().enumerate().filter(|(_, ids)| !names_twice(ids));
+        let sorted =
+            faces.flat_map(|(face, _)| (0..3).map(move |i| (3 * face + i) as u32)).collect();
+        let mut sides = Self { corners, sorted };
+        // By the upper end, then by the lower; the second pass keeps the order of the first.
+        for end in [1, 0] {
+            sides.sorted =
+                counting_sort(&sides.sorted, mesh.n_vertices(), |side| sides.ends(side)[end]);
         }
-        let mut sorted = vec![0; starts[mesh.n_vertices()]];
-        let mut next = starts.clone();
-        for side in all() {
-            let slot = &mut next[sides.ends(side)[0] as usize];
-            sorted[*slot] = side;
-            *slot += 1;
-        }
-        for range in starts.windows(2) {
-            sorted[range[0]..range[1]].sort_unstable_by_key(|&side| (sides.ends(side)[1], side));
-        }
-        sides.sorted = sorted;
         sides
     }
 
@@ -204,6 +193,22 @@ impl<'a> Sides<'a> {
     fn by_edge(&self) -> impl Iterator<Item = &[u32]> {
         self.sorted.chunk_by(|&a, &b| self.ends(a) == self.ends(b))
     }
+}
+
+/// Items in the order of their keys, which are below `n_keys`; equal keys keep their order.
+fn counting_sort(items: &[u32], n_keys: usize, key: impl Fn(u32) -> u32) -> Vec<u32> {
+    let mut next = vec![0; n_keys + 1];
+    items.iter().for_each(|&item| next[key(item) as usize + 1] += 1);
+    for i in 1..next.len() {
+        next[i] += next[i - 1];
+    }
+    let mut sorted = vec![0; items.len()];
+    for &item in items {
+        let slot: &mut usize = &mut next[key(item) as usize];
+        sorted[*slot] = item;
+        *slot += 1;
+    }
+    sorted
 }
 
 /// Joins triangle corners across the edges at their vertex: what stays apart are different fans.

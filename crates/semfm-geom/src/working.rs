@@ -86,7 +86,9 @@ impl WorkingMesh {
         let nearest_corner = |(carrier, p): (&Carrier, &DVec3)| {
             let distance = |&id: &u32| mesh.vertices()[id as usize].distance_squared(*p);
             let [a, b, c] = carrier.corners;
-            [b, c].into_iter().fold(a, |best, id| if distance(&id) < distance(&best) { id } else { best })
+            [b, c]
+                .into_iter()
+                .fold(a, |best, id| if distance(&id) < distance(&best) { id } else { best })
         };
         let of_original = carriers.iter().zip(original.vertices()).map(nearest_corner).collect();
         Self { mesh, of_original, to_original, carriers }

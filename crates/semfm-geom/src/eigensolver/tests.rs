@@ -107,7 +107,7 @@ fn every_component_brings_a_zero_and_the_constant_comes_first() {
 fn equal_components_bring_multiplicities_far_above_the_block() {
     // 40 copies of one torus: every eigenvalue is there at least 40 times.
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for c in 0..40u32 {
+    for _ in 0..40 {
         let (v, f) = torus(9, 7, 0.1, DVec3::ZERO);
         let first = vertices.len() as u32;
         vertices.extend(v);

@@ -71,19 +71,19 @@ impl Polygons {
         let mut faces = Vec::with_capacity(n_triangles);
         let mut corner_uvs = Vec::with_capacity(if uv_ids.is_empty() { 0 } else { n_triangles });
         let uv_of = |id: u32| uvs.get(id as usize).copied().unwrap_or(MISSING_UV);
-        let mut cutter = PolygonCutter::default();
-        let mut corners = Vec::new();
+        let mut cutter = EarCutter::default();
         let mut start = 0;
         for &end in &self.ends {
             let ids = &self.ids[start..end];
-            corners.clear();
-            corners.extend(ids.iter().map(|&id| vertices[id as usize]));
-            let cut = cutter.cut(&corners);
-            faces.extend(cut.iter().map(|triangle| triangle.map(|i| ids[i as usize])));
-            if !uv_ids.is_empty() {
-                let uv_ids = &uv_ids[start..end];
-                corner_uvs
-                    .extend(cut.iter().map(|triangle| triangle.map(|i| uv_of(uv_ids[i as usize]))));
+            let mut push = |corners: [u32; 3]| {
+                faces.push(corners.map(|i| ids[i as usize]));
+                if !uv_ids.is_empty() {
+                    corner_uvs.push(corners.map(|i| uv_of(uv_ids[start + i as usize])));
+                }
+            };
+            match cutter.cut(ids, vertices) {
+                Some(triangles) => triangles.iter().copied().for_each(&mut push),
+                None => (1..ids.len() as u32 - 1).for_each(|i| push([0, i, i + 1])),
             }
             start = end;
         }
@@ -105,33 +105,34 @@ pub(crate) struct Triangles {
     pub corner_uvs: Option<Vec<[[f32; 2]; 3]>>,
 }
 
-/// Cuts one polygon after the other, keeping the scratch space.
+/// Cuts one concave polygon after the other, keeping the scratch space.
 #[derive(Default)]
-struct PolygonCutter {
+struct EarCutter {
+    corners: Vec<DVec3>,
     flat: Vec<DVec2>,
     ring: Vec<u32>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl PolygonCutter {
-    /// The n − 2 triangles of a polygon with n ≥ 3 corners, as numbers of its corners, with its
-    /// winding. A convex polygon becomes the fan around its first corner, which is what most
-    /// readers do; a concave one is cut at its ears (G. H. Meisters, *Polygons have ears*, 1975),
-    /// since its fan would fold over. Where no ear is left (the polygon crosses itself or repeats
-    /// corners) it is fanned as well.
-    fn cut(&mut self, corners: &[DVec3]) -> &[[u32; 3]] {
-        self.triangles.clear();
-        let n = corners.len() as u32;
-        let simple = corners.len() <= 3 || corners.len() > MAX_EAR_CORNERS;
-        if simple || !self.flatten_if_concave(corners) || !self.clip_ears() {
-            self.triangles.clear();
-            self.triangles.extend((1..n.saturating_sub(1)).map(|i| [0, i, i + 1]));
+impl EarCutter {
+    /// The n − 2 triangles of a concave polygon, as numbers of its corners, with its winding: it is
+    /// cut at its ears (G. H. Meisters, *Polygons have ears*, 1975), since its fan would fold over.
+    ///
+    /// `None` asks for the fan around the first corner, which is what most readers make of any
+    /// polygon: where it is convex, and where no ear is left because it crosses itself or repeats
+    /// corners.
+    fn cut(&mut self, ids: &[u32], vertices: &[DVec3]) -> Option<&[[u32; 3]]> {
+        if ids.len() <= 3 || ids.len() > MAX_EAR_CORNERS {
+            return None;
         }
-        &self.triangles
+        self.corners.clear();
+        self.corners.extend(ids.iter().map(|&id| vertices[id as usize]));
+        (self.flatten_if_concave() && self.clip_ears()).then_some(&self.triangles)
     }
 
     /// Projects the polygon along its Newell normal; false where it is convex or has no area.
-    fn flatten_if_concave(&mut self, corners: &[DVec3]) -> bool {
+    fn flatten_if_concave(&mut self) -> bool {
+        let corners = &self.corners;
         let origin = corners[0];
         let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
         let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
@@ -148,6 +149,7 @@ impl PolygonCutter {
 
     /// Cuts ears off the flat polygon; false where it runs out of them early.
     fn clip_ears(&mut self) -> bool {
+        self.triangles.clear();
         self.ring.clear();
         self.ring.extend(0..self.flat.len() as u32);
         while self.ring.len() > 3 {
@@ -191,6 +193,13 @@ mod tests {
         points.iter().map(|&(x, y)| DVec3::new(x, y, 2.0 * x - y)).collect()
     }
 
+    fn cut(corners: &[DVec3]) -> Vec<[u32; 3]> {
+        let mut polygons = Polygons::default();
+        (0..corners.len() as u32).for_each(|id| polygons.push(id, NO_UV));
+        polygons.close();
+        polygons.into_triangles(corners, &[]).faces
+    }
+
     fn area(corners: &[DVec3], triangle: [u32; 3]) -> f64 {
         let [a, b, c] = triangle.map(|i| corners[i as usize]);
         (b - a).cross(c - a).length() / 2.0
@@ -199,7 +208,7 @@ mod tests {
     #[test]
     fn a_convex_polygon_is_fanned() {
         let corners = polygon(&[(0.0, 0.0), (2.0, 0.0), (3.0, 1.0), (1.0, 3.0), (0.0, 2.0)]);
-        assert_eq!(PolygonCutter::default().cut(&corners), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        assert_eq!(cut(&corners), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
     }
 
     #[test]
@@ -210,8 +219,7 @@ mod tests {
         for shift in 0..4 {
             let mut turned = corners.clone();
             turned.rotate_left(shift);
-            let mut cutter = PolygonCutter::default();
-            let triangles = cutter.cut(&turned);
+            let triangles = cut(&turned);
             let total: f64 = triangles.iter().map(|&t| area(&turned, t)).sum();
             assert_eq!(triangles.len(), 2);
             assert!((total - fan).abs() < 1e-12, "{total} {fan}");
@@ -222,6 +230,6 @@ mod tests {
     fn repeated_corners_still_give_two_less_than_corners() {
         let corners =
             polygon(&[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]);
-        assert_eq!(PolygonCutter::default().cut(&corners).len(), 4);
+        assert_eq!(cut(&corners).len(), 4);
     }
 }

@@ -1,4 +1,8 @@
-//! GLB: one mesh with one rough, two-sided material.
+//! GLB: one mesh with one primitive.
+//!
+//! It has no material on purpose: beside one, trimesh drops the colours of the vertices. They are
+//! written as sRGB bytes, though the specification calls `COLOR_0` linear, because trimesh and
+//! Open3D show them as they stand.
 
 use std::io::{Error, Result, Write};
 
@@ -39,11 +43,7 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Resu
     let json = json!({
         "asset": {"version": "2.0", "generator": "SemFM"},
         "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
-        "materials": [{
-            "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0},
-            "doubleSided": true,
-        }],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": indices}]}],
         "accessors": arrays.accessors, "bufferViews": arrays.views,
         "buffers": [{"byteLength": arrays.n_bytes}],
     });

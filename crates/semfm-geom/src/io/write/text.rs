@@ -21,14 +21,14 @@ pub(super) fn write_obj(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> 
     })
 }
 
-/// OFF, or COFF with colours in 0..1.
+/// OFF, or COFF with colours in 0..255, which is what other readers understand.
 pub(super) fn write_off(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Result<()> {
     let keyword = if paint.colors.is_some() { "COFF" } else { "OFF" };
     writeln!(out, "{keyword}\n{} {} 0", mesh.n_vertices(), mesh.n_faces())?;
     write_blocks(out, mesh.vertices().iter().enumerate(), |block, (i, p)| {
         push(block, format_args!("{:?} {:?} {:?}", p.x, p.y, p.z));
         if let Some(colors) = paint.colors {
-            let [r, g, b, a] = colors[i].map(|c| f32::from(c) / 255.0);
+            let [r, g, b, a] = colors[i];
             push(block, format_args!(" {r} {g} {b} {a}"));
         }
         block.push(b'\n');
