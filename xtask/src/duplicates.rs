@@ -60,7 +60,8 @@ mod tests {
         let package = |name: &str, version: &str| {
             format!("[[package]]\nname = \"{name}\"\nversion = \"{version}\"\n\n")
         };
-        let packages = [("glam", "0.33.12"), ("syn", "1.0.0"), ("glam", "0.34.2"), ("syn", "2.0.0")];
+        let packages =
+            [("glam", "0.33.12"), ("syn", "1.0.0"), ("glam", "0.34.2"), ("syn", "2.0.0")];
         let lock: String = packages.iter().map(|(name, version)| package(name, version)).collect();
         assert_eq!(doubled(&lock), ["glam (0.33.12, 0.34.2)"]);
     }

@@ -37,7 +37,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             let region = read_region(Path::new(region), &source.0)?;
             carry(source, target, &region, Some(Path::new(folder)))
         }
-        _ => Err("usage: SOURCE SOURCE.txt TARGET TARGET.txt REGION.json FOLDER, or nothing".into()),
+        _ => {
+            Err("usage: SOURCE SOURCE.txt TARGET TARGET.txt REGION.json FOLDER, or nothing".into())
+        }
     }
 }
 
@@ -98,6 +100,7 @@ fn grip_of(tool: &Mesh) -> Vec<bool> {
 
 fn read_features(path: &str) -> Result<Vec<f32>, Box<dyn Error>> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
-    let number = |word: &str| word.parse().map_err(|error| format!("{path}: `{word}`: {error}").into());
+    let number =
+        |word: &str| word.parse().map_err(|error| format!("{path}: `{word}`: {error}").into());
     text.split_whitespace().map(number).collect()
 }
