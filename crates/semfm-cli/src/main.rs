@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, completions, info, region, transfer, views};
+use commands::{Outcome, completions, demo, info, region, transfer, views};
 use options::Common;
 
 /// Carry a demonstrated region from one object to another.
@@ -30,7 +30,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    //DEMO
+    Demo(demo::Demo),
     Views(views::Views),
     Region(region::MakeRegion),
     Transfer(Box<transfer::Carry>),
@@ -42,7 +42,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let common = arguments.common;
     let outcome = common.apply().and_then(|()| match arguments.command {
-        //DEMO
+        Command::Demo(command) => command.run(&common),
         Command::Views(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),

@@ -48,7 +48,7 @@ impl Demo {
                 let (n, category) = (object.mesh.n_vertices(), self.category);
                 talk::say(format_args!("made        a {} ({category}, {n} vertices)", object.kind));
             }
-            Ok(write_object(&self.output, &object, self.level)?)
+            Ok(write_object(&self.output, &object, self.level, &task)?)
         };
         let (source, target) = (make(0)?, make(1)?);
 
@@ -58,10 +58,10 @@ impl Demo {
             Ok(PreparedObject::new(mesh, Meaning::Views(&embeddings.views), &settings, &task)?)
         };
         let (prepared_source, prepared_target) = (prepare(&source)?, prepare(&target)?);
-        let region = read_region(&source.label, prepared_source.shape.original())?;
+        let region = read_region(&source.truth, prepared_source.shape.original())?;
         let carried =
             transfer(&prepared_source, &prepared_target, &region, &settings.transfer, &task)?;
-        let truth = read_region(&target.label, prepared_target.shape.original())?;
+        let truth = read_region(&target.truth, prepared_target.shape.original())?;
         let overlap = iou(&carried.region, &truth)?;
 
         let mut about = Map::new();
@@ -98,7 +98,7 @@ fn repeat_by_hand(source: &ObjectFiles, target: &ObjectFiles, folder: &Path) {
         "  semfm-cli transfer {} {} --region {} \\\n    --source-embeddings {} --target-embeddings {} -o {}",
         quoted(&source.mesh),
         quoted(&target.mesh),
-        quoted(&source.label),
+        quoted(&source.truth),
         quoted(&source.embeddings),
         quoted(&target.embeddings),
         quoted(folder),

@@ -1,7 +1,7 @@
 //! One file for each command.
 
 pub mod completions;
-//DEMO
+pub mod demo;
 pub mod embed;
 pub mod info;
 pub mod region;
