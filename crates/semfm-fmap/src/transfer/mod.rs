@@ -131,6 +131,7 @@ impl<'a> Matching<'a> {
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
+        semfm_geom::algebra::keep_sequential();
         settings.check()?;
         let settings = settings.clipped(source.shape().basis().k().min(target.shape().basis().k()));
         let mut stages = Stages::default();
