@@ -1,1 +1,4 @@
-//! Roads through the built binary.
+//! Roads through the built binary, and what they share.
+
+pub mod calibration;
+pub mod shell;

@@ -1,3 +1,126 @@
-//! One subcommand for each job of the CI.
+//! One subcommand for each job of the CI; `cargo xtask` without a word lists them.
+//!
+//! All jobs build the whole workspace with one profile and one selection of packages: any other
+//! selection changes the features of shared dependencies, and cargo would build them again.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program that talks to a shell")]
 
-fn main() {}
+#[cfg(test)]
+mod docs;
+mod duplicates;
+mod features;
+mod process;
+mod python;
+mod tally;
+mod test;
+mod workspace;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use crate::process::cargo;
+use crate::tally::Tally;
+use crate::workspace::Workspace;
+
+const USAGE: &str = "\
+cargo xtask test [--full]   every test, Rust and Python; --full adds the encoders on PyTorch
+cargo xtask fmt             formatting, without changing anything
+cargo xtask lint            clippy on all targets, warnings are errors
+cargo xtask doc             the documentation, warnings are errors
+cargo xtask features        the facade without its default features
+cargo xtask deny            one version of each crate whose types cross our borders
+cargo xtask corpus          the readers against the corpus of bad files, where it is at hand
+cargo xtask bench           builds the benchmark programs (release) and names them
+cargo xtask ci              fmt, lint, doc, features, deny, then test --full";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match run(&words) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Whether the job passed; an error where it could not be done at all.
+fn run(words: &[&str]) -> Result<bool> {
+    let workspace = Workspace::find()?;
+    match words {
+        [] | ["help" | "--help" | "-h"] => {
+            println!("{USAGE}");
+            Ok(true)
+        }
+        ["test"] => Ok(end_with(&test::run(&workspace, false))),
+        ["test", "--full"] => Ok(end_with(&test::run(&workspace, true))),
+        ["ci"] => Ok(ci(&workspace)),
+        [job] => match JOBS.iter().find(|(name, _)| name == job) {
+            Some((_, work)) => work(&workspace).map(|()| true),
+            None => bail!("no job `{job}`\n{USAGE}"),
+        },
+        _ => bail!("cannot read `{}`\n{USAGE}", words.join(" ")),
+    }
+}
+
+type Job = fn(&Workspace) -> Result<()>;
+
+const JOBS: [(&str, Job); 7] = [
+    ("fmt", |workspace| cargo(workspace, &["fmt", "--all", "--check"]).succeed()),
+    ("lint", |workspace| {
+        let arguments = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+        cargo(workspace, &arguments).succeed()
+    }),
+    ("doc", |workspace| {
+        cargo(workspace, &["doc", "--workspace", "--no-deps"])
+            .env("RUSTDOCFLAGS", "-D warnings")
+            .succeed()
+    }),
+    ("features", features::check),
+    ("deny", duplicates::check),
+    ("corpus", |workspace| {
+        let arguments = ["test", "--workspace", "--test", "corpus*", "--", "--show-output"];
+        cargo(workspace, &arguments).succeed()
+    }),
+    ("bench", bench),
+];
+
+/// What CI runs before the tests, cheapest first.
+const BEFORE_TESTS: [&str; 5] = ["fmt", "deny", "lint", "doc", "features"];
+
+/// All jobs, the tests last so that their summary is the last line; a failed job stops no other.
+fn ci(workspace: &Workspace) -> bool {
+    let mut failed = Vec::new();
+    for (name, work) in JOBS.iter().filter(|(name, _)| BEFORE_TESTS.contains(name)) {
+        println!("== {name}");
+        if let Err(error) = work(workspace) {
+            eprintln!("error: {name}: {error:#}");
+            failed.push(*name);
+        }
+    }
+    println!("== test --full");
+    let tally = test::run(workspace, true);
+    if !failed.is_empty() {
+        println!("failed before the tests: {}", failed.join(", "));
+    }
+    end_with(&tally) && failed.is_empty()
+}
+
+/// Prints the summary, last of all, and says whether everything passed.
+fn end_with(tally: &Tally) -> bool {
+    println!("{tally}");
+    tally.failed == 0 && tally.passed > 0
+}
+
+fn bench(workspace: &Workspace) -> Result<()> {
+    cargo(workspace, &["build", "--release", "--workspace", "--examples"]).succeed()?;
+    println!("built, each says how it is called:");
+    for program in workspace.examples("crates/*/examples")? {
+        if program.starts_with("bench_") {
+            println!("  {}", workspace.built("release/examples").join(program).display());
+        }
+    }
+    Ok(())
+}

@@ -1,3 +1,82 @@
-//! SemFM at the shell.
+//! SemFM at the shell: arguments in, facade calls, files out.
+//!
+//! stdout is data, stderr is talk. Exit codes: 0 success, 1 a sound run without an answer (verdict
+//! `refuse`), 2 bad input or failure.
 
-fn main() {}
+mod commands;
+mod load;
+mod options;
+mod talk;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use commands::{Outcome, completions, demo, info, region, transfer, views};
+use options::Common;
+
+/// Carry a demonstrated region from one object to another.
+///
+/// A demonstration touches one object (the handle of a mug). SemFM finds where to act on a different
+/// object of the same kind (a kettle).
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, after_help = "Start with:  semfm-cli demo")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Views(views::Views),
+    Region(region::MakeRegion),
+    Transfer(Box<transfer::Carry>),
+    Info(info::Info),
+    Completions(completions::Completions),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let common = arguments.common;
+    let outcome = common.apply().and_then(|()| match arguments.command {
+        Command::Demo(command) => command.run(&common),
+        Command::Views(command) => command.run(&common),
+        Command::Region(command) => command.run(&common),
+        Command::Transfer(command) => command.run(&common),
+        Command::Info(command) => command.run(&common),
+        Command::Completions(command) => command.run(),
+    });
+    match outcome {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::NoAnswer) => ExitCode::from(1),
+        Ok(Outcome::Refused) => ExitCode::from(2),
+        Err(error) => {
+            talk::complain(&error);
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The command line itself, for completions and for the test that checks it.
+fn command_line() -> clap::Command {
+    <Arguments as clap::CommandFactory>::command()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::command_line().debug_assert();
+    }
+
+    #[test]
+    fn every_command_shows_an_example() {
+        for command in super::command_line().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("semfm-cli"), "{} has no example", command.get_name());
+        }
+    }
+}

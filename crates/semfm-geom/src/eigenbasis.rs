@@ -60,8 +60,9 @@ impl Eigenbasis {
     /// Where `functions` has not one row per vertex.
     pub fn project_all(&self, functions: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(functions.nrows(), self.n_vertices(), "one value per vertex");
-        let weighted =
-            Mat::from_fn(functions.nrows(), functions.ncols(), |i, j| functions[(i, j)] * self.mass[i]);
+        let weighted = Mat::from_fn(functions.nrows(), functions.ncols(), |i, j| {
+            functions[(i, j)] * self.mass[i]
+        });
         let mut coefficients = Mat::zeros(self.k(), functions.ncols());
         let (phi_t, m_f) = (self.functions.transpose(), weighted.as_ref());
         matmul(coefficients.as_mut(), Accum::Replace, phi_t, m_f, 1.0, Par::Seq);

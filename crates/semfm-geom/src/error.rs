@@ -11,7 +11,9 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub enum Error {
     // ---- meshes
     /// A mesh needs at least one vertex and one triangle.
-    #[error("empty mesh: {n_vertices} vertices and {n_faces} triangles, expected at least one of each")]
+    #[error(
+        "empty mesh: {n_vertices} vertices and {n_faces} triangles, expected at least one of each"
+    )]
     EmptyMesh {
         /// Vertices given.
         n_vertices: usize,
@@ -31,7 +33,9 @@ pub enum Error {
         z: f64,
     },
     /// A triangle names a vertex that does not exist.
-    #[error("triangle {face} names vertex {vertex}, but there are {n_vertices} vertices (ids from 0)")]
+    #[error(
+        "triangle {face} names vertex {vertex}, but there are {n_vertices} vertices (ids from 0)"
+    )]
     VertexOutOfRange {
         /// Triangle id, 0-based.
         face: usize,
@@ -71,7 +75,9 @@ pub enum Error {
 
     // ---- eigenbasis
     /// More eigenpairs were asked for than the mesh has.
-    #[error("{asked} eigenpairs asked of a mesh with {n_vertices} vertices, which has at most {n_vertices}")]
+    #[error(
+        "{asked} eigenpairs asked of a mesh with {n_vertices} vertices, which has at most {n_vertices}"
+    )]
     TooManyEigenpairs {
         /// Pairs asked.
         asked: usize,
@@ -116,6 +122,14 @@ pub enum Error {
         /// What stands there.
         found: String,
     },
+    /// A file that follows its format holds something that is not a mesh.
+    #[error("{}: {cause}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its contents; [`Error::code`] and [`Error::place`] are those of it.
+        cause: Box<Error>,
+    },
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
@@ -130,4 +144,39 @@ pub enum Error {
     /// The caller asked the work to stop.
     #[error("cancelled")]
     Cancelled,
+}
+
+impl Error {
+    /// A stable name for the kind of failure, for scripts: kebab-case, one per variant.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::EmptyMesh { .. } => "no-faces",
+            Self::NotFinite { .. } => "non-finite",
+            Self::VertexOutOfRange { .. } => "index-out-of-range",
+            Self::NoArea { .. } => "no-area",
+            Self::Length { .. } => "length",
+            Self::OutOfRange { .. } => "out-of-range",
+            Self::TooManyEigenpairs { .. } => "too-many-eigenpairs",
+            Self::NotConverged { .. } => "not-converged",
+            Self::NotPositiveDefinite { .. } => "not-positive-definite",
+            Self::LinearAlgebra(_) => "linear-algebra",
+            Self::Format { .. } => "format",
+            Self::InFile { cause, .. } => cause.code(),
+            Self::Io { .. } => "io",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// Where it went wrong: a line, a byte offset, an element, a vertex; `None` where the failure
+    /// has no place.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::NotFinite { vertex, .. } => Some(format!("vertex {vertex}")),
+            Self::VertexOutOfRange { face, .. } => Some(format!("triangle {face}")),
+            Self::NotPositiveDefinite { row, .. } => Some(format!("row {row}")),
+            Self::Format { place, .. } => Some(place.clone()),
+            Self::InFile { cause, .. } => cause.place(),
+            _ => None,
+        }
+    }
 }

@@ -131,6 +131,7 @@ impl<'a> Matching<'a> {
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
+        semfm_geom::algebra::keep_sequential();
         settings.check()?;
         let settings = settings.clipped(source.shape().basis().k().min(target.shape().basis().k()));
         let mut stages = Stages::default();
@@ -221,7 +222,11 @@ impl<'a> Matching<'a> {
         let both: Vec<f64> = votes.iter().zip(&second).map(|(a, b)| (a + b) / 2.0).collect();
         let one_piece =
             is_one_piece(self.source.shape().mesh(), &inside, &self.source.shape().basis().mass);
-        let onto_original = |weights: &[f64]| Region::from_weights(shape.onto_original(weights));
+        // A mix of weights inside [0, 1] leaves it by a rounding error at most.
+        let onto_original = |weights: &[f64]| {
+            let carried = shape.onto_original(weights);
+            Region::from_weights(carried.into_iter().map(|w| w.clamp(0.0, 1.0)).collect())
+        };
         let hypotheses = islands(shape.mesh(), &both, areas, one_piece, self.settings.n_hypotheses)
             .into_iter()
             .map(|(weights, probability)| {

@@ -5,31 +5,57 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 use faer::{MatRef, Par, Side};
 
 use super::shift_invert::shifted;
-use crate::{Laplacian, Result};
+use crate::{Error, Laplacian, Result};
 
 /// Eigenvalues closer than this, relative to their size, are not told apart by a count.
 const CLUSTER_WIDTH: f64 = 1e-6;
 
-/// A number no eigenvalue equals, and how many eigenvalues must lie below it if none was missed.
+/// A gap in the spectrum, and how many eigenvalues must lie below it if none was missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fence {
-    /// Where to count.
-    pub tau: f64,
+    /// Largest value below the gap.
+    pub below: f64,
+    /// Smallest value above it.
+    pub above: f64,
     /// Pairs found below it.
     pub expected: usize,
 }
 
-/// The highest place among `values` (ascending) at which counting makes sense: the middle of the
-/// last gap wider than a cluster. `None` where all values are one cluster.
+/// The highest place among `values` (ascending) at which counting makes sense: the last gap wider
+/// than a cluster. `None` where all values are one cluster.
 ///
 /// Above the fence remain at most the members of the cluster that ends the list; within a cluster
 /// any choice of members is as good as any other.
 pub(super) fn fence(values: &[f64], scale: f64) -> Option<Fence> {
     (1..values.len()).rev().find_map(|j| {
         let (below, above) = (values[j - 1], values[j]);
-        (above - below > CLUSTER_WIDTH * above.max(scale))
-            .then_some(Fence { tau: 0.5 * (below + above), expected: j })
+        let wide = above - below > CLUSTER_WIDTH * above.max(scale);
+        wide.then_some(Fence { below, above, expected: j })
     })
+}
+
+/// How many eigenvalues below the fence were not found.
+///
+/// The count is taken in the middle of the gap, and elsewhere in it where the middle gives none or
+/// one that contradicts the pairs at hand: without pivoting, a factorisation of an indefinite
+/// matrix can break down by bad luck.
+///
+/// # Errors
+/// [`Error::LinearAlgebra`] where no place in the gap gives a possible count.
+pub(super) fn missed_below(
+    fence: Fence,
+    laplacian: &Laplacian,
+    symbolic: &SymbolicCholesky<usize>,
+) -> Result<usize> {
+    for share in [0.5, 0.3, 0.7] {
+        let tau = fence.below + share * (fence.above - fence.below);
+        if let Some(below) = count_below(laplacian, symbolic, tau)?
+            && below >= fence.expected
+        {
+            return Ok(below - fence.expected);
+        }
+    }
+    Err(Error::LinearAlgebra("the eigensolver's count of eigenvalues"))
 }
 
 /// Number of eigenvalues of L φ = λ M φ below `tau`.
@@ -37,8 +63,8 @@ pub(super) fn fence(values: &[f64], scale: f64) -> Option<Fence> {
 /// Sylvester's law of inertia: L − τM = P R D Rᵀ Pᵀ has as many negative pivots D as there are
 /// eigenvalues below τ. `symbolic` is the analysis of any shifted L, so the cost is one numeric
 /// factorisation. `None` where a pivot vanishes, which happens only for τ at an eigenvalue of a
-/// leading block; the caller then moves τ.
-pub(super) fn count_below(
+/// leading block.
+fn count_below(
     laplacian: &Laplacian,
     symbolic: &SymbolicCholesky<usize>,
     tau: f64,

@@ -5,13 +5,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::dense::symmetric_eigen;
-use super::orthogonalise::{Orthonormaliser, product, project_out, random_block};
+use super::orthogonalise::{Orthonormaliser, product, random_block};
+use super::row_panels::RowPanels;
 use super::shift_invert::ShiftInvert;
 use crate::{Error, Result, Task};
-
-/// Rows rotated at a time, so that a restart works in place: 256 rows of 300 columns fill a third
-/// of a core's second-level cache.
-const ROTATED_ROWS: usize = 256;
 
 /// Restarts after which the search is given up; a mesh's spectrum takes 0 to 4.
 const MOST_RESTARTS: usize = 60;
@@ -92,7 +89,7 @@ impl Schedule {
     const DIGITS_PER_BLOCK: f64 = 1.0;
 
     fn new(plan: &Plan) -> Self {
-        Self { next_check: plan.wanted + plan.wanted / 2 + 2 * plan.block, last: None }
+        Self { next_check: plan.wanted * 5 / 2 + 6 * plan.block, last: None }
     }
 
     fn plan_next(&mut self, dimension: usize, worst: f64, plan: &Plan) {
@@ -115,7 +112,7 @@ impl Schedule {
 struct Krylov<'a> {
     operator: &'a ShiftInvert,
     /// [deflated | V | Q | room] (n × (d + max_dimension)).
-    basis: Mat<f64>,
+    basis: RowPanels,
     n_deflated: usize,
     /// Columns of V.
     expanded: usize,
@@ -133,22 +130,22 @@ impl<'a> Krylov<'a> {
     fn start(operator: &'a ShiftInvert, deflated: MatRef<'_, f64>, plan: &Plan) -> Self {
         let (n, d, b) = (deflated.nrows(), deflated.ncols(), plan.block);
         let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
-        let noise = random_block(n, b, &mut random);
+        let mut block = random_block(n, b, &mut random);
+        // One application to the noise before it becomes a basis block: its rough part would
+        // occupy b columns and contribute nothing.
+        operator.apply(&mut block);
         let mut krylov = Self {
             operator,
-            basis: Mat::zeros(n, d + plan.max_dimension),
+            basis: RowPanels::new(n, d + plan.max_dimension),
             n_deflated: d,
             expanded: 0,
             kept: 0,
             projected: Mat::zeros(plan.max_dimension, plan.max_dimension),
             coupling: Mat::zeros(b, b),
-            block: Mat::zeros(n, b),
+            block,
             work: Orthonormaliser::new(n, b, 0.0, random),
         };
-        krylov.basis.as_mut().subcols_mut(0, d).copy_from(deflated);
-        // One application to the noise before it becomes a basis block: its rough part would
-        // occupy b columns and contribute nothing.
-        operator.apply(noise.as_ref(), &mut krylov.block);
+        krylov.basis.store(0, deflated);
         krylov.complete_block(2);
         // ‖A⁻¹‖ ≤ 1/s: what the operator leaves below this is rounding.
         krylov.work.negligible = 1e-15 / operator.shift;
@@ -158,11 +155,11 @@ impl<'a> Krylov<'a> {
     /// Applies the operator to Q and appends Q to V.
     fn expand(&mut self) {
         let (d, m, b) = (self.n_deflated, self.expanded, self.block.ncols());
-        self.operator.apply(self.basis.as_ref().subcols(d + m, b), &mut self.block);
+        self.basis.load(d + m, self.block.as_mut());
+        self.operator.apply(&mut self.block);
         // A block couples with itself and the one before; the first after a restart, with all kept.
         let from = if m == self.kept { 0 } else { m - b };
-        let coupled = self.basis.as_ref().subcols(d + from, m + b - from);
-        let components = project_out(coupled, &mut self.block);
+        let components = self.basis.project_out(d + from..d + m + b, &mut self.block);
         for j in 0..b {
             for i in 0..components.nrows() {
                 self.projected[(from + i, m + j)] = components[(i, j)];
@@ -177,14 +174,18 @@ impl<'a> Krylov<'a> {
     /// Returns R, for which the block as it came is Q R + (something in V).
     fn complete_block(&mut self, passes: usize) -> Mat<f64> {
         let occupied = self.n_deflated + self.expanded;
-        let basis = self.basis.as_ref().subcols(0, occupied);
-        let mut r = self.work.orthonormalise(&mut self.block, basis);
+        let clear = |block: &mut Mat<f64>| {
+            self.basis.project_out(0..occupied, block);
+        };
+        let mut r = self.work.orthonormalise(&mut self.block, &clear);
         for _ in 0..passes {
-            project_out(basis, &mut self.block);
-            r = self.work.orthonormalise(&mut self.block, basis) * r;
+            clear(&mut self.block);
+            let again = self.work.orthonormalise(&mut self.block, &clear);
+            let mut both = Mat::zeros(r.nrows(), r.ncols());
+            product(both.as_mut(), again.as_ref(), r.as_ref());
+            r = both;
         }
-        let b = self.block.ncols();
-        self.basis.as_mut().subcols_mut(occupied, b).copy_from(&self.block);
+        self.basis.store(occupied, self.block.as_ref());
         r
     }
 
@@ -206,17 +207,9 @@ impl<'a> Krylov<'a> {
         // between forgetting what was learnt and having to orthogonalise against it.
         let keep = (plan.wanted + (m - plan.wanted.min(m)) / 2).min(m - 2 * b);
         let combination = projection.vectors.as_ref().subcols(0, keep);
-        let mut rows = Mat::zeros(ROTATED_ROWS, keep);
-        let n = self.basis.nrows();
-        for start in (0..n).step_by(ROTATED_ROWS) {
-            let height = ROTATED_ROWS.min(n - start);
-            let mut panel = self.basis.as_mut().submatrix_mut(start, d, height, m);
-            let mut rotated = rows.as_mut().subrows_mut(0, height);
-            product(rotated.as_mut(), panel.as_ref(), combination);
-            panel.as_mut().subcols_mut(0, keep).copy_from(rotated);
-        }
-        let next = self.basis.as_ref().subcols(d + m, b).to_owned();
-        self.basis.as_mut().subcols_mut(d + keep, b).copy_from(&next);
+        self.basis.load(d + m, self.block.as_mut());
+        self.basis.rotate(d..d + m, combination);
+        self.basis.store(d + keep, self.block.as_ref());
         self.projected.fill(0.0);
         for (i, &mu) in projection.mus[..keep].iter().enumerate() {
             self.projected[(i, i)] = mu;
@@ -238,9 +231,7 @@ impl<'a> Krylov<'a> {
                 projection.residuals[(i - m, j)] / projection.mus[j]
             }
         });
-        let mut vectors = Mat::zeros(self.basis.nrows(), wanted);
-        let space = self.basis.as_ref().subcols(d, m + b);
-        product(vectors.as_mut(), space, combination.as_ref());
+        let vectors = self.basis.into_combinations(d..d + m + b, combination.as_ref());
         let mut mus = projection.mus;
         mus.truncate(wanted);
         Ritz { mus, vectors }

@@ -1,6 +1,7 @@
 //! Orthonormal blocks: block Gram–Schmidt and Cholesky QR, both made of matrix products.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -16,7 +17,7 @@ pub(super) fn product(destination: MatMut<'_, f64>, left: MatRef<'_, f64>, right
 
 /// Takes out of `block` (n × b) its components along the orthonormal `basis` (n × c), and returns
 /// them (c × b): one pass of classical Gram–Schmidt.
-pub(super) fn project_out(basis: MatRef<'_, f64>, block: &mut Mat<f64>) -> Mat<f64> {
+fn project_out(basis: MatRef<'_, f64>, block: &mut Mat<f64>) -> Mat<f64> {
     let mut components = Mat::zeros(basis.ncols(), block.ncols());
     product(components.as_mut(), basis.transpose(), block.as_ref());
     matmul(block.as_mut(), Accum::Add, basis, components.as_ref(), -1.0, Par::Seq);
@@ -45,15 +46,20 @@ impl Orthonormaliser {
     /// Replaces `block` by Q and returns R (b × b, upper triangular).
     ///
     /// Cholesky QR: R from the Gram matrix WᵀW, Q = W R⁻¹. One call leaves Q orthonormal up to
-    /// ε·cond(W)²; the caller's second call, after the block went once more through
-    /// [`project_out`], completes what Yamamoto et al. (2015) call CholeskyQR2. A block that is
+    /// ε·cond(W)²; the caller's second call, after the block was once more cleared of the
+    /// basis, completes what Yamamoto et al. (2015) call CholeskyQR2. A block that is
     /// (nearly) rank deficient takes the slower [`column_by_column`](Self::column_by_column).
-    pub fn orthonormalise(&mut self, block: &mut Mat<f64>, basis: MatRef<'_, f64>) -> Mat<f64> {
+    /// `clear` takes out of a column its components along the basis so far.
+    pub fn orthonormalise(
+        &mut self,
+        block: &mut Mat<f64>,
+        clear: &dyn Fn(&mut Mat<f64>),
+    ) -> Mat<f64> {
         let b = block.ncols();
         let mut gram = Mat::zeros(b, b);
         product(gram.as_mut(), block.transpose(), block.as_ref());
         let Some(r) = self.cholesky(&gram) else {
-            return self.column_by_column(block, basis);
+            return self.column_by_column(block, clear);
         };
         product(self.spare.as_mut(), block.as_ref(), inverse_of_upper(&r).as_ref());
         std::mem::swap(block, &mut self.spare);
@@ -82,9 +88,13 @@ impl Orthonormaliser {
     }
 
     /// Gram–Schmidt, each column twice (Giraud et al. 2005). A negligible column ends with zero on
-    /// the diagonal of R and is replaced by a random direction orthogonal to `basis` and block, so
+    /// the diagonal of R and is replaced by a random direction orthogonal to basis and block, so
     /// that the Krylov space grows on past an invariant subspace.
-    fn column_by_column(&mut self, block: &mut Mat<f64>, basis: MatRef<'_, f64>) -> Mat<f64> {
+    fn column_by_column(
+        &mut self,
+        block: &mut Mat<f64>,
+        clear: &dyn Fn(&mut Mat<f64>),
+    ) -> Mat<f64> {
         let (n, b) = (block.nrows(), block.ncols());
         let mut r = Mat::<f64>::zeros(b, b);
         for j in 0..b {
@@ -101,7 +111,7 @@ impl Orthonormaliser {
             } else {
                 column = random_block(n, 1, &mut self.random);
                 for _ in 0..3 {
-                    project_out(basis, &mut column);
+                    clear(&mut column);
                     project_out(block.as_ref().subcols(0, j), &mut column);
                     let shorter = 1.0 / column.norm_l2();
                     column.col_as_slice_mut(0).iter_mut().for_each(|x| *x *= shorter);
@@ -133,10 +143,9 @@ fn inverse_of_upper(r: &Mat<f64>) -> Mat<f64> {
 
 /// Largest entry of |QᵀQ − I| for the columns of `q`.
 pub(crate) fn orthonormality_error(q: MatRef<'_, f64>) -> f64 {
-    use faer::linalg::matmul::triangular::{BlockStructure, matmul};
     let k = q.ncols();
     let mut gram = Mat::<f64>::zeros(k, k);
-    matmul(
+    triangular::matmul(
         gram.as_mut(),
         BlockStructure::TriangularLower,
         Accum::Replace,
@@ -172,9 +181,9 @@ mod tests {
         }
         let mut q = block.clone();
         let mut work = Orthonormaliser::new(500, 8, 1e-14, random);
-        let none = Mat::zeros(500, 0);
-        let first = work.orthonormalise(&mut q, none.as_ref());
-        let second = work.orthonormalise(&mut q, none.as_ref());
+        let keep = |_: &mut Mat<f64>| ();
+        let first = work.orthonormalise(&mut q, &keep);
+        let second = work.orthonormalise(&mut q, &keep);
         assert!(orthonormality_error(q.as_ref()) < 1e-14);
         assert!(deviation(&block, &q, &(second * first)) < 1e-13);
     }
@@ -183,10 +192,10 @@ mod tests {
     fn a_deficient_block_is_filled_with_new_directions_orthogonal_to_the_basis() {
         let mut random = ChaCha8Rng::seed_from_u64(2);
         let mut work = Orthonormaliser::new(60, 4, 1e-12, ChaCha8Rng::seed_from_u64(3));
-        let none = Mat::zeros(60, 0);
+        let keep = |_: &mut Mat<f64>| ();
         let mut basis = random_block(60, 4, &mut random);
-        work.orthonormalise(&mut basis, none.as_ref());
-        work.orthonormalise(&mut basis, none.as_ref());
+        work.orthonormalise(&mut basis, &keep);
+        work.orthonormalise(&mut basis, &keep);
         let mut block = random_block(60, 4, &mut random);
         project_out(basis.as_ref(), &mut block);
         for i in 0..60 {
@@ -194,7 +203,10 @@ mod tests {
             block[(i, 2)] = 2.0 * block[(i, 0)];
         }
         let mut q = block.clone();
-        let r = work.orthonormalise(&mut q, basis.as_ref());
+        let clear = |column: &mut Mat<f64>| {
+            project_out(basis.as_ref(), column);
+        };
+        let r = work.orthonormalise(&mut q, &clear);
         assert_eq!((r[(1, 1)], r[(2, 2)]), (0.0, 0.0));
         assert!(orthonormality_error(q.as_ref()) < 1e-14);
         assert!((basis.transpose() * &q).norm_max() < 1e-14);

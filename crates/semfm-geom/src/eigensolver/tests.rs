@@ -107,7 +107,7 @@ fn every_component_brings_a_zero_and_the_constant_comes_first() {
 fn equal_components_bring_multiplicities_far_above_the_block() {
     // 40 copies of one torus: every eigenvalue is there at least 40 times.
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for c in 0..40u32 {
+    for _ in 0..40 {
         let (v, f) = torus(9, 7, 0.1, DVec3::ZERO);
         let first = vertices.len() as u32;
         vertices.extend(v);
@@ -162,14 +162,27 @@ fn a_count_notices_a_pair_that_was_left_out() {
     let laplacian = torus_laplacian(40, 20, 0.2);
     let operator = ShiftInvert::new(&laplacian).unwrap();
     let mut values = dense_values(&laplacian, 21);
-    let count = |fence: check::Fence| {
-        count_below(&laplacian, operator.factor.symbolic(), fence.tau).unwrap().unwrap()
+    let missed = |values: &[f64]| {
+        let fence = fence(values, values[1]).unwrap();
+        missed_below(fence, &laplacian, operator.factor.symbolic()).unwrap()
     };
-    let whole = fence(&values, values[1]).unwrap();
-    assert_eq!(count(whole), whole.expected);
+    assert_eq!(missed(&values), 0);
     values.remove(10);
-    let with_a_hole = fence(&values, values[1]).unwrap();
-    assert_eq!(count(with_a_hole), with_a_hole.expected + 1);
+    assert_eq!(missed(&values), 1);
+    values.remove(5);
+    assert_eq!(missed(&values), 2);
+}
+
+#[test]
+fn a_count_below_what_was_found_is_an_error() {
+    let laplacian = torus_laplacian(40, 20, 0.2);
+    let operator = ShiftInvert::new(&laplacian).unwrap();
+    let values = dense_values(&laplacian, 9);
+    let too_many = check::Fence { below: values[7], above: values[8], expected: 9 };
+    assert!(matches!(
+        missed_below(too_many, &laplacian, operator.factor.symbolic()),
+        Err(Error::LinearAlgebra(_))
+    ));
 }
 
 #[test]

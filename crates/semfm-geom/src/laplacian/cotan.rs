@@ -1,8 +1,6 @@
 //! The cotangent Laplacian (Pinkall & Polthier 1993; Meyer et al. 2003).
 
-use faer::sparse::{SparseColMat, Triplet};
-
-use super::Laplacian;
+use super::{Laplacian, assembly, fill_empty_masses};
 use crate::{Error, Mesh, Result};
 
 /// Stiffness from the cotangents of the angles opposite each edge, mass a third of the area around
@@ -15,9 +13,7 @@ use crate::{Error, Mesh, Result};
 /// # Errors
 /// [`Error::NoArea`] where every triangle is degenerate.
 pub fn cotan_laplacian(mesh: &Mesh) -> Result<Laplacian> {
-    let n = mesh.n_vertices();
-    let mut triplets = Vec::with_capacity(mesh.n_faces() * 12 + n);
-    triplets.extend((0..n).map(|i| Triplet::new(i, i, 0.0)));
+    let mut edges = Vec::with_capacity(mesh.n_faces() * 3);
     for (face, ids) in mesh.faces().iter().enumerate() {
         let corners = mesh.corners(face);
         let double_area = mesh.face_normal_scaled(face).length();
@@ -25,24 +21,18 @@ pub fn cotan_laplacian(mesh: &Mesh) -> Result<Laplacian> {
             continue;
         }
         for k in 0..3 {
-            let (i, j) = (ids[(k + 1) % 3] as usize, ids[(k + 2) % 3] as usize);
-            let (to_i, to_j) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
+            let (to_i, to_j) =
+                (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
             let weight = 0.5 * to_i.dot(to_j) / double_area;
-            triplets.push(Triplet::new(i, i, weight));
-            triplets.push(Triplet::new(j, j, weight));
-            triplets.push(Triplet::new(i, j, -weight));
-            triplets.push(Triplet::new(j, i, -weight));
+            edges.push((ids[(k + 1) % 3], ids[(k + 2) % 3], weight));
         }
     }
     let mut mass = mesh.vertex_areas();
-    let mean = mass.iter().sum::<f64>() / n as f64;
-    if mean <= 0.0 {
+    if mass.iter().all(|&m| m <= 0.0) {
         return Err(Error::NoArea { n_faces: mesh.n_faces() });
     }
-    mass.iter_mut().for_each(|m| *m = m.max(1e-12 * mean));
-    let stiffness = SparseColMat::try_new_from_triplets(n, n, &triplets)
-        .map_err(|_| Error::LinearAlgebra("assembling the cotangent Laplacian"))?;
-    Ok(Laplacian { stiffness, mass })
+    fill_empty_masses(&mut mass);
+    Ok(Laplacian { stiffness: assembly::stiffness(mesh.n_vertices(), &edges), mass })
 }
 
 #[cfg(test)]

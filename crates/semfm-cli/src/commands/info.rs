@@ -1,0 +1,116 @@
+//! `semfm-cli info`: what is in a file, or why it is refused.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use semfm::geom::connectivity::MeshReport;
+use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::views::mcap::inspect;
+use serde_json::{Value, json};
+
+use super::Outcome;
+use crate::options::Common;
+use crate::talk;
+
+/// Say what is in a mesh or MCAP file, or why it is refused
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  semfm-cli info mug.obj mug.emb.mcap --json\n\n\
+    With --json, one object a line: `kind` and counts, or `error` with code, message and place.")]
+pub struct Info {
+    /// Mesh files (OBJ, PLY, STL, OFF, glTF, GLB) and MCAP files
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+}
+
+impl Info {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        let mut outcome = Outcome::Done;
+        for path in &self.files {
+            let report = match look(path) {
+                Ok(report) => report,
+                Err(error) => {
+                    outcome = Outcome::Refused;
+                    let (code, place) = (error.code(), error.place());
+                    json!({ "error": { "code": code, "message": error.to_string(), "place": place } })
+                }
+            };
+            if common.json {
+                let mut line = json!({ "file": path.display().to_string() });
+                line.as_object_mut()
+                    .into_iter()
+                    .for_each(|line| line.extend(report.as_object().cloned().unwrap_or_default()));
+                talk::say(line);
+            } else if let Some(error) = report.get("error") {
+                talk::remark(format_args!(
+                    "error: {}",
+                    error["message"].as_str().unwrap_or_default()
+                ));
+            } else {
+                show(path, &report);
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+/// The report on one file.
+fn look(path: &Path) -> semfm::Result<Value> {
+    if is_mcap(path) {
+        let report = serde_json::to_value(inspect(path)?);
+        return Ok(with_kind("mcap", report.unwrap_or_default()));
+    }
+    let file = read_mesh(path)?;
+    let report = serde_json::to_value(MeshReport::new(&file.mesh));
+    let mut value = with_kind("mesh", report.unwrap_or_default());
+    let (low, high) = file.mesh.bounds();
+    value["n_vertices"] = json!(file.mesh.n_vertices());
+    value["n_faces"] = json!(file.n_faces);
+    value["n_triangles"] = json!(file.mesh.n_faces());
+    value["hash"] = json!(file.mesh.hash().to_string());
+    value["area"] = json!(file.mesh.area());
+    value["bounds"] = json!([low.to_array(), high.to_array()]);
+    value["format"] = json!(format!("{:?}", file.format).to_lowercase());
+    value["has_colors"] = json!(!file.appearance.is_plain());
+    value["notes"] = json!(file.appearance.notes);
+    Ok(value)
+}
+
+/// MCAP by its extension or by its first bytes; a mesh's extension wins over the bytes.
+fn is_mcap(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    if extension.eq_ignore_ascii_case("mcap") {
+        return true;
+    }
+    let mut start = [0; 8];
+    MeshFormat::from_path(path).is_none()
+        && std::fs::File::open(path)
+            .and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start))
+            .is_ok()
+        && start == *b"\x89MCAP0\r\n"
+}
+
+fn with_kind(kind: &str, report: Value) -> Value {
+    let mut value = json!({ "kind": kind });
+    if let (Some(value), Value::Object(report)) = (value.as_object_mut(), report) {
+        value.extend(report);
+    }
+    value
+}
+
+/// The report as a table for people.
+fn show(path: &Path, report: &Value) {
+    talk::say(path.display());
+    for (key, value) in report.as_object().into_iter().flatten() {
+        match value {
+            Value::Array(items) if items.is_empty() => {}
+            Value::Null => {}
+            Value::Array(items) if items.iter().any(Value::is_object) => {
+                talk::say(format_args!("  {key}"));
+                items.iter().for_each(|item| talk::say(format_args!("    {item}")));
+            }
+            Value::String(text) => talk::say(format_args!("  {key:24} {text}")),
+            other => talk::say(format_args!("  {key:24} {other}")),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! `semfm-cli region`: mark where the demonstration touched.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::{ArgGroup, Args};
+use semfm::geom::math::DVec3;
+use semfm::region_file::write_region;
+use semfm::regions;
+use semfm::views::mcap::read_view;
+use semfm::{Mesh, Region};
+
+use super::Outcome;
+use crate::options::Common;
+use crate::{load, talk};
+
+/// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("how").required(true).args(["near", "mask", "ply_color", "vertices"]))]
+#[command(after_help = "Examples:\n  \
+    semfm-cli region mug.obj -o grip.json --near 0.05,0,0.04 --radius 0.03\n  \
+    semfm-cli region mug.obj -o grip.json --mask grip.png --view mug.views.mcap#003\n  \
+    semfm-cli region painted.ply -o grip.json --ply-color")]
+pub struct MakeRegion {
+    /// The mesh
+    mesh: PathBuf,
+    /// Where to write the region (JSON)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// A contact point in the mesh's frame and units; needs --radius
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "radius",
+        allow_hyphen_values = true,
+        help_heading = "How"
+    )]
+    near: Option<String>,
+    /// Geodesic radius around the contact, in the mesh's units
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        requires = "near",
+        allow_negative_numbers = true,
+        help_heading = "How"
+    )]
+    radius: Option<f64>,
+    /// A picture of the size of a view, bright where the region is; needs --view
+    #[arg(long, value_name = "IMAGE", requires = "view", help_heading = "How")]
+    mask: Option<PathBuf>,
+    /// The view of the mask: a views file and a number
+    #[arg(long, value_name = "V.views.mcap#NNN", requires = "mask", help_heading = "How")]
+    view: Option<String>,
+    /// The vertices painted red, or in the colour given
+    #[arg(long, value_name = "R,G,B", num_args = 0..=1, default_missing_value = "red", help_heading = "How")]
+    ply_color: Option<String>,
+    /// Vertex ids, 0-based
+    #[arg(long, value_name = "ID,ID,…", value_delimiter = ',', help_heading = "How")]
+    vertices: Option<Vec<u32>>,
+}
+
+impl MakeRegion {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        let file = load::mesh(&self.mesh, None)?;
+        let region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
+            let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
+            regions::near(&file.mesh, DVec3::new(x, y, z), radius)?
+        } else if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
+            from_mask(&file.mesh, mask, view)?
+        } else if let Some(paint) = &self.ply_color {
+            let paint = match paint.as_str() {
+                "red" => None,
+                text => Some(numbers(text).context("--ply-color: expected R,G,B, each 0 to 255")?),
+            };
+            regions::painted(file.appearance.vertex_colors.as_deref(), paint)
+                .with_context(|| self.mesh.display().to_string())?
+        } else {
+            let ids = self.vertices.unwrap_or_default();
+            Region::from_vertices(file.mesh.n_vertices(), &ids).context("--vertices")?
+        };
+        write_region(&self.output, &region, &file.mesh)?;
+        if !common.quiet {
+            let (inside, of) = (region.vertices().len(), region.n_vertices());
+            talk::remark(format_args!("{inside} of {of} vertices"));
+        }
+        talk::say(self.output.display());
+        Ok(Outcome::Done)
+    }
+}
+
+fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N]> {
+    let found = || anyhow::anyhow!("found `{text}`");
+    let values: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    values.and_then(|values| values.try_into().ok()).ok_or_else(found)
+}
+
+fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
+    let Some((path, number)) = view.rsplit_once('#') else {
+        bail!("--view: expected V.views.mcap#NNN, found `{view}`");
+    };
+    let number = number
+        .parse()
+        .with_context(|| format!("--view: expected a number after #, found `{number}`"))?;
+    let path = Path::new(path);
+    let (metadata, view) = read_view(path, number)?;
+    metadata.mesh.check(mesh, path)?;
+    let picture = image::open(mask).with_context(|| mask.display().to_string())?.into_luma8();
+    let (width, height) = (view.camera.width, view.camera.height);
+    if picture.dimensions() != (width, height) {
+        let (w, h) = picture.dimensions();
+        bail!(
+            "{}: size: expected {width} × {height}, as the view, found {w} × {h}",
+            mask.display()
+        );
+    }
+    let marked: Vec<bool> = picture.pixels().map(|pixel| pixel.0[0] >= 128).collect();
+    Ok(regions::masked(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())?)
+}

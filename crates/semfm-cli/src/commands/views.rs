@@ -1,0 +1,111 @@
+//! `semfm-cli views`: the pictures that an encoder is shown.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use semfm::geom::io::MeshFile;
+use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
+use semfm::views::{RenderSettings, RigSettings, render, rig};
+
+use super::Outcome;
+use crate::options::Common;
+use crate::{load, talk};
+
+/// Render the views of an object that an encoder is shown
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  semfm-cli views mug.obj -o mug.views.mcap\n  \
+    semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224")]
+pub struct Views {
+    /// The mesh: OBJ, PLY, STL, OFF, glTF or GLB
+    mesh: PathBuf,
+    /// Where to write (`NAME.views.mcap`)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    #[command(flatten)]
+    rig: RigOptions,
+    /// Which renderer draws
+    #[arg(long, value_enum, default_value_t = Renderer::Auto, help_heading = "Rendering")]
+    renderer: Renderer,
+    /// An image for a mesh with texture coordinates (OBJ, PLY)
+    #[arg(long, value_name = "IMAGE", help_heading = "Rendering")]
+    texture: Option<PathBuf>,
+    /// Ignore the object's colours
+    #[arg(long, conflicts_with = "texture", help_heading = "Rendering")]
+    grey: bool,
+}
+
+/// Where the cameras stand.
+#[derive(Clone, Debug, Args)]
+pub struct RigOptions {
+    /// Number of views
+    #[arg(long, default_value_t = RigSettings::default().count, value_name = "N", help_heading = "Rendering")]
+    pub count: usize,
+    /// Side of the square images in pixels
+    #[arg(long, default_value_t = RigSettings::default().size, value_name = "PIXELS", help_heading = "Rendering")]
+    pub size: u32,
+}
+
+impl RigOptions {
+    pub fn settings(&self) -> RigSettings {
+        RigSettings { count: self.count, size: self.size, ..Default::default() }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Renderer {
+    /// The GPU where this build can use one, else the CPU
+    Auto,
+    /// The GPU or nothing
+    Gpu,
+    /// The CPU
+    Cpu,
+}
+
+impl Views {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        if self.renderer == Renderer::Gpu {
+            bail!("--renderer: expected auto or cpu, found gpu: this build has no GPU renderer");
+        }
+        let file = load::mesh(&self.mesh, self.texture.as_deref())?;
+        if common.verbose {
+            file.appearance
+                .notes
+                .iter()
+                .for_each(|note| talk::remark(format_args!("note: {note}")));
+        }
+        make_views(&file, !self.grey, &self.rig.settings(), &self.output, common)?;
+        talk::say(self.output.display());
+        Ok(Outcome::Done)
+    }
+}
+
+/// Renders an object and writes its views file.
+pub fn make_views(
+    file: &MeshFile,
+    colored: bool,
+    settings: &RigSettings,
+    output: &Path,
+    common: &Common,
+) -> Result<()> {
+    let task = talk::watched(common.quiet);
+    let cameras = rig(&file.mesh, settings)?;
+    let appearance = Some(&file.appearance).filter(|appearance| colored && !appearance.is_plain());
+    let views = load::with_paint(&file.mesh, appearance, |paint| {
+        render(&file.mesh, paint, &cameras, &RenderSettings::default(), &task)
+    })?;
+    let metadata = ViewsMetadata {
+        mesh: MeshIdentity::of(&file.mesh),
+        width: settings.size,
+        height: settings.size,
+        rig: format!("fibonacci {}, principal frame", settings.count),
+        background: "white".into(),
+        seed: 0,
+        more: [("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned())]
+            .into(),
+    };
+    let colors: Option<Vec<[u8; 3]>> = appearance
+        .and_then(|appearance| appearance.vertex_colors.as_ref())
+        .map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect());
+    Ok(write_views(output, &views, &file.mesh, colors.as_deref(), &metadata)?)
+}

@@ -1,0 +1,32 @@
+//! Options that every command takes.
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+/// Options of every command.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "General")]
+pub struct Common {
+    /// Worker threads; 0 takes one for each core. Results do not depend on it
+    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
+    pub threads: usize,
+    /// Say nothing but the answer
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
+    /// Answer in JSON on stdout
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+impl Common {
+    /// Sets up the workers.
+    pub fn apply(&self) -> Result<()> {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build_global()
+            .context("cannot start the worker threads")
+    }
+}

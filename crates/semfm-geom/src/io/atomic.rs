@@ -1,0 +1,78 @@
+//! Files that are written whole or not at all.
+
+use std::fs::File;
+use std::io::{BufWriter, Error as IoError, Write};
+use std::path::Path;
+
+use crate::{Error, Result};
+
+/// Writes a file through `write`: into a temporary file beside the target, flushed to the disk and
+/// only then renamed over it. Whatever goes wrong, the target is either the old file or the new one,
+/// and the temporary file is gone.
+///
+/// # Errors
+/// [`Error::Io`] with the target's path, whether the disk failed or `write` did.
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("answer.txt");
+/// semfm_geom::io::write_atomically(&path, |out| out.write_all(b"42\n"))?;
+/// assert_eq!(std::fs::read(&path)?, b"42\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_atomically(
+    path: impl AsRef<Path>,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<()> {
+    let path = path.as_ref();
+    replace(path, write).map_err(|source| Error::Io { path: path.to_owned(), source })
+}
+
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".semfm-");
+    #[cfg(unix)]
+    {
+        // Temporary files are private; ours becomes an ordinary file, so it starts as one (less
+        // the umask) or keeps what the file in its place allows.
+        use std::os::unix::fs::PermissionsExt;
+        let ordinary = std::fs::Permissions::from_mode(0o666);
+        builder.permissions(std::fs::metadata(path).map_or(ordinary, |old| old.permissions()));
+    }
+    let mut out = BufWriter::new(builder.tempfile_in(folder)?);
+    write(&mut out)?;
+    let file = out.into_inner().map_err(|error| IoError::other(error.to_string()))?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|error| error.error)?;
+    // The rename itself lives in the folder; not every file system lets a folder be flushed.
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.txt");
+        write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+        let error = write_atomically(&path, |out| {
+            out.write_all(b"half of the n")?;
+            Err(IoError::other("the disk is full"))
+        });
+        assert!(error.unwrap_err().to_string().contains("kept.txt: the disk is full"));
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

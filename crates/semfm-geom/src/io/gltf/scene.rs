@@ -1,0 +1,339 @@
+//! Walking the scene and gathering its triangles.
+
+use std::collections::HashMap;
+
+use super::accessor::{Accessors, Component};
+use super::json::{Node, Primitive, Whole};
+use super::material::Surface;
+use crate::Result;
+use crate::io::MeshParts;
+use crate::io::appearance::{Appearance, MISSING_UV, rgba_from_floats};
+use crate::io::image::ImageBudget;
+use crate::math::{DAffine3, DMat4, DQuat, DVec3};
+
+/// Vertices and triangles that a file of no size may make out of repeated instances; a file may
+/// have more in proportion to its bytes. With 24 bytes a vertex and 36 a triangle this stays within
+/// the reader's promise of 64 MB and 40 times the file.
+const FREE_VERTICES: usize = 400_000;
+const FREE_TRIANGLES: usize = 800_000;
+
+pub(crate) struct SceneReader<'a> {
+    accessors: &'a Accessors<'a>,
+    parts: MeshParts,
+    budget: Option<ImageBudget>,
+    surfaces: HashMap<Option<usize>, (u32, Surface)>,
+    material_of: Vec<u32>,
+}
+
+impl<'a> SceneReader<'a> {
+    pub fn new(accessors: &'a Accessors<'a>) -> Self {
+        let parts = MeshParts {
+            vertices: vec![],
+            faces: vec![],
+            n_faces: 0,
+            appearance: Appearance::default(),
+        };
+        Self { accessors, parts, budget: None, surfaces: HashMap::new(), material_of: Vec::new() }
+    }
+
+    /// Reads all triangles of the default scene. Without any scene the file is a library: the nodes
+    /// without a parent are shown, and where no node shows a mesh, each mesh once.
+    pub fn read(mut self) -> Result<MeshParts> {
+        let root = self.accessors.root;
+        let scene = match root.scene {
+            Some(scene) => Some(root.scenes.get(scene.0).ok_or_else(|| {
+                let found = format!("scene {} of {}", scene.0, root.scenes.len());
+                self.accessors.input.error("scene", "a scene that exists", found)
+            })?),
+            None => root.scenes.first(),
+        };
+        match scene {
+            Some(scene) => self.walk(&scene.nodes)?,
+            None if root.nodes.iter().any(|node| node.mesh.is_some()) => {
+                self.walk(&parentless(&root.nodes))?
+            }
+            None => {
+                for mesh in 0..root.meshes.len() {
+                    self.add_mesh(mesh, DAffine3::IDENTITY)?;
+                }
+            }
+        }
+        Ok(self.finish())
+    }
+
+    /// Visits nodes depth first, children in order. A node met twice would make the tree a graph,
+    /// or a ring without end, both of which glTF forbids.
+    fn walk(&mut self, roots: &[Whole]) -> Result<()> {
+        let root = self.accessors.root;
+        let mut met = vec![false; root.nodes.len()];
+        let mut stack: Vec<(usize, DAffine3)> =
+            roots.iter().rev().map(|node| (node.0, DAffine3::IDENTITY)).collect();
+        while let Some((id, scene_from_parent)) = stack.pop() {
+            let place = || format!("node {id}");
+            let Some(node) = root.nodes.get(id) else {
+                let found = format!("{} of them", root.nodes.len());
+                return Err(self.accessors.input.error(place(), "a node that exists", found));
+            };
+            if std::mem::replace(&mut met[id], true) {
+                return Err(self.accessors.input.error(
+                    place(),
+                    "one parent",
+                    "the node is met twice",
+                ));
+            }
+            let scene_from_node = scene_from_parent * self.transform(id, node)?;
+            if let Some(mesh) = node.mesh {
+                let still = node.skin.is_some();
+                self.add_mesh(mesh.0, if still { DAffine3::IDENTITY } else { scene_from_node })?;
+            }
+            stack.extend(node.children.iter().rev().map(|child| (child.0, scene_from_node)));
+        }
+        Ok(())
+    }
+
+    /// `parent_from_node`: the matrix, or translation × rotation × scale.
+    fn transform(&self, id: usize, node: &Node) -> Result<DAffine3> {
+        let refuse = |expected: &str, found: String| {
+            Err(self.accessors.input.error(format!("node {id}"), expected, found))
+        };
+        let mut numbers = node.matrix.iter().flatten().chain(node.translation.iter().flatten());
+        let mut more = node.rotation.iter().flatten().chain(node.scale.iter().flatten());
+        // Renderers keep these in 32 bits; beyond them nothing sensible is meant.
+        let in_range = |x: &&f64| x.abs() > f64::from(f32::MAX);
+        if let Some(x) = numbers.find(in_range).or_else(|| more.find(in_range)) {
+            return refuse("a transform of finite 32-bit numbers", format!("{x:e}"));
+        }
+        if let Some(matrix) = &node.matrix {
+            let matrix = DMat4::from_cols_array(matrix);
+            if matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+                return refuse("a matrix whose last row is 0 0 0 1", matrix.row(3).to_string());
+            }
+            return Ok(DAffine3::from_mat4(matrix));
+        }
+        let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+        if rotation.length_squared() == 0.0 {
+            return refuse("a unit quaternion", rotation.to_string());
+        }
+        Ok(DAffine3::from_scale_rotation_translation(
+            DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
+            rotation.normalize(),
+            DVec3::from_array(node.translation.unwrap_or_default()),
+        ))
+    }
+
+    fn add_mesh(&mut self, mesh: usize, scene_from_mesh: DAffine3) -> Result<()> {
+        let meshes = &self.accessors.root.meshes;
+        let Some(json) = meshes.get(mesh) else {
+            let found = format!("{} of them", meshes.len());
+            return Err(self.accessors.input.error(
+                format!("mesh {mesh}"),
+                "a mesh that exists",
+                found,
+            ));
+        };
+        for (i, primitive) in json.primitives.iter().enumerate() {
+            let place = format!("mesh {mesh}, primitive {i}");
+            self.add_primitive(&place, primitive, scene_from_mesh)?;
+        }
+        Ok(())
+    }
+
+    /// Copies a primitive's vertices and triangles. One without positions shows nothing.
+    fn add_primitive(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        scene_from_mesh: DAffine3,
+    ) -> Result<()> {
+        let mode = primitive.mode.map_or(4, |mode| mode.0);
+        let Some(&Whole(position)) = primitive.attributes.get("POSITION") else { return Ok(()) };
+        if mode < 4 {
+            return Ok(());
+        }
+        let input = self.accessors.input;
+        let json = self.accessors.get(position)?;
+        if json.buffer_view.is_none()
+            && primitive.extensions.contains_key("KHR_draco_mesh_compression")
+        {
+            return Err(input.error(place, "plain positions", "KHR_draco_mesh_compression"));
+        }
+        let n_vertices = json.count.0;
+        let n_corners = match primitive.indices {
+            Some(indices) => self.accessors.get(indices.0)?.count.0,
+            None => n_vertices,
+        };
+        self.require_room(place, n_vertices, n_corners)?;
+        let quantized =
+            self.accessors.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
+        let allowed: &[Component] = if quantized {
+            &[Component::F32, Component::I8, Component::U8, Component::I16, Component::U16]
+        } else {
+            &[Component::F32]
+        };
+        let positions = self.accessors.vectors::<3>(position, allowed)?;
+        let corners = match primitive.indices {
+            Some(indices) => self.accessors.indices(indices.0)?,
+            None => (0..n_vertices as u32).collect(),
+        };
+        if let Some(id) = corners.iter().find(|&&id| id as usize >= n_vertices) {
+            return Err(input.error(place, format!("indices below {n_vertices}"), id.to_string()));
+        }
+        let Some(mut triangles) = triangles(mode, &corners) else {
+            return Err(input.error(place, "a mode from 0 to 6", mode.to_string()));
+        };
+        if scene_from_mesh.matrix3.determinant() < 0.0 {
+            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        let offset = self.parts.vertices.len();
+        let place_in_scene = |p: [f64; 3]| scene_from_mesh.transform_point3(DVec3::from_array(p));
+        self.parts.vertices.extend(positions.into_iter().map(place_in_scene));
+        self.add_colors(place, primitive, offset, n_vertices);
+        self.add_material(place, primitive, n_vertices, &triangles);
+        let shifted = triangles.into_iter().map(|triangle| triangle.map(|id| id + offset as u32));
+        self.parts.faces.extend(shifted);
+        Ok(())
+    }
+
+    /// Refuses what instances multiply beyond measure, before anything is reserved for it.
+    fn require_room(&self, place: &str, n_vertices: usize, n_corners: usize) -> Result<()> {
+        let n_bytes = self.accessors.buffers.n_loaded();
+        let max_vertices = FREE_VERTICES + n_bytes / 4;
+        let max_triangles = FREE_TRIANGLES + n_bytes / 2;
+        if self.parts.vertices.len().saturating_add(n_vertices) > max_vertices
+            || self.parts.faces.len().saturating_add(n_corners) > 3 * max_triangles
+        {
+            let expected = format!("at most {max_vertices} vertices from a file of this size");
+            let found = format!("{n_vertices} vertices and {n_corners} corners more");
+            return Err(self.accessors.input.error(place, expected, found));
+        }
+        Ok(())
+    }
+
+    /// `COLOR_0`, taken as it stands: the specification calls it linear, but what writes it and
+    /// what shows it in practice mean sRGB. Vertices without a colour are white.
+    fn add_colors(&mut self, place: &str, primitive: &Primitive, offset: usize, n_vertices: usize) {
+        let appearance = &mut self.parts.appearance;
+        let n_total = offset + n_vertices;
+        if let Some(&Whole(accessor)) = primitive.attributes.get("COLOR_0") {
+            let allowed = [Component::F32, Component::U8, Component::U16];
+            let kind = self.accessors.get(accessor).map(|json| (json.kind.as_str(), json.count.0));
+            let colors: Result<Vec<[u8; 4]>> = match kind {
+                Ok((_, count)) if count != n_vertices => Ok(Vec::new()),
+                Ok(("VEC3", _)) => self.accessors.vectors::<3>(accessor, &allowed).map(|colors| {
+                    colors
+                        .into_iter()
+                        .map(|[r, g, b]| rgba_from_floats([r, g, b, 1.0].map(|x| x as f32)))
+                        .collect()
+                }),
+                Ok(_) => self.accessors.vectors::<4>(accessor, &allowed).map(|colors| {
+                    colors
+                        .into_iter()
+                        .map(|color| rgba_from_floats(color.map(|x| x as f32)))
+                        .collect()
+                }),
+                Err(error) => Err(error),
+            };
+            match colors {
+                Ok(colors) if colors.len() == n_vertices => {
+                    let all = appearance.vertex_colors.get_or_insert_default();
+                    all.resize(offset, [255; 4]);
+                    all.extend(colors);
+                }
+                Ok(_) => appearance.notes.push(format!("{place}: not as many colours as vertices")),
+                Err(error) => appearance.notes.push(error.to_string()),
+            }
+        }
+        if let Some(all) = &mut appearance.vertex_colors {
+            all.resize(n_total, [255; 4]);
+        }
+    }
+
+    fn add_material(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        n_vertices: usize,
+        triangles: &[[u32; 3]],
+    ) {
+        let key = primitive.material.map(|material| material.0);
+        if !self.surfaces.contains_key(&key) {
+            let notes = &mut self.parts.appearance.notes;
+            let surface = Surface::read(self.accessors, key, &mut self.budget, notes);
+            self.surfaces.insert(key, (self.surfaces.len() as u32, surface));
+        }
+        let (number, surface) = &self.surfaces[&key];
+        let n_before = self.parts.faces.len();
+        self.material_of.resize(n_before + triangles.len(), *number);
+        let appearance = &mut self.parts.appearance;
+        let set = format!("TEXCOORD_{}", surface.uv_set);
+        let accessor =
+            primitive.attributes.get(&set).filter(|_| surface.material.texture.is_some());
+        if let Some(&Whole(accessor)) = accessor {
+            let fits = self.accessors.get(accessor).is_ok_and(|json| json.count.0 == n_vertices);
+            match surface.uvs(self.accessors, accessor) {
+                Ok(uvs) if fits => {
+                    let all = appearance.corner_uvs.get_or_insert_default();
+                    all.resize(n_before, [MISSING_UV; 3]);
+                    all.extend(triangles.iter().map(|ids| ids.map(|id| uvs[id as usize])));
+                }
+                Ok(_) => appearance
+                    .notes
+                    .push(format!("{place}: not as many texture coordinates as vertices")),
+                Err(error) => appearance.notes.push(error.to_string()),
+            }
+        }
+        if let Some(all) = &mut appearance.corner_uvs {
+            all.resize(n_before + triangles.len(), [MISSING_UV; 3]);
+        }
+    }
+
+    fn finish(mut self) -> MeshParts {
+        let appearance = &mut self.parts.appearance;
+        if self.surfaces.keys().any(Option::is_some) {
+            let mut surfaces: Vec<_> = self.surfaces.into_values().collect();
+            surfaces.sort_by_key(|&(number, _)| number);
+            appearance.materials =
+                surfaces.into_iter().map(|(_, surface)| surface.material).collect();
+            appearance.material_of = (appearance.materials.len() > 1).then_some(self.material_of);
+        }
+        self.parts.n_faces = self.parts.faces.len();
+        self.parts
+    }
+}
+
+/// Nodes that are nobody's child.
+fn parentless(nodes: &[Node]) -> Vec<Whole> {
+    let mut is_child = vec![false; nodes.len()];
+    for child in nodes.iter().flat_map(|node| &node.children) {
+        if let Some(flag) = is_child.get_mut(child.0) {
+            *flag = true;
+        }
+    }
+    (0..nodes.len()).filter(|&id| !is_child[id]).map(Whole).collect()
+}
+
+/// The triangles of a list (4), a strip (5) or a fan (6), with the corner order of glTF 2.0,
+/// section 3.7.2.1; `None` for another mode. Corners that do not complete a triangle are left over.
+fn triangles(mode: usize, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let windows = || corners.windows(3).enumerate();
+    match mode {
+        4 => Some(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()),
+        5 => Some(windows().map(|(i, c)| [c[0], c[1 + i % 2], c[2 - i % 2]]).collect()),
+        6 => Some(corners.windows(2).skip(1).map(|c| [c[0], c[1], corners[0]]).collect()),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_keep_their_winding() {
+        assert_eq!(triangles(5, &[0, 1, 2, 3, 4]).unwrap(), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
+        assert_eq!(triangles(6, &[0, 1, 2, 3]).unwrap(), [[1, 2, 0], [2, 3, 0]]);
+        assert_eq!(triangles(4, &[0, 1, 2, 3]).unwrap(), [[0, 1, 2]]);
+        assert!(triangles(6, &[0]).unwrap().is_empty());
+        assert!(triangles(7, &[0]).is_none());
+    }
+}

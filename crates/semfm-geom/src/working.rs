@@ -1,0 +1,177 @@
+//! The working mesh: what the original becomes before any map is computed, and the way back.
+
+use rayon::prelude::*;
+
+use crate::clean::{CleanReport, CleanSettings, Cleaned, clean};
+use crate::math::DVec3;
+use crate::simplify::{Simplified, SimplifyReport, SimplifySettings, simplify};
+use crate::surface::{SurfaceIndex, SurfacePoint};
+use crate::{Mesh, Result, Task};
+
+/// The cleaned, simplified mesh that maps are computed on, in the units of the original, and the
+/// index maps both ways.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorkingMesh {
+    /// The working mesh itself (n_working vertices); its vertices are vertices of the original.
+    pub mesh: Mesh,
+    /// For each vertex of the original (n): itself where it was kept, the vertex that it was
+    /// welded to, or the nearest corner of the working triangle nearest to it.
+    pub of_original: Vec<u32>,
+    /// For each working vertex, the original vertex that it is; ascending.
+    pub to_original: Vec<u32>,
+    /// For each vertex of the original (n), the point of the working surface that stands for it.
+    pub carriers: Vec<Carrier>,
+}
+
+/// A point of the working surface as a mix of three working vertices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carrier {
+    /// Working vertices.
+    pub corners: [u32; 3],
+    /// Their weights, each in [0, 1], adding up to 1.
+    pub weights: [f64; 3],
+}
+
+impl Carrier {
+    /// A working vertex itself.
+    pub fn vertex(id: u32) -> Self {
+        Self { corners: [id; 3], weights: [1.0, 0.0, 0.0] }
+    }
+
+    fn on(mesh: &Mesh, place: &SurfacePoint) -> Self {
+        Self { corners: mesh.faces()[place.face as usize], weights: place.barycentric }
+    }
+
+    /// The mix of the corners' values; `values` has one per working vertex.
+    pub fn mix(&self, values: &[f64]) -> f64 {
+        // The weight 1 is kept apart so that a kept vertex gets its value to the last bit.
+        if self.weights[0] == 1.0 {
+            return values[self.corners[0] as usize];
+        }
+        (0..3).map(|k| self.weights[k] * values[self.corners[k] as usize]).sum()
+    }
+}
+
+impl WorkingMesh {
+    /// Cleans, simplifies, and finds for each original vertex its place on the working surface.
+    ///
+    /// # Errors
+    /// [`NoArea`](crate::Error::NoArea), [`Cancelled`](crate::Error::Cancelled).
+    pub fn new(
+        original: &Mesh,
+        cleaning: &CleanSettings,
+        simplification: &SimplifySettings,
+        task: &Task,
+    ) -> Result<(Self, CleanReport, Option<SimplifyReport>)> {
+        let Cleaned { mesh: cleaned, of_original: clean_of, to_original: of_clean, report } =
+            clean(original, cleaning)?;
+        let Some(simplified) = simplify(&cleaned, simplification, task)? else {
+            let kept = |&clean: &Option<u32>| clean.map(Carrier::vertex);
+            let carriers = placed(original, &cleaned, clean_of.iter().map(kept).collect())?;
+            return Ok((Self::with(original, cleaned, of_clean, carriers), report, None));
+        };
+        let Simplified { mesh, to_before, of_before, report: simplification } = simplified;
+        let mut on_working: Vec<Carrier> =
+            of_before.iter().map(|place| Carrier::on(&mesh, place)).collect();
+        for (id, &clean) in (0u32..).zip(&to_before) {
+            on_working[clean as usize] = Carrier::vertex(id);
+        }
+        let carriers = clean_of.iter().map(|clean| clean.map(|id| on_working[id as usize]));
+        let carriers = placed(original, &mesh, carriers.collect())?;
+        let to_original = to_before.iter().map(|&clean| of_clean[clean as usize]).collect();
+        Ok((Self::with(original, mesh, to_original, carriers), report, Some(simplification)))
+    }
+
+    fn with(original: &Mesh, mesh: Mesh, to_original: Vec<u32>, carriers: Vec<Carrier>) -> Self {
+        let nearest_corner = |(carrier, p): (&Carrier, &DVec3)| {
+            let distance = |&id: &u32| mesh.vertices()[id as usize].distance_squared(*p);
+            let [a, b, c] = carrier.corners;
+            [b, c]
+                .into_iter()
+                .fold(a, |best, id| if distance(&id) < distance(&best) { id } else { best })
+        };
+        let of_original = carriers.iter().zip(original.vertices()).map(nearest_corner).collect();
+        Self { mesh, of_original, to_original, carriers }
+    }
+
+    /// Values on the working vertices, carried onto the original's vertices: exact where a vertex
+    /// was kept, linear on the working triangle nearest to it where it was not.
+    pub fn onto_original(&self, values: &[f64]) -> Vec<f64> {
+        assert_eq!(values.len(), self.mesh.n_vertices(), "one value per working vertex");
+        self.carriers.iter().map(|carrier| carrier.mix(values)).collect()
+    }
+
+    /// Values on the original's vertices, read off at the vertices that were kept.
+    pub fn onto_working(&self, values: &[f64]) -> Vec<f64> {
+        assert_eq!(values.len(), self.carriers.len(), "one value per original vertex");
+        self.to_original.iter().map(|&id| values[id as usize]).collect()
+    }
+}
+
+/// Fills in, by the nearest point of the surface, the carriers of vertices that cleaning dropped.
+fn placed(original: &Mesh, working: &Mesh, known: Vec<Option<Carrier>>) -> Result<Vec<Carrier>> {
+    if let Some(all) = known.iter().copied().collect() {
+        return Ok(all);
+    }
+    let surface = SurfaceIndex::new(working)?;
+    let place = |(known, &p): (Option<Carrier>, &DVec3)| {
+        // A vertex so far out that its squared distance overflows gets vertex 0: nothing refers to
+        // it, or cleaning would have kept it.
+        known.unwrap_or_else(|| {
+            surface.closest(p).map_or(Carrier::vertex(0), |place| Carrier::on(working, &place))
+        })
+    };
+    Ok(known.into_par_iter().zip(original.vertices()).map(place).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::zoo;
+
+    fn working(mesh: &Mesh, target_vertices: usize) -> WorkingMesh {
+        let simplification = SimplifySettings { target_vertices, most_distance: 0.2 };
+        WorkingMesh::new(mesh, &CleanSettings::default(), &simplification, &Task::default())
+            .unwrap()
+            .0
+    }
+
+    #[test]
+    fn on_the_whole_zoo_the_maps_name_the_same_places_in_the_same_order() {
+        for (name, mesh) in zoo::all() {
+            for target in [0, mesh.n_vertices() / 3] {
+                let working = working(&mesh, target);
+                assert_eq!(working.of_original.len(), mesh.n_vertices(), "{name}");
+                assert!(working.to_original.is_sorted(), "{name}: the order changed");
+                for (id, &original) in (0u32..).zip(&working.to_original) {
+                    let p = mesh.vertices()[original as usize];
+                    assert_eq!(working.mesh.vertices()[id as usize], p, "{name}");
+                    assert_eq!(working.of_original[original as usize], id, "{name}");
+                }
+                let values: Vec<f64> = (0..working.mesh.n_vertices()).map(|i| i as f64).collect();
+                let back = working.onto_working(&working.onto_original(&values));
+                assert_eq!(back, values, "{name}: there and back is not the identity");
+            }
+        }
+    }
+
+    #[test]
+    fn a_linear_function_comes_back_linear_where_the_surface_is_flat() {
+        let grid = zoo::open_grid(30, 20);
+        let points = grid.vertices().iter().map(|p| DVec3::new(p.x, p.y, 0.0)).collect();
+        let mesh = Mesh::new(points, grid.faces().to_vec()).unwrap();
+        let working = working(&mesh, 100);
+        let x: Vec<f64> = working.mesh.vertices().iter().map(|p| p.x).collect();
+        for (x, p) in working.onto_original(&x).iter().zip(mesh.vertices()) {
+            assert!((x - p.x).abs() < 1e-12, "found {x} at {p}");
+        }
+    }
+
+    #[test]
+    fn a_vertex_that_nothing_refers_to_still_gets_an_answer() {
+        let points = vec![DVec3::ZERO, 4.0 * DVec3::X, DVec3::X, DVec3::Y];
+        let working = working(&Mesh::new(points, vec![[0, 2, 3]]).unwrap(), 0);
+        assert_eq!(working.of_original, [0, 1, 1, 2]);
+        assert_eq!(working.onto_original(&[1.0, 2.0, 3.0]), [1.0, 2.0, 2.0, 3.0]);
+    }
+}

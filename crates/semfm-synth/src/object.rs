@@ -1,0 +1,279 @@
+//! One object: a closed mesh of a smooth union, with part labels and its true grip region.
+
+use std::f64::consts::PI;
+
+use isosurface::MarchingCubes;
+use isosurface::distance::Signed;
+use isosurface::extractor::IndexedVertices;
+use isosurface::math::Vec3;
+use isosurface::sampler::Sampler;
+use isosurface::source::ScalarSource;
+use rayon::prelude::*;
+use semfm_geom::connectivity::components;
+use semfm_geom::math::{DMat3, DVec3, bounds};
+use semfm_geom::simplify::{SimplifySettings, simplify};
+use semfm_geom::{Mesh, Task};
+
+use crate::sdf::smooth_min;
+use crate::seed::{Draw, stream};
+use crate::shapes::{Part, blueprint};
+use crate::{Category, Result};
+
+/// What to make.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectSettings {
+    /// Vertices aimed at; the count reached is close to it.
+    pub n_vertices: usize,
+    /// Holes torn into the surface, as single-view reconstructions have them.
+    pub holes: usize,
+    /// Detached blobs floating near the surface, likewise.
+    pub floaters: usize,
+    /// Seed of the proportions, the damage and the pose.
+    pub seed: u64,
+}
+
+impl Default for ObjectSettings {
+    fn default() -> Self {
+        Self { n_vertices: 3000, holes: 0, floaters: 0, seed: 0 }
+    }
+}
+
+/// A procedural object with everything that is known about it.
+#[derive(Clone, Debug)]
+pub struct SynthObject {
+    /// Its category.
+    pub category: Category,
+    /// Number within the category; six kinds take turns.
+    pub instance: usize,
+    /// Hammer, pickaxe, mug …
+    pub kind: &'static str,
+    /// The surface, bounding-box diagonal 1, in a random upright-ish pose.
+    pub mesh: Mesh,
+    /// Distinct part names, sorted.
+    pub part_names: Vec<&'static str>,
+    /// Part of each vertex (n), an index into `part_names`.
+    pub parts: Vec<u8>,
+    /// Whether each vertex (n) lies in the true grip region.
+    pub region: Vec<bool>,
+    /// The seed it was made from.
+    pub seed: u64,
+}
+
+impl SynthObject {
+    /// A short name, unique among objects: `containers_3_s0`.
+    pub fn name(&self) -> String {
+        format!("{}_{}_s{}", self.category, self.instance, self.seed)
+    }
+}
+
+/// Makes the `instance`-th object of a category.
+///
+/// The same arguments give the same object on every machine and thread count.
+///
+/// # Errors
+/// Only where the ground floor refuses the mesh, which a blueprint never causes.
+pub fn make_object(
+    category: Category,
+    instance: usize,
+    settings: &ObjectSettings,
+) -> Result<SynthObject> {
+    let key = [category.name(), &instance.to_string(), &settings.seed.to_string()];
+    let mut draw = stream(&key);
+    let plan = blueprint(category, instance, &mut draw);
+    let field = |p: DVec3| {
+        let distances = plan.parts.iter().map(|part| part.field.at(p).distance);
+        distances.reduce(|a, b| smooth_min(a, b, plan.blend)).unwrap_or(f64::INFINITY)
+    };
+    let grid = Grid::around(&field, settings.n_vertices);
+    let mut distances = grid.sample(&field);
+    grid.float(&mut distances, settings.floaters, &mut draw);
+    let dense = grid.mesh(&distances)?;
+    let whole = if settings.floaters == 0 { largest_component(&dense)? } else { dense };
+    let mut mesh = thin_out(whole, settings.n_vertices)?;
+    if settings.holes > 0 {
+        mesh = tear(&mesh, settings.holes, &mut draw)?;
+    }
+    let labels: Vec<usize> =
+        mesh.vertices().iter().map(|&p| nearest_part(&plan.parts, p)).collect();
+    let mut part_names: Vec<&'static str> = plan.parts.iter().map(|part| part.name).collect();
+    part_names.sort_unstable();
+    part_names.dedup();
+    let name_of =
+        |label: usize| part_names.binary_search(&plan.parts[label].name).unwrap_or(0) as u8;
+    let parts = labels.iter().map(|&label| name_of(label)).collect();
+    let region = mesh
+        .vertices()
+        .iter()
+        .zip(&labels)
+        .map(|(&p, &label)| plan.parts[label].holds(p))
+        .collect();
+    let mesh = pose(&mesh, &mut draw)?;
+    Ok(SynthObject {
+        category,
+        instance,
+        kind: plan.kind,
+        mesh,
+        part_names,
+        parts,
+        region,
+        seed: settings.seed,
+    })
+}
+
+fn nearest_part(parts: &[Part], p: DVec3) -> usize {
+    let distances = parts.iter().map(|part| part.field.at(p).distance);
+    distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(label, _)| label)
+}
+
+/// A cubic lattice around the object, fine enough for the vertices asked.
+struct Grid {
+    origin: DVec3,
+    spacing: f64,
+    /// Lattice points along each edge of the cube.
+    n: usize,
+    /// Points along x, y, z that can hold surface; the rest of the cube is outside.
+    used: [usize; 3],
+}
+
+/// No blueprint reaches beyond these corners.
+const WORLD: (DVec3, DVec3) = (DVec3::new(-1.6, -1.2, -1.2), DVec3::new(1.9, 1.2, 2.0));
+/// Spacing of the first look at where the object is.
+const COARSE: f64 = 0.05;
+/// Marching cubes gives about this many vertices per lattice square of surface.
+const VERTICES_PER_SQUARE: f64 = 1.5;
+/// Finer than aimed at by this factor, then thinned out: evener triangles than marching cubes'.
+const OVERSAMPLING: f64 = 1.6;
+/// Thinning may move the surface by this share of the object's diagonal; no blueprint comes near.
+const FARTHEST_FROM_LATTICE: f64 = 0.05;
+/// Finest and coarsest lattice: thin blades need .03, memory forbids less than .008.
+const SPACING: (f64, f64) = (0.008, 0.03);
+
+impl Grid {
+    fn around(field: &(impl Fn(DVec3) -> f64 + Sync), n_vertices: usize) -> Self {
+        let extent = (WORLD.1 - WORLD.0) / COARSE;
+        let [nx, ny, nz] = [extent.x, extent.y, extent.z].map(|e| e.ceil() as usize);
+        let near: Vec<(DVec3, f64)> = (0..nx * ny * nz)
+            .into_par_iter()
+            .map(|i| {
+                WORLD.0
+                    + COARSE
+                        * DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64)
+            })
+            .map(|p| (p, field(p)))
+            .filter(|&(_, d)| d < 0.06)
+            .collect();
+        let points: Vec<DVec3> = near.iter().map(|&(p, _)| p).collect();
+        let (low, high) =
+            bounds(&points).expect("a blueprint has at least one part inside the world");
+        let (low, high) = (low - 0.16, high + 0.16);
+        let shell = near.iter().filter(|(_, d)| d.abs() < COARSE / 2.0).count();
+        let area = shell as f64 * COARSE * COARSE;
+        let wanted = n_vertices as f64 * OVERSAMPLING;
+        let spacing = (VERTICES_PER_SQUARE * area / wanted).sqrt().clamp(SPACING.0, SPACING.1);
+        let used = ((high - low) / spacing).to_array().map(|e| e.ceil() as usize + 1);
+        Self { origin: low, spacing, n: used.into_iter().max().unwrap_or(2), used }
+    }
+
+    fn point(&self, i: usize) -> DVec3 {
+        let [nx, ny, _] = self.used;
+        self.origin
+            + self.spacing * DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64)
+    }
+
+    fn sample(&self, field: &(impl Fn(DVec3) -> f64 + Sync)) -> Vec<f32> {
+        let [nx, ny, nz] = self.used;
+        (0..nx * ny * nz).into_par_iter().map(|i| field(self.point(i)) as f32).collect()
+    }
+
+    /// Adds `count` blobs a little way off the surface.
+    fn float(&self, distances: &mut [f32], count: usize, draw: &mut Draw) {
+        let off: Vec<usize> =
+            (0..distances.len()).filter(|&i| (0.09..0.13).contains(&distances[i])).collect();
+        for _ in 0..count.min(off.len()) {
+            let centre = self.point(off[draw.below(off.len())]);
+            let radius = draw.between(0.03, 0.06);
+            for (i, d) in distances.iter_mut().enumerate() {
+                *d = d.min((self.point(i).distance(centre) - radius) as f32);
+            }
+        }
+    }
+
+    /// The zero level as a mesh.
+    fn mesh(&self, distances: &[f32]) -> Result<Mesh> {
+        struct Lattice<'a>(&'a Grid, &'a [f32]);
+        impl ScalarSource for Lattice<'_> {
+            fn sample_scalar(&self, p: Vec3) -> Signed {
+                let steps = (self.0.n - 1) as f32;
+                let [x, y, z] = [p.x, p.y, p.z].map(|t| (t * steps).round() as usize);
+                let [nx, ny, nz] = self.0.used;
+                let outside = x >= nx || y >= ny || z >= nz;
+                Signed(if outside { f32::MAX } else { self.1[(z * ny + y) * nx + x] })
+            }
+        }
+        let (mut coordinates, mut ids) = (Vec::new(), Vec::new());
+        let lattice = Lattice(self, distances);
+        MarchingCubes::<Signed>::new(self.n).extract(
+            &Sampler::new(&lattice),
+            &mut IndexedVertices::new(&mut coordinates, &mut ids),
+        );
+        let side = self.spacing * (self.n - 1) as f64;
+        let (corners, _) = coordinates.as_chunks::<3>();
+        let vertices = corners
+            .iter()
+            .map(|c| self.origin + side * DVec3::new(c[0].into(), c[1].into(), c[2].into()))
+            .collect();
+        let (faces, _) = ids.as_chunks::<3>();
+        Ok(Mesh::new(vertices, faces.to_vec())?)
+    }
+}
+
+/// The component with most vertices: thin parts of a coarse lattice may leave crumbs.
+fn largest_component(mesh: &Mesh) -> Result<Mesh> {
+    let components = components(mesh);
+    let mut sizes = vec![0usize; components.count];
+    components.of_vertex.iter().for_each(|&component| sizes[component as usize] += 1);
+    let largest = (0..sizes.len()).rev().max_by_key(|&component| sizes[component]).unwrap_or(0);
+    keep(mesh, |face| components.of_vertex[mesh.faces()[face][0] as usize] as usize == largest)
+}
+
+/// Collapses edges until `n_vertices` are left.
+fn thin_out(mesh: Mesh, n_vertices: usize) -> Result<Mesh> {
+    let settings =
+        SimplifySettings { target_vertices: n_vertices, most_distance: FARTHEST_FROM_LATTICE };
+    let thinned = simplify(&mesh, &settings, &Task::default())?;
+    Ok(thinned.map_or(mesh, |thinned| thinned.mesh))
+}
+
+/// Tears `count` round holes of 4 to 9 % of the world into the surface.
+fn tear(mesh: &Mesh, count: usize, draw: &mut Draw) -> Result<Mesh> {
+    let centre = |face: usize| mesh.corners(face).iter().sum::<DVec3>() / 3.0;
+    let holes: Vec<(DVec3, f64)> = (0..count)
+        .map(|_| (centre(draw.below(mesh.n_faces())), draw.between(0.04, 0.09)))
+        .collect();
+    keep(mesh, |face| holes.iter().all(|&(hole, radius)| centre(face).distance(hole) >= radius))
+}
+
+/// The triangles that `wanted` names, with the vertices that they use, in the same order.
+fn keep(mesh: &Mesh, wanted: impl Fn(usize) -> bool) -> Result<Mesh> {
+    let faces: Vec<[u32; 3]> =
+        (0..mesh.n_faces()).filter(|&face| wanted(face)).map(|face| mesh.faces()[face]).collect();
+    let mut used: Vec<u32> = faces.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut new_id = vec![u32::MAX; mesh.n_vertices()];
+    (0..).zip(&used).for_each(|(new, &old)| new_id[old as usize] = new);
+    let vertices = used.iter().map(|&old| mesh.vertices()[old as usize]).collect();
+    let faces = faces.iter().map(|ids| ids.map(|id| new_id[id as usize])).collect();
+    Ok(Mesh::new(vertices, faces)?)
+}
+
+/// Centres the object, scales its bounding-box diagonal to 1 and turns it: any heading, a little tilt.
+fn pose(mesh: &Mesh, draw: &mut Draw) -> Result<Mesh> {
+    let (low, high) = mesh.bounds();
+    let heading = DMat3::from_rotation_z(draw.between(-PI, PI));
+    let tilt =
+        DMat3::from_rotation_y(0.25 * draw.normal()) * DMat3::from_rotation_x(0.25 * draw.normal());
+    let turn = heading * tilt * (1.0 / mesh.diagonal());
+    let vertices = mesh.vertices().iter().map(|&p| turn * (p - (low + high) / 2.0)).collect();
+    Ok(Mesh::new(vertices, mesh.faces().to_vec())?)
+}

@@ -1,0 +1,192 @@
+//! The object's own frame: principal axes of its surface, with signs that turn with the object.
+
+use semfm_geom::Mesh;
+use semfm_geom::math::{DMat3, DVec3};
+
+use crate::Result;
+
+/// Skewness (third moment over σ³) below which an axis counts as symmetric and takes its sign
+/// from the file's frame: sampling noise of mirror-symmetric meshes stays under it.
+const SYMMETRIC_SKEWNESS: f64 = 1e-6;
+
+/// Sweeps of Jacobi rotations; a 3×3 matrix is diagonal to machine precision after five or six.
+const JACOBI_SWEEPS: usize = 12;
+
+/// Rotation `frame_from_object` whose rows are the principal axes of the surface: x of the
+/// smallest variance, z ("up" in every picture) of the largest, right-handed.
+///
+/// Moments are exact integrals over the triangles, so they do not depend on the tessellation.
+/// z, and the more skewed of x and y, point towards their longer tail (positive third moment);
+/// the last axis follows by handedness. A rotated object has the rotated frame, as long as its
+/// variances differ.
+///
+/// # Errors
+/// [`semfm_geom::Error::NoArea`] where every triangle is degenerate.
+pub fn principal_frame(mesh: &Mesh) -> Result<DMat3> {
+    let scale = mesh.diagonal();
+    let (area, centroid) = area_and_centroid(mesh);
+    if !(area > 0.0 && area.is_finite() && scale.is_finite()) {
+        return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
+    }
+    // In units of the diagonal, so that neither kilometres nor micrometres leave f64's range.
+    let to_unit = |p: DVec3| (p - centroid) / scale;
+    let mut covariance = DMat3::ZERO;
+    for face in 0..mesh.n_faces() {
+        let corners = mesh.corners(face).map(to_unit);
+        let sum = corners[0] + corners[1] + corners[2];
+        // ∫ x xᵀ over a triangle = area/12 · (Σ aᵢ aᵢᵀ + s sᵀ), s the sum of the corners.
+        let moment: DMat3 = corners.iter().map(|&a| outer(a)).fold(outer(sum), |m, a| m + a);
+        covariance += moment * (mesh.face_area(face) / area / 12.0);
+    }
+    let (variances, axes) = eigen_ascending(covariance);
+    let skewness = [0, 1, 2].map(|axis| {
+        let third: f64 = (0..mesh.n_faces())
+            .map(|face| {
+                let heights = mesh.corners(face).map(|p| to_unit(p).dot(axes[axis]));
+                mesh.face_area(face) / area * mean_cube(heights)
+            })
+            .sum();
+        third / variances[axis].max(f64::MIN_POSITIVE).powf(1.5)
+    });
+    let signed = |axis: usize| axes[axis] * sign(skewness[axis], axes[axis]);
+    let z = signed(2);
+    Ok(if skewness[0].abs() > skewness[1].abs() {
+        let x = signed(0);
+        DMat3::from_cols(x, z.cross(x), z).transpose()
+    } else {
+        let y = signed(1);
+        DMat3::from_cols(y.cross(z), y, z).transpose()
+    })
+}
+
+/// Positions of the vertices that some triangle uses: strays must not shrink the object's pictures.
+pub(crate) fn surface_vertices(mesh: &Mesh) -> Vec<DVec3> {
+    let mut used = vec![false; mesh.n_vertices()];
+    for &id in mesh.faces().iter().flatten() {
+        used[id as usize] = true;
+    }
+    mesh.vertices().iter().zip(used).filter_map(|(&p, used)| used.then_some(p)).collect()
+}
+
+fn area_and_centroid(mesh: &Mesh) -> (f64, DVec3) {
+    let (low, _) = mesh.bounds();
+    let mut area = 0.0;
+    let mut first = DVec3::ZERO;
+    for face in 0..mesh.n_faces() {
+        let [a, b, c] = mesh.corners(face).map(|p| p - low);
+        let weight = mesh.face_area(face);
+        area += weight;
+        first += (a + b + c) * (weight / 3.0);
+    }
+    (area, low + first / area)
+}
+
+fn outer(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a * a.x, a * a.y, a * a.z)
+}
+
+/// Mean of s³ over a triangle on which s is linear with these corner values: a tenth of the sum
+/// of all ten monomials of degree three.
+fn mean_cube([a, b, c]: [f64; 3]) -> f64 {
+    (a * a * (a + b + c) + b * b * (a + b + c) + c * c * (a + b + c) + a * b * c) / 10.0
+}
+
+fn sign(skewness: f64, axis: DVec3) -> f64 {
+    if skewness.abs() > SYMMETRIC_SKEWNESS {
+        return skewness.signum();
+    }
+    let [x, y, z] = axis.to_array();
+    let largest = if x.abs() >= y.abs() && x.abs() >= z.abs() {
+        x
+    } else if y.abs() >= z.abs() {
+        y
+    } else {
+        z
+    };
+    if largest < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Eigenvalues and unit eigenvectors of a symmetric matrix, ascending (Jacobi 1846).
+fn eigen_ascending(matrix: DMat3) -> ([f64; 3], [DVec3; 3]) {
+    let mut a = matrix.transpose().to_cols_array_2d(); // row-major; the matrix is symmetric
+    let mut v = DMat3::IDENTITY.to_cols_array_2d(); // v[k]: row k of the eigenvector matrix
+    for _ in 0..JACOBI_SWEEPS {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+            let (c, s) = (1.0 / t.hypot(1.0), t / t.hypot(1.0));
+            for row in a.iter_mut().chain(v.iter_mut()) {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+            }
+            let (row_p, row_q) = (a[p], a[q]);
+            for (k, (x, y)) in row_p.into_iter().zip(row_q).enumerate() {
+                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
+            }
+        }
+    }
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
+    let axis = |i: usize| DVec3::new(v[0][i], v[1][i], v[2][i]).normalize_or(DVec3::AXES[i]);
+    (order.map(|i| a[i][i]), order.map(axis))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lopsided tetrahedron: three different variances, all of them skewed.
+    fn lopsided() -> Mesh {
+        let corners = [[0.0, 0.0, 0.0], [3.0, 0.2, 0.1], [0.3, 1.4, 0.0], [0.2, 0.1, 0.6]];
+        let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap()
+    }
+
+    fn moved(mesh: &Mesh, turn: DMat3, scale: f64, shift: DVec3) -> Mesh {
+        let vertices = mesh.vertices().iter().map(|&p| turn * p * scale + shift).collect();
+        Mesh::new(vertices, mesh.faces().to_vec()).unwrap()
+    }
+
+    #[test]
+    fn the_frame_turns_with_the_object() {
+        let mesh = lopsided();
+        let frame = principal_frame(&mesh).unwrap();
+        assert!((frame.determinant() - 1.0).abs() < 1e-12);
+        for (k, scale) in [1e-6, 1.0, 1e5].into_iter().enumerate() {
+            let turn = DMat3::from_rotation_z(1.0 + k as f64) * DMat3::from_rotation_x(2.0);
+            let turned = moved(&mesh, turn, scale, DVec3::splat(3.0 * scale));
+            let difference = principal_frame(&turned).unwrap() * turn - frame;
+            assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-9), "{difference}");
+        }
+    }
+
+    #[test]
+    fn the_frame_does_not_see_the_tessellation() {
+        let mesh = lopsided();
+        let mut vertices = mesh.vertices().to_vec();
+        let mut faces = Vec::new();
+        for (face, &[a, b, c]) in mesh.faces().iter().enumerate() {
+            let [p, q, r] = mesh.corners(face);
+            let middle = vertices.len() as u32;
+            vertices.push(0.7 * p + 0.2 * q + 0.1 * r);
+            faces.extend([[a, b, middle], [b, c, middle], [c, a, middle]]);
+        }
+        let finer = Mesh::new(vertices, faces).unwrap();
+        let difference = principal_frame(&finer).unwrap() - principal_frame(&mesh).unwrap();
+        assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-12), "{difference}");
+    }
+
+    #[test]
+    fn a_flat_symmetric_plate_still_has_a_frame() {
+        let corners = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]];
+        let faces = vec![[0, 1, 2], [0, 2, 3]];
+        let plate = Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap();
+        let frame = principal_frame(&plate).unwrap();
+        assert!((frame.row(2) - DVec3::X).length() < 1e-12);
+        assert!(frame.row(0).z.abs() > 1.0 - 1e-12);
+        let line = Mesh::new(vec![DVec3::ZERO, DVec3::X, 2.0 * DVec3::X], vec![[0, 1, 2]]).unwrap();
+        assert!(principal_frame(&line).unwrap_err().to_string().contains("no area"));
+    }
+}

@@ -1,0 +1,160 @@
+//! Gathers the cameras of a file from its `/views/NNN/camera` and `/tf` messages.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::path::Path;
+
+use foxglove::Decode;
+use foxglove::messages::{CameraCalibration, FrameTransform};
+use semfm_geom::math::DAffine3;
+
+use super::frames::{TF, parse_frame, read_camera, read_transform, topic};
+use super::reader::Message;
+use crate::{Camera, Error, Result};
+
+/// The largest number of views that a file of ours may have; guards sums over hostile numbers.
+const VIEWS_AT_MOST: usize = 100_000;
+
+/// Calibrations and poses seen so far, by view.
+#[derive(Default)]
+pub(super) struct Cameras {
+    calibrations: BTreeMap<usize, CameraCalibration>,
+    poses: BTreeMap<usize, DAffine3>,
+}
+
+impl Cameras {
+    /// Takes a camera message of a view.
+    pub fn calibration(&mut self, path: &Path, view: usize, message: &Message<'_>) -> Result<()> {
+        let calibration = decode(path, message, "foxglove.CameraCalibration")?;
+        insert_once(&mut self.calibrations, view, calibration, path, message)
+    }
+
+    /// Takes a transform; frames that are not those of views are none of ours.
+    pub fn transform(&mut self, path: &Path, message: &Message<'_>) -> Result<()> {
+        let transform: FrameTransform = decode(path, message, "foxglove.FrameTransform")?;
+        let Some(view) = parse_frame(&transform.child_frame_id) else { return Ok(()) };
+        let pose = read_transform(&transform)
+            .map_err(|(expected, found)| message_error(path, message, &expected, found))?;
+        insert_once(&mut self.poses, view, pose, path, message)
+    }
+
+    /// One camera for each of the views 0 to `n_views` − 1, all of the size that the file names.
+    pub fn finish(&self, path: &Path, n_views: usize, size: (u32, u32)) -> Result<Vec<Camera>> {
+        check_count(path, "/views/NNN/camera", n_views, self.calibrations.len())?;
+        check_count(path, TF, n_views, self.poses.len())?;
+        (0..n_views).map(|view| self.camera(path, view, size)).collect()
+    }
+
+    /// The camera of one view.
+    pub fn camera(&self, path: &Path, view: usize, size: (u32, u32)) -> Result<Camera> {
+        let camera_topic = topic(view, "camera");
+        let calibration = self
+            .calibrations
+            .get(&view)
+            .ok_or_else(|| topic_error(path, &camera_topic, "one message", "none"))?;
+        let pose = self.poses.get(&view).ok_or_else(|| {
+            topic_error(path, TF, &format!("a transform of view {view:03}"), "none")
+        })?;
+        let camera = read_camera(calibration, view, *pose)
+            .map_err(|(expected, found)| topic_error(path, &camera_topic, &expected, found))?;
+        if (camera.width, camera.height) != size {
+            let expected = format!("{} × {} pixels, as the metadata say", size.0, size.1);
+            let found = format!("{} × {}", camera.width, camera.height);
+            return Err(topic_error(path, &camera_topic, &expected, found));
+        }
+        Ok(camera)
+    }
+}
+
+/// Decodes a message whose channel must have the given schema.
+pub(super) fn decode<T: Decode>(path: &Path, message: &Message<'_>, schema: &str) -> Result<T> {
+    let channel = message.channel;
+    let found = channel.schema.as_ref().map_or("none", |schema| schema.name.as_str());
+    if found != schema || channel.message_encoding != "protobuf" {
+        let found = format!("`{found}` encoded as `{}`", channel.message_encoding);
+        let expected = format!("the schema `{schema}` encoded as `protobuf`");
+        return Err(message_error(path, message, &expected, found));
+    }
+    T::decode(message.data)
+        .map_err(|error| message_error(path, message, &format!("a `{schema}`"), error.to_string()))
+}
+
+/// Keeps a view's item; a second one is refused.
+pub(super) fn insert_once<T>(
+    items: &mut BTreeMap<usize, T>,
+    view: usize,
+    item: T,
+    path: &Path,
+    message: &Message<'_>,
+) -> Result<()> {
+    match items.entry(view) {
+        Entry::Vacant(entry) => {
+            entry.insert(item);
+            Ok(())
+        }
+        Entry::Occupied(_) => {
+            let expected = format!("one message for view {view:03}");
+            Err(message_error(path, message, &expected, "a second one".to_owned()))
+        }
+    }
+}
+
+/// As many items as the metadata record says.
+pub(super) fn check_count(path: &Path, topic: &str, expected: usize, found: usize) -> Result<()> {
+    if expected == 0 || expected > VIEWS_AT_MOST {
+        let allowed = format!("1 to {VIEWS_AT_MOST} views");
+        return Err(topic_error(path, "metadata", &allowed, expected.to_string()));
+    }
+    match expected == found {
+        true => Ok(()),
+        false => {
+            let expected = format!("{expected} views, as the metadata say");
+            Err(topic_error(path, topic, &expected, found.to_string()))
+        }
+    }
+}
+
+/// An error that names topic and message.
+pub(super) fn message_error(
+    path: &Path,
+    message: &Message<'_>,
+    expected: &str,
+    found: String,
+) -> Error {
+    let place = format!("topic {}, message {}", message.channel.topic, message.index);
+    Error::Format { path: path.to_path_buf(), place, expected: expected.to_owned(), found }
+}
+
+/// An error that names a topic.
+pub(super) fn topic_error(
+    path: &Path,
+    topic: &str,
+    expected: &str,
+    found: impl Into<String>,
+) -> Error {
+    Error::Format {
+        path: path.to_path_buf(),
+        place: format!("topic {topic}"),
+        expected: expected.to_owned(),
+        found: found.into(),
+    }
+}
+
+/// A camera that a file can hold: rigid, finite, with pixels.
+pub(super) fn check_camera(view: usize, camera: &Camera) -> Result<()> {
+    let rotation = camera.camera_from_object.matrix3;
+    let off = (rotation.transpose() * rotation) - semfm_geom::math::DMat3::IDENTITY;
+    let largest = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    let is_rigid = largest < 1e-9 && rotation.determinant() > 0.0;
+    let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
+    let is_finite =
+        numbers.iter().all(|x| x.is_finite()) && camera.camera_from_object.translation.is_finite();
+    if is_rigid && is_finite && camera.fx > 0.0 && camera.fy > 0.0 {
+        return Ok(());
+    }
+    Err(Error::Invalid {
+        what: format!("camera of view {view:03}"),
+        expected: "finite intrinsics and a rigid pose".to_owned(),
+        found: format!("{camera:?}"),
+    })
+}

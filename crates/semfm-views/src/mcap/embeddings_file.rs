@@ -1,0 +1,312 @@
+//! `NAME.emb.mcap`: what an encoder made of each view, with the cameras.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use foxglove::bytes::Bytes;
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use semfm_geom::Mesh;
+
+use super::cameras::{
+    Cameras, check_camera, check_count, decode, insert_once, message_error, topic_error,
+};
+use super::frames::{TF, calibration, frame, parse_topic, topic, transform};
+use super::inspect::METADATA_NAME;
+use super::metadata::EmbeddingsMetadata;
+use super::reader::{Message, read_messages};
+use super::schema::{PATCH_EMBEDDINGS, PatchEmbeddingsMessage};
+use super::views_file::time_of;
+use super::writer::{McapFile, Packing, timestamp, write_file};
+use crate::{EmbeddedView, Error, PatchEmbeddings, Result};
+
+/// How vectors are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Dtype {
+    /// Half precision: three decimal digits, half the size. Normalised features lose nothing that
+    /// matters to a cosine.
+    #[default]
+    F16,
+    /// Single precision.
+    F32,
+}
+
+impl Dtype {
+    fn name(self) -> &'static str {
+        match self {
+            Self::F16 => "f16",
+            Self::F32 => "f32",
+        }
+    }
+
+    fn parse(name: &str) -> Option<Self> {
+        [Self::F16, Self::F32].into_iter().find(|dtype| dtype.name() == name)
+    }
+
+    /// Bytes of one number.
+    fn n_bytes(self) -> usize {
+        match self {
+            Self::F16 => 2,
+            Self::F32 => 4,
+        }
+    }
+}
+
+/// The embeddings of an object's views.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmbeddingsFile {
+    /// The file they came from, for messages; empty for one that was never written.
+    pub path: PathBuf,
+    /// Of which mesh, by which encoder.
+    pub metadata: EmbeddingsMetadata,
+    /// The views, as numbered; at least one, all of the same dimension.
+    pub views: Vec<EmbeddedView>,
+}
+
+impl EmbeddingsFile {
+    /// Reads an embeddings file and checks everything in it.
+    ///
+    /// # Errors
+    /// [`Error::Container`] for a damaged file; [`Error::Format`] with topic and message for
+    /// inconsistent dimensions, numbers that are not finite in a valid patch, wrong lengths, missing
+    /// or non-rigid cameras and wrong counts.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut cameras = Cameras::default();
+        let mut patches: BTreeMap<usize, PatchEmbeddings> = BTreeMap::new();
+        let contents = read_messages(path, |message| match parse_topic(&message.channel.topic) {
+            Some((view, "camera")) => cameras.calibration(path, view, &message),
+            Some((view, "embeddings")) => {
+                let grid = read_grid(path, view, &message)?;
+                if let Some(first) = patches.values().next().filter(|p| p.dim != grid.dim) {
+                    let expected = format!("dimension {}, as in the views before", first.dim);
+                    return Err(message_error(path, &message, &expected, grid.dim.to_string()));
+                }
+                insert_once(&mut patches, view, grid, path, &message)
+            }
+            _ if message.channel.topic == TF => cameras.transform(path, &message),
+            _ => Ok(()),
+        })?;
+        let (metadata, n_views) = EmbeddingsMetadata::read(path, &contents.metadata)?;
+        check_count(path, "/views/NNN/embeddings", n_views, patches.len())?;
+        let size = (metadata.views.width, metadata.views.height);
+        let cameras = cameras.finish(path, n_views, size)?;
+        let views = cameras.into_iter().enumerate().map(|(view, camera)| {
+            let missing = || topic_error(path, &topic(view, "embeddings"), "one message", "none");
+            let patches = patches.remove(&view).ok_or_else(missing)?;
+            Ok(EmbeddedView { camera, patches })
+        });
+        Ok(Self { path: path.to_path_buf(), metadata, views: views.collect::<Result<_>>()? })
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where [`read`](Self::read) would refuse the file, [`Error::Io`].
+    pub fn write(&self, path: &Path, dtype: Dtype) -> Result<()> {
+        self.check()?;
+        write_file(path, Packing::Plain, |file| {
+            file.metadata(METADATA_NAME, self.metadata.entries(self.views.len()))?;
+            for (view, embedded) in self.views.iter().enumerate() {
+                write_view(file, view, embedded, dtype)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Refuses to be used with another mesh than the one the views were made of.
+    ///
+    /// # Errors
+    /// [`Error::OtherMesh`], naming both.
+    pub fn check_mesh(&self, mesh: &Mesh) -> Result<()> {
+        self.metadata.views.mesh.check(mesh, &self.path)
+    }
+
+    /// Dimension of the embeddings; 0 without views.
+    pub fn dim(&self) -> usize {
+        self.views.first().map_or(0, |view| view.patches.dim)
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.views.is_empty() {
+            return Err(invalid("views".to_owned(), "at least one", "none"));
+        }
+        let size = (self.metadata.views.width, self.metadata.views.height);
+        for (view, embedded) in self.views.iter().enumerate() {
+            check_camera(view, &embedded.camera)?;
+            let found = (embedded.camera.width, embedded.camera.height);
+            if found != size {
+                let what = format!("image size of view {view:03}");
+                return Err(invalid(what, format!("{size:?}"), format!("{found:?}")));
+            }
+            check_grid(&embedded.patches, self.dim())
+                .map_err(|(expected, found)| invalid(format!("view {view:03}"), expected, found))?;
+        }
+        Ok(())
+    }
+}
+
+fn invalid(what: String, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    Error::Invalid { what, expected: expected.into(), found: found.into() }
+}
+
+/// Lengths and numbers of a grid; on failure what was expected and found.
+fn check_grid(patches: &PatchEmbeddings, dim: usize) -> std::result::Result<(), (String, String)> {
+    let n_patches = patches.rows.saturating_mul(patches.cols);
+    if n_patches == 0 || dim == 0 || patches.dim != dim {
+        let PatchEmbeddings { rows, cols, dim: found, .. } = patches;
+        let expected = format!("rows × cols × dim of at least 1 × 1 × 1, dim {dim}");
+        return Err((expected, format!("{rows} × {cols} × {found}")));
+    }
+    let lengths = [patches.data.len(), patches.coverage.len(), patches.valid.len()];
+    let expected = [n_patches.saturating_mul(dim), n_patches, n_patches];
+    if lengths != expected {
+        let [data, coverage, valid] = expected;
+        let expected = format!("{data} numbers, {coverage} coverages and {valid} validities");
+        return Err((expected, format!("{lengths:?}")));
+    }
+    let [x0, y0, x1, y1] = patches.rect;
+    if !(patches.rect.iter().all(|x| x.is_finite()) && x0 < x1 && y0 < y1) {
+        let expected = "a rectangle with left < right and top < bottom".to_owned();
+        return Err((expected, format!("{:?}", patches.rect)));
+    }
+    // Without an early exit, so that the compiler compares many numbers at once.
+    let is_finite = |vector: &[f32]| vector.iter().fold(true, |all, x| all & x.is_finite());
+    let mut cells = patches.data.chunks_exact(dim).zip(&patches.valid);
+    match cells.position(|(vector, &valid)| valid && !is_finite(vector)) {
+        None => Ok(()),
+        Some(patch) => {
+            let (row, col) = (patch / patches.cols, patch % patches.cols);
+            let expected = "finite numbers in every valid patch".to_owned();
+            Err((expected, format!("NaN or infinity at row {row}, column {col}")))
+        }
+    }
+}
+
+fn write_view(
+    file: &mut McapFile<'_>,
+    view: usize,
+    embedded: &EmbeddedView,
+    dtype: Dtype,
+) -> Result<()> {
+    let EmbeddedView { camera, patches } = embedded;
+    let time = time_of(view);
+    file.log(TF, time, &transform(view, time, camera))?;
+    file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;
+    let [x0, y0, x1, y1] = patches.rect;
+    let message = PatchEmbeddingsMessage {
+        timestamp: Some(timestamp(time)),
+        frame_id: frame(view),
+        rows: count(patches.rows)?,
+        cols: count(patches.cols)?,
+        dim: count(patches.dim)?,
+        dtype: dtype.name().to_owned(),
+        data: encode(view, patches, dtype)?,
+        x0,
+        y0,
+        x1,
+        y1,
+        coverage: Bytes::copy_from_slice(&patches.coverage),
+        valid: patches.valid.iter().map(|&valid| valid.into()).collect::<Vec<u8>>().into(),
+    };
+    file.log(&topic(view, "embeddings"), time, &message)
+}
+
+fn count(n: usize) -> Result<u32> {
+    let error = |_| invalid("rows, cols or dim".to_owned(), "less than 2^32", n.to_string());
+    u32::try_from(n).map_err(error)
+}
+
+/// Numbers are converted in blocks of this many, which stay in the cache.
+const BLOCK: usize = 4096;
+
+/// Vectors as little-endian bytes.
+fn encode(view: usize, patches: &PatchEmbeddings, dtype: Dtype) -> Result<Bytes> {
+    let numbers = &patches.data;
+    let mut bytes = Vec::with_capacity(numbers.len() * dtype.n_bytes());
+    match dtype {
+        Dtype::F32 => extend(&mut bytes, numbers, f32::to_le_bytes),
+        Dtype::F16 => {
+            let is_over = |x: &f32| x.is_finite() && f16::from_f32(*x).is_infinite();
+            // Everything from here on rounds to infinity.
+            let any_large = numbers.iter().fold(false, |any, x| any | (x.abs() >= 65_520.0));
+            if any_large && let Some(at) = numbers.iter().position(is_over) {
+                let what = format!("view {view:03}, number {at}");
+                return Err(invalid(what, "at most 65504 for f16", numbers[at].to_string()));
+            }
+            let mut halves = [f16::ZERO; BLOCK];
+            for numbers in numbers.chunks(BLOCK) {
+                let halves = &mut halves[..numbers.len()];
+                halves.convert_from_f32_slice(numbers);
+                extend(&mut bytes, halves, f16::to_le_bytes);
+            }
+        }
+    }
+    Ok(bytes.into())
+}
+
+/// Appends numbers as little-endian bytes: in one go where the machine holds them so already.
+fn extend<T: bytemuck::NoUninit, const N: usize>(
+    bytes: &mut Vec<u8>,
+    numbers: &[T],
+    to_le_bytes: impl Fn(T) -> [u8; N],
+) {
+    match cfg!(target_endian = "little") {
+        true => bytes.extend_from_slice(bytemuck::cast_slice(numbers)),
+        false => numbers.iter().for_each(|&x| bytes.extend(to_le_bytes(x))),
+    }
+}
+
+/// One grid, checked but for its dimension, which the first view sets.
+fn read_grid(path: &Path, view: usize, message: &Message<'_>) -> Result<PatchEmbeddings> {
+    let error = |expected: &str, found: String| message_error(path, message, expected, found);
+    let grid: PatchEmbeddingsMessage = decode(path, message, PATCH_EMBEDDINGS)?;
+    if grid.frame_id != frame(view) {
+        return Err(error(&format!("the frame `{}`", frame(view)), format!("`{}`", grid.frame_id)));
+    }
+    let dtype = Dtype::parse(&grid.dtype)
+        .ok_or_else(|| error("the dtype `f16` or `f32`", format!("`{}`", grid.dtype)))?;
+    let product = u64::from(grid.rows).checked_mul(grid.cols.into());
+    let product = product.and_then(|n| n.checked_mul(grid.dim.into()));
+    let n_bytes = product.and_then(|n| n.checked_mul(dtype.n_bytes() as u64));
+    if n_bytes != Some(grid.data.len() as u64) {
+        let PatchEmbeddingsMessage { rows, cols, dim, .. } = grid;
+        let expected = format!("{rows} × {cols} × {dim} numbers of {} bytes", dtype.n_bytes());
+        return Err(error(&expected, format!("{} bytes of data", grid.data.len())));
+    }
+    if let Some(byte) = grid.valid.iter().find(|&&valid| valid > 1) {
+        return Err(error("0 or 1 for the validity of a patch", byte.to_string()));
+    }
+    let patches = PatchEmbeddings {
+        rows: grid.rows as usize,
+        cols: grid.cols as usize,
+        dim: grid.dim as usize,
+        data: decode_numbers(&grid.data, dtype),
+        rect: [grid.x0, grid.y0, grid.x1, grid.y1],
+        coverage: grid.coverage.to_vec(),
+        valid: grid.valid.iter().map(|&valid| valid == 1).collect(),
+    };
+    check_grid(&patches, patches.dim).map_err(|(expected, found)| error(&expected, found))?;
+    Ok(patches)
+}
+
+/// Numbers out of little-endian bytes.
+fn decode_numbers(bytes: &[u8], dtype: Dtype) -> Vec<f32> {
+    match dtype {
+        Dtype::F32 => {
+            bytes.as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect()
+        }
+        Dtype::F16 => {
+            // Through a small aligned block, so that the conversion can use the processor's own.
+            let mut block = [f16::ZERO; BLOCK];
+            let mut numbers = vec![0.0; bytes.len() / 2];
+            for (numbers, bytes) in numbers.chunks_mut(BLOCK).zip(bytes.chunks(2 * BLOCK)) {
+                let block = &mut block[..numbers.len()];
+                for (half, &bytes) in block.iter_mut().zip(bytes.as_chunks::<2>().0) {
+                    *half = f16::from_le_bytes(bytes);
+                }
+                block.convert_to_f32_slice(numbers);
+            }
+            numbers
+        }
+    }
+}

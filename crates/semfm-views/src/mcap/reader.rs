@@ -1,0 +1,436 @@
+//! The strict reader: every record of a file once, from the first to the last.
+//!
+//! The format's own index would be quicker for a single message, but an index can lie: a linear
+//! walk sees what is there, and afterwards holds the summary against it ([`super::summary`]).
+//! Checksums of a chunk are compared before its first message is handed out. Specification: "MCAP
+//! File Format Specification", Foxglove (2022), <https://mcap.dev/spec>.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::decompress::decompress;
+use super::message_index::ChunkMessages;
+use super::record::{Fields, MAGIC, Place, Record, Records, opcode};
+use super::summary::{self, Layout, StoredAttachment, StoredChunk, StoredMetadata};
+use crate::{Error, Fault, Result};
+
+/// How the messages of some channels are laid out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schema {
+    /// Name of the message type, such as `foxglove.RawImage`.
+    pub name: String,
+    /// Language of the schema, such as `protobuf`.
+    pub encoding: String,
+    /// The schema itself.
+    pub data: Vec<u8>,
+}
+
+/// A stream of messages of one kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The id in this file.
+    pub id: u16,
+    /// Topic, such as `/views/000/image`.
+    pub topic: String,
+    /// How a message's bytes are encoded, such as `protobuf`.
+    pub message_encoding: String,
+    /// The schema, where the channel has one.
+    pub schema: Option<Arc<Schema>>,
+    /// What else the writer said of the channel.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// A message as it is handed to the visitor of [`read_messages`].
+#[derive(Clone, Copy, Debug)]
+pub struct Message<'a> {
+    /// The stream that it belongs to.
+    pub channel: &'a Channel,
+    /// Which message of its channel it is, from 0 in file order.
+    pub index: u64,
+    /// The publisher's count.
+    pub sequence: u32,
+    /// When it was recorded, in nanoseconds of the writer's clock.
+    pub log_time: u64,
+    /// When it was published.
+    pub publish_time: u64,
+    /// The encoded message.
+    pub data: &'a [u8],
+}
+
+/// What a file holds beside its messages.
+#[derive(Clone, Debug, Default)]
+pub struct Contents {
+    /// The profile that the header names.
+    pub profile: String,
+    /// The program that wrote the file.
+    pub library: String,
+    /// Schemas by id.
+    pub schemas: BTreeMap<u16, Arc<Schema>>,
+    /// Channels by id, those without messages too.
+    pub channels: BTreeMap<u16, Arc<Channel>>,
+    /// Messages of each channel.
+    pub n_messages_of: BTreeMap<u16, u64>,
+    /// Earliest and latest time of recording, `None` without messages.
+    pub log_times: Option<(u64, u64)>,
+    /// Number of chunks.
+    pub n_chunks: usize,
+    /// Metadata records, name and entries, in file order.
+    pub metadata: Vec<(String, BTreeMap<String, String>)>,
+    /// Attachments in file order: name, media type, bytes of data.
+    pub attachments: Vec<(String, String, u64)>,
+}
+
+impl Contents {
+    /// Number of messages in the file.
+    pub fn n_messages(&self) -> u64 {
+        self.n_messages_of.values().sum()
+    }
+}
+
+/// Reads a file whole and hands every message to `visit`, in file order.
+///
+/// Lengths, checksums, ids, the messages' index and the summary are all checked; memory stays under
+/// 64 MB plus 40 times the file. The summary stands at the end: what `visit` collected is sound
+/// only when this returns `Ok`.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Container`] with the record at fault, or whatever `visit` returns.
+pub fn read_messages(
+    path: &Path,
+    visit: impl FnMut(Message<'_>) -> Result<()>,
+) -> Result<Contents> {
+    let bytes =
+        std::fs::read(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    read_bytes(path, &bytes, visit)
+}
+
+/// As [`read_messages`], for the bytes of a file that are in memory already; `path` is for messages.
+///
+/// # Errors
+/// As [`read_messages`].
+pub fn read_bytes(
+    path: &Path,
+    bytes: &[u8],
+    mut visit: impl FnMut(Message<'_>) -> Result<()>,
+) -> Result<Contents> {
+    let body = between_magics(path, bytes)?;
+    let mut records = Records { path, bytes: body, at: MAGIC.len(), chunk: None };
+    let mut walk = Walk {
+        path,
+        file_bytes: bytes.len(),
+        contents: Contents::default(),
+        layout: Layout::default(),
+        kept: 0,
+        chunk_messages: None,
+        room: Vec::new(),
+        visit: &mut visit,
+    };
+    walk.header(&mut records)?;
+    let data_end = walk.data_section(&mut records)?;
+    summary::check(&mut walk.contents, &walk.layout, &mut records, data_end)?;
+    Ok(walk.contents)
+}
+
+/// The file without the magic at its end; offsets keep counting from its start.
+fn between_magics<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
+    let error = |offset, fault, found: &str| {
+        let place = Place { path, opcode: None, offset, chunk: None };
+        place.error(fault, "the magic bytes of MCAP version 0 (89 4d 43 41 50 30 0d 0a)", found)
+    };
+    if bytes.is_empty() {
+        return Err(error(0, Fault::Truncated, "an empty file"));
+    }
+    if !bytes.starts_with(MAGIC) {
+        return Err(match MAGIC.starts_with(bytes) {
+            true => error(0, Fault::Truncated, "only the first of them"),
+            false => error(0, Fault::Magic, "other bytes: this is no MCAP file"),
+        });
+    }
+    match bytes[MAGIC.len()..].strip_suffix(MAGIC) {
+        Some(rest) => Ok(&bytes[..MAGIC.len() + rest.len()]),
+        None => {
+            let found = "other bytes at the end of the file: it was cut or never finished";
+            Err(error(bytes.len().saturating_sub(MAGIC.len()), Fault::Truncated, found))
+        }
+    }
+}
+
+/// Schemas and channels out of chunks may take this much memory whatever the size of the file,
+const KEPT_BYTES: usize = 16 << 20;
+/// or this many times the size of the file.
+const KEPT_PER_FILE_BYTE: usize = 4;
+
+/// The state of a walk over the data section.
+struct Walk<'a, 'v> {
+    path: &'a Path,
+    file_bytes: usize,
+    contents: Contents,
+    layout: Layout,
+    /// Memory of all different schemas and channels out of chunks so far.
+    kept: usize,
+    /// Messages of the chunk just read, until a record other than a Message Index follows.
+    chunk_messages: Option<ChunkMessages>,
+    /// Where chunks are decompressed.
+    room: Vec<u8>,
+    visit: &'v mut dyn FnMut(Message<'_>) -> Result<()>,
+}
+
+impl<'a> Walk<'a, '_> {
+    fn header(&mut self, records: &mut Records<'a>) -> Result<()> {
+        let start = Place { path: self.path, opcode: None, offset: MAGIC.len(), chunk: None };
+        let record = records
+            .next()?
+            .ok_or_else(|| start.error(Fault::Truncated, "a Header record", "the end"))?;
+        if record.opcode != opcode::HEADER {
+            return Err(record.misplaced("the Header record"));
+        }
+        let mut fields = record.fields();
+        self.contents.profile = fields.text()?.to_owned();
+        self.contents.library = fields.text()?.to_owned();
+        Ok(())
+    }
+
+    /// Reads up to the Data End record and returns the byte behind it.
+    fn data_section(&mut self, records: &mut Records<'a>) -> Result<usize> {
+        while let Some(record) = records.next()? {
+            match record.opcode {
+                opcode::MESSAGE_INDEX => {
+                    self.message_index(&record)?;
+                    continue;
+                }
+                opcode::DATA_END => {
+                    self.finish_chunk()?;
+                    let crc = record.fields().u32()?;
+                    check_crc(crc, &records.bytes[..record.place.offset], record.place)?;
+                    return Ok(record.end());
+                }
+                _ => self.finish_chunk()?,
+            }
+            match record.opcode {
+                opcode::CHUNK => self.chunk(&record)?,
+                opcode::ATTACHMENT => self.attachment(&record)?,
+                opcode::METADATA => self.metadata(&record)?,
+                _ if self.declaration(&record)? => {}
+                opcode::MESSAGE => self.message(&record)?,
+                other if opcode::is_foreign(other) => {}
+                _ => return Err(record.misplaced("a record of the data section, or Data End")),
+            }
+        }
+        let place = Place { path: self.path, opcode: None, offset: records.at, chunk: None };
+        Err(place.error(Fault::Truncated, "a Data End record", "the end of the file"))
+    }
+
+    /// Takes a Schema or Channel record; false for every other one.
+    fn declaration(&mut self, record: &Record<'_>) -> Result<bool> {
+        let Some(memory) = declare(&mut self.contents, record)? else { return Ok(false) };
+        if record.place.chunk.is_some() {
+            self.kept = self.kept.saturating_add(memory);
+            let limit = KEPT_BYTES.max(self.file_bytes.saturating_mul(KEPT_PER_FILE_BYTE));
+            if self.kept > limit {
+                let expected = format!("at most {limit} bytes of schemas and channels");
+                return Err(record.place.error(Fault::OverLimit, expected, self.kept));
+            }
+        }
+        Ok(true)
+    }
+
+    fn message(&mut self, record: &Record<'_>) -> Result<()> {
+        let mut fields = record.fields();
+        let id = fields.u16()?;
+        let Some(channel) = self.contents.channels.get(&id) else {
+            let found = format!("channel {id}, which was not declared");
+            return Err(record.place.error(Fault::Id, "a channel declared before", found));
+        };
+        let (sequence, log_time, publish_time) = (fields.u32()?, fields.u64()?, fields.u64()?);
+        let count = self.contents.n_messages_of.entry(id).or_default();
+        let index = *count;
+        *count += 1;
+        let (first, last) = self.contents.log_times.unwrap_or((log_time, log_time));
+        self.contents.log_times = Some((first.min(log_time), last.max(log_time)));
+        if let Some(messages) = &mut self.chunk_messages {
+            messages.push(id, record.place.offset, log_time);
+        }
+        let data = fields.bytes;
+        (self.visit)(Message { channel, index, sequence, log_time, publish_time, data })
+    }
+
+    fn chunk(&mut self, record: &Record<'_>) -> Result<()> {
+        let mut fields = record.fields();
+        let (start_time, end_time) = (fields.u64()?, fields.u64()?);
+        let (size, crc) = (fields.u64()?, fields.u32()?);
+        let compression = fields.text()?;
+        let stored = fields.long_bytes()?;
+        let mut room = std::mem::take(&mut self.room);
+        let place = record.place;
+        let bytes = decompress(compression, stored, size, self.file_bytes, &mut room, place)?;
+        check_crc(crc, bytes, place)?;
+        self.chunk_messages = Some(ChunkMessages::default());
+        let chunk = Some(place.offset);
+        let mut records = Records { path: self.path, bytes, at: 0, chunk };
+        while let Some(record) = records.next()? {
+            match record.opcode {
+                _ if self.declaration(&record)? => {}
+                opcode::MESSAGE => self.message(&record)?,
+                other if opcode::is_foreign(other) => {}
+                _ => return Err(record.misplaced("a Schema, Channel or Message")),
+            }
+        }
+        self.room = room;
+        if let Some(messages) = &self.chunk_messages {
+            messages.check_times(start_time, end_time, place)?;
+        }
+        self.layout.chunks.push(StoredChunk {
+            offset: place.offset as u64,
+            length: record.length() as u64,
+            times: (start_time, end_time),
+            compression: compression.to_owned(),
+            compressed_size: stored.len() as u64,
+            size,
+            message_indexes: BTreeMap::new(),
+            message_index_length: 0,
+        });
+        self.contents.n_chunks += 1;
+        Ok(())
+    }
+
+    fn message_index(&mut self, record: &Record<'_>) -> Result<()> {
+        let (Some(messages), Some(chunk)) =
+            (&mut self.chunk_messages, self.layout.chunks.last_mut())
+        else {
+            return Err(record.misplaced("no Message Index but behind a chunk"));
+        };
+        let channel = messages.check_index(record.fields())?;
+        chunk.message_indexes.insert(channel, record.place.offset as u64);
+        chunk.message_index_length += record.length() as u64;
+        Ok(())
+    }
+
+    /// The chunk's Message Index records are complete, or there are none at all.
+    fn finish_chunk(&mut self) -> Result<()> {
+        match (self.chunk_messages.take(), self.layout.chunks.last()) {
+            (Some(messages), Some(chunk)) if !chunk.message_indexes.is_empty() => {
+                let place = Place {
+                    path: self.path,
+                    opcode: Some(opcode::CHUNK),
+                    offset: chunk.offset as usize,
+                    chunk: None,
+                };
+                messages.check_complete(place)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn attachment(&mut self, record: &Record<'_>) -> Result<()> {
+        let mut fields = record.fields();
+        let (log_time, create_time) = (fields.u64()?, fields.u64()?);
+        let (name, media_type) = (fields.text()?, fields.text()?);
+        let data_size = fields.long_bytes()?.len() as u64;
+        let covered = &record.body[..record.body.len() - fields.bytes.len()];
+        check_crc(fields.u32()?, covered, record.place)?;
+        self.layout.attachments.push(StoredAttachment {
+            offset: record.place.offset as u64,
+            length: record.length() as u64,
+            log_time,
+            create_time,
+            data_size,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+        });
+        self.contents.attachments.push((name.to_owned(), media_type.to_owned(), data_size));
+        Ok(())
+    }
+
+    fn metadata(&mut self, record: &Record<'_>) -> Result<()> {
+        let mut fields = record.fields();
+        let name = fields.text()?.to_owned();
+        self.layout.metadata.push(StoredMetadata {
+            offset: record.place.offset as u64,
+            length: record.length() as u64,
+            name: name.clone(),
+        });
+        self.contents.metadata.push((name, fields.text_map()?));
+        Ok(())
+    }
+}
+
+/// Takes a Schema or Channel record and returns about how much memory it was given (none where it
+/// was known), or `None` for every other record. The same id may be declared many times, but only
+/// with the same content.
+pub(super) fn declare(contents: &mut Contents, record: &Record<'_>) -> Result<Option<usize>> {
+    match record.opcode {
+        opcode::SCHEMA => declare_schema(contents, record.fields()).map(Some),
+        opcode::CHANNEL => declare_channel(contents, record.fields()).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// About what a map entry costs beside its text.
+const ENTRY_BYTES: usize = 128;
+
+fn declare_schema(contents: &mut Contents, mut fields: Fields<'_>) -> Result<usize> {
+    let id = fields.u16()?;
+    if id == 0 {
+        return Err(fields.place.error(Fault::Id, "a schema id from 1", 0));
+    }
+    let (name, encoding, data) = (fields.text()?, fields.text()?, fields.short_bytes()?);
+    if let Some(known) = contents.schemas.get(&id) {
+        if known.name != name || known.encoding != encoding || known.data != data {
+            let expected = format!("schema {id} as declared before (`{}`)", known.name);
+            let found = format!("another one (`{name}`)");
+            return Err(fields.place.error(Fault::Conflict, expected, found));
+        }
+        return Ok(0);
+    }
+    let memory = ENTRY_BYTES + name.len() + encoding.len() + data.len();
+    let schema =
+        Schema { name: name.to_owned(), encoding: encoding.to_owned(), data: data.to_vec() };
+    contents.schemas.insert(id, Arc::new(schema));
+    Ok(memory)
+}
+
+fn declare_channel(contents: &mut Contents, mut fields: Fields<'_>) -> Result<usize> {
+    let (id, schema_id) = (fields.u16()?, fields.u16()?);
+    let schema = match schema_id {
+        0 => None,
+        _ => Some(contents.schemas.get(&schema_id).cloned().ok_or_else(|| {
+            let found = format!("schema {schema_id}, which was not declared");
+            fields.place.error(Fault::Id, "a schema declared before", found)
+        })?),
+    };
+    let body_bytes = fields.bytes.len();
+    let channel = Channel {
+        id,
+        topic: fields.text()?.to_owned(),
+        message_encoding: fields.text()?.to_owned(),
+        schema,
+        metadata: fields.text_map()?,
+    };
+    if let Some(known) = contents.channels.get(&id) {
+        if **known != channel {
+            let expected = format!("channel {id} as declared before (`{}`)", known.topic);
+            let found = format!("another one (`{}`)", channel.topic);
+            return Err(fields.place.error(Fault::Conflict, expected, found));
+        }
+        return Ok(0);
+    }
+    let memory = ENTRY_BYTES * (1 + channel.metadata.len()) + body_bytes;
+    contents.channels.insert(id, Arc::new(channel));
+    Ok(memory)
+}
+
+/// Compares a stored checksum with the true one; zero says that none was stored.
+pub(super) fn check_crc(stored: u32, bytes: &[u8], place: Place<'_>) -> Result<()> {
+    if stored == 0 {
+        return Ok(());
+    }
+    match crc32fast::hash(bytes) {
+        found if found == stored => Ok(()),
+        found => Err(place.error(
+            Fault::Crc,
+            format!("checksum {stored:#010x} of {} bytes", bytes.len()),
+            format!("{found:#010x}"),
+        )),
+    }
+}

@@ -1,0 +1,322 @@
+//! `NAME.views.mcap`: rendered views with cameras, depth and triangles, for encoders and for eyes.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+use foxglove::bytes::Bytes;
+use foxglove::messages::{CompressedImage, RawImage};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
+use semfm_geom::Mesh;
+
+use super::cameras::{
+    Cameras, check_camera, check_count, decode, insert_once, message_error, topic_error,
+};
+use super::frames::{OBJECT, TF, calibration, frame, parse_topic, topic, transform};
+use super::inspect::METADATA_NAME;
+use super::metadata::{MeshIdentity, ViewsMetadata};
+use super::reader::{Message, read_messages};
+use super::scene::{SceneMesh, scene_update};
+use super::writer::{McapFile, Packing, timestamp, write_file};
+use crate::{Error, Result, View};
+
+/// The rendered views of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewsFile {
+    /// Of which mesh, and how they were rendered.
+    pub metadata: ViewsMetadata,
+    /// The views, as numbered.
+    pub views: Vec<View>,
+}
+
+/// Time of recording of a view, in nanoseconds: one second each, so that playing the file in
+/// Foxglove walks around the object.
+pub(super) fn time_of(view: usize) -> u64 {
+    view as u64 * 1_000_000_000
+}
+
+/// Writes a views file whole or not at all; the mesh goes with it for viewers, grey or with the
+/// colours given (one RGB per vertex).
+///
+/// # Errors
+/// [`Error::OtherMesh`] where the metadata name another mesh, [`Error::Invalid`] for a view whose
+/// arrays do not have the size of its camera or that names a triangle the mesh has not,
+/// [`Error::Io`].
+pub fn write_views(
+    path: &Path,
+    views: &[View],
+    mesh: &Mesh,
+    colors: Option<&[[u8; 3]]>,
+    metadata: &ViewsMetadata,
+) -> Result<()> {
+    metadata.mesh.check(mesh, path)?;
+    if views.is_empty() {
+        return Err(invalid("views", "at least one", "none"));
+    }
+    for (view, rendered) in views.iter().enumerate() {
+        check_view(view, rendered, metadata)?;
+    }
+    let shown = SceneMesh {
+        topic: "/mesh",
+        frame_id: OBJECT,
+        vertices: mesh.vertices(),
+        faces: mesh.faces(),
+        colors,
+    };
+    shown.check()?;
+    write_file(path, Packing::Lz4, |file| {
+        file.metadata(METADATA_NAME, metadata.entries(views.len()))?;
+        file.log(shown.topic, 0, &scene_update(&shown))?;
+        for (view, rendered) in views.iter().enumerate() {
+            write_view(path, file, view, rendered)?;
+        }
+        Ok(())
+    })
+}
+
+impl ViewsFile {
+    /// Reads all views of a file.
+    ///
+    /// # Errors
+    /// [`Error::Container`] for a damaged file; [`Error::Format`] with topic and message for
+    /// anything missing, of the wrong size, or of another encoding than ours.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (metadata, pictures, cameras) = gather(path, None)?;
+        let n_views = metadata.1;
+        let metadata = metadata.0;
+        check_count(path, "/views/NNN/image", n_views, pictures.images.len())?;
+        let size = (metadata.width, metadata.height);
+        let cameras = cameras.finish(path, n_views, size)?;
+        let views = (0..n_views).zip(cameras);
+        let views = views.map(|(view, camera)| pictures.view(path, view, camera, &metadata));
+        Ok(Self { views: views.collect::<Result<_>>()?, metadata })
+    }
+}
+
+/// Reads one view of a file, as in `V.views.mcap#003`, without keeping the others.
+///
+/// # Errors
+/// As [`ViewsFile::read`]; [`Error::Invalid`] where the file has no such view.
+pub fn read_view(path: &Path, view: usize) -> Result<(ViewsMetadata, View)> {
+    let ((metadata, n_views), pictures, cameras) = gather(path, Some(view))?;
+    if view >= n_views {
+        let expected = format!("000 to {:03} in {}", n_views.saturating_sub(1), path.display());
+        return Err(invalid("view", expected, format!("{view:03}")));
+    }
+    let camera = cameras.camera(path, view, (metadata.width, metadata.height))?;
+    let view = pictures.view(path, view, camera, &metadata)?;
+    Ok((metadata, view))
+}
+
+/// The pictures of a file, encoded as they are in it.
+#[derive(Default)]
+struct Pictures {
+    images: BTreeMap<usize, CompressedImage>,
+    depths: BTreeMap<usize, RawImage>,
+    triangles: BTreeMap<usize, RawImage>,
+}
+
+fn gather(path: &Path, only: Option<usize>) -> Result<((ViewsMetadata, usize), Pictures, Cameras)> {
+    let mut cameras = Cameras::default();
+    let mut pictures = Pictures::default();
+    let contents = read_messages(path, |message| match parse_topic(&message.channel.topic) {
+        Some((view, _)) if only.is_some_and(|only| only != view) => Ok(()),
+        Some((view, "camera")) => cameras.calibration(path, view, &message),
+        Some((view, what)) => pictures.take(path, view, what, &message),
+        None if message.channel.topic == TF => cameras.transform(path, &message),
+        None => Ok(()),
+    })?;
+    Ok((ViewsMetadata::read(path, &contents.metadata)?, pictures, cameras))
+}
+
+impl Pictures {
+    fn take(&mut self, path: &Path, view: usize, what: &str, message: &Message<'_>) -> Result<()> {
+        let raw = |encoding: &str| -> Result<RawImage> {
+            let image: RawImage = decode(path, message, "foxglove.RawImage")?;
+            let length = u64::from(image.step) * u64::from(image.height);
+            let is_packed = u64::from(image.step) == 4 * u64::from(image.width);
+            if image.encoding != encoding || !is_packed || length != image.data.len() as u64 {
+                let RawImage { width, height, step, encoding: found, data, .. } = &image;
+                let expected = format!("a packed {encoding} image");
+                let found =
+                    format!("{width} × {height} {found}, step {step}, {} bytes", data.len());
+                return Err(message_error(path, message, &expected, found));
+            }
+            Ok(image)
+        };
+        match what {
+            "image" => {
+                let image: CompressedImage = decode(path, message, "foxglove.CompressedImage")?;
+                if image.format != "png" {
+                    let found = format!("`{}`", image.format);
+                    return Err(message_error(path, message, "the format `png`", found));
+                }
+                insert_once(&mut self.images, view, image, path, message)
+            }
+            "depth" => insert_once(&mut self.depths, view, raw("32FC1")?, path, message),
+            "triangles" => insert_once(&mut self.triangles, view, raw("32SC1")?, path, message),
+            _ => Ok(()),
+        }
+    }
+
+    /// Decodes one view and checks that its pictures belong together.
+    fn view(
+        &self,
+        path: &Path,
+        view: usize,
+        camera: crate::Camera,
+        metadata: &ViewsMetadata,
+    ) -> Result<View> {
+        let size = (camera.width, camera.height);
+        let rgb = {
+            let topic = topic(view, "image");
+            let image = self
+                .images
+                .get(&view)
+                .ok_or_else(|| topic_error(path, &topic, "one message", "none"))?;
+            decode_png(&image.data, size)
+                .map_err(|(e, found)| topic_error(path, &topic, &e, found))?
+        };
+        let depth = numbers(path, &self.depths, view, "depth", size, f32::from_le_bytes)?;
+        let triangles =
+            numbers(path, &self.triangles, view, "triangles", size, i32::from_le_bytes)?;
+        let rendered = View { camera, rgb, depth, triangles };
+        check_pixels(&rendered, metadata.mesh.n_triangles)
+            .map_err(|(e, found)| topic_error(path, &topic(view, "depth"), &e, found))?;
+        Ok(rendered)
+    }
+}
+
+/// The pixels of a raw image of the camera's size.
+fn numbers<T>(
+    path: &Path,
+    images: &BTreeMap<usize, RawImage>,
+    view: usize,
+    what: &str,
+    size: (u32, u32),
+    number: impl Fn([u8; 4]) -> T,
+) -> Result<Vec<T>> {
+    let topic = topic(view, what);
+    let image =
+        images.get(&view).ok_or_else(|| topic_error(path, &topic, "one message", "none"))?;
+    if (image.width, image.height) != size {
+        let expected = format!("{} × {} pixels, as its camera", size.0, size.1);
+        let found = format!("{} × {}", image.width, image.height);
+        return Err(topic_error(path, &topic, &expected, found));
+    }
+    Ok(image.data.as_chunks::<4>().0.iter().map(|&bytes| number(bytes)).collect())
+}
+
+/// sRGB bytes of a PNG that must have the given size; nothing larger is ever decoded.
+fn decode_png(bytes: &[u8], size: (u32, u32)) -> std::result::Result<Vec<u8>, (String, String)> {
+    let expected = format!("a PNG of {} × {} pixels", size.0, size.1);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(size.0);
+    limits.max_image_height = Some(size.1);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| (expected.clone(), error.to_string()))?;
+    if (image.width(), image.height()) != size {
+        return Err((expected, format!("{} × {}", image.width(), image.height())));
+    }
+    Ok(image.into_rgb8().into_raw())
+}
+
+/// Depth and triangles agree on what is background, and name triangles that exist.
+fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), (String, String)> {
+    let is_wrong = |(&depth, &triangle): (&f32, &i32)| match triangle {
+        -1 => depth != f32::INFINITY,
+        0.. => triangle as usize >= n_triangles || !(depth.is_finite() && depth > 0.0),
+        _ => true,
+    };
+    match view.depth.iter().zip(&view.triangles).position(is_wrong) {
+        None => Ok(()),
+        Some(pixel) => {
+            let width = view.camera.width as usize;
+            let (row, col) = (pixel / width, pixel % width);
+            let (depth, triangle) = (view.depth[pixel], view.triangles[pixel]);
+            let expected = format!(
+                "a triangle below {n_triangles} and a positive depth, or −1 and an infinite one"
+            );
+            let found = format!("triangle {triangle} at depth {depth}, row {row}, column {col}");
+            Err((expected, found))
+        }
+    }
+}
+
+fn invalid(
+    what: impl Into<String>,
+    expected: impl Into<String>,
+    found: impl Into<String>,
+) -> Error {
+    Error::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
+}
+
+fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<()> {
+    let what = format!("view {view:03}");
+    check_camera(view, &rendered.camera)?;
+    let (width, height) = (rendered.camera.width, rendered.camera.height);
+    if (width, height) != (metadata.width, metadata.height) {
+        let expected = format!("{} × {} pixels", metadata.width, metadata.height);
+        return Err(invalid(what, expected, format!("{width} × {height}")));
+    }
+    let n_pixels = width as usize * height as usize;
+    let lengths = [rendered.rgb.len() / 3, rendered.depth.len(), rendered.triangles.len()];
+    if !rendered.rgb.len().is_multiple_of(3) || lengths != [n_pixels; 3] {
+        let expected = format!("{n_pixels} pixels in rgb, depth and triangles");
+        return Err(invalid(what, expected, format!("{lengths:?}")));
+    }
+    check_pixels(rendered, metadata.mesh.n_triangles)
+        .map_err(|(expected, found)| invalid(what, expected, found))
+}
+
+fn write_view(path: &Path, file: &mut McapFile<'_>, view: usize, rendered: &View) -> Result<()> {
+    let View { camera, rgb, depth, triangles } = rendered;
+    let (width, height) = (camera.width, camera.height);
+    let time = time_of(view);
+    file.log(TF, time, &transform(view, time, camera))?;
+    file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(rgb, width, height, ExtendedColorType::Rgb8)
+        .map_err(|error| Error::Io {
+            path: path.to_path_buf(),
+            source: std::io::Error::other(error),
+        })?;
+    let image = CompressedImage {
+        timestamp: Some(timestamp(time)),
+        frame_id: frame(view),
+        data: png.into(),
+        format: "png".to_owned(),
+    };
+    file.log(&topic(view, "image"), time, &image)?;
+    let raw = |encoding: &str, data: Bytes| RawImage {
+        timestamp: Some(timestamp(time)),
+        frame_id: frame(view),
+        width,
+        height,
+        encoding: encoding.to_owned(),
+        step: 4 * width,
+        data,
+    };
+    let depth: Vec<u8> = depth.iter().flat_map(|z| z.to_le_bytes()).collect();
+    file.log(&topic(view, "depth"), time, &raw("32FC1", depth.into()))?;
+    let triangles: Vec<u8> = triangles.iter().flat_map(|t| t.to_le_bytes()).collect();
+    file.log(&topic(view, "triangles"), time, &raw("32SC1", triangles.into()))
+}
+
+impl ViewsMetadata {
+    /// Metadata for views of `mesh`; the rest is for the caller to fill.
+    pub fn of(mesh: &Mesh, width: u32, height: u32) -> Self {
+        Self {
+            mesh: MeshIdentity::of(mesh),
+            width,
+            height,
+            rig: String::new(),
+            background: String::new(),
+            seed: 0,
+            more: BTreeMap::new(),
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The renderer: a mesh and cameras in, pictures with depth and triangle ids out.
+//!
+//! `triangle` turns a triangle into linear forms over the image, `raster` fills a z-buffer with
+//! them, `shade` gives its samples colours, `probe` asks for the depth at single positions.
+//! Everything is computed on the CPU, the same at every thread count.
+
+pub(crate) mod probe;
+pub(crate) mod raster;
+mod shade;
+pub(crate) mod triangle;
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use semfm_geom::{Mesh, Task};
+
+pub use shade::{CornerNormals, Paint};
+
+use crate::{Camera, Error, Result, View};
+use raster::Raster;
+use triangle::Projection;
+
+/// Samples of one z-buffer: larger pictures are drawn in bands of rows, which bounds the memory.
+const BAND_SAMPLES: usize = 1 << 20;
+
+/// Pixels that one call may render, over all views; they take eleven bytes each.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// Light, colours and smoothing. The defaults are those that the encoder was measured with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Colour samples along each side of a pixel (1 to 8).
+    pub supersampling: u32,
+    /// Colour behind the object (sRGB, 0 to 1).
+    pub background: [f32; 3],
+    /// Where the light comes from, in camera axes x right, y up, z towards the viewer.
+    pub light: [f64; 3],
+    /// Brightness of a surface that the light grazes; one that faces it has 1.
+    pub ambient: f64,
+    /// Vertex normals are used up to this angle from the triangle's own, in radians.
+    pub crease: f64,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            supersampling: 2,
+            background: [1.0; 3],
+            light: [0.25, 0.35, 0.9],
+            ambient: 0.35,
+            crease: 40f64.to_radians(),
+        }
+    }
+}
+
+impl RenderSettings {
+    fn check(&self) -> Result<()> {
+        if !(1..=8).contains(&self.supersampling) {
+            let found = self.supersampling.to_string();
+            return Err(Error::invalid("supersampling", "1 to 8", found));
+        }
+        let numbers = self.light.iter().chain([&self.ambient, &self.crease]);
+        if !(numbers.copied().all(f64::is_finite) && self.light.iter().any(|&x| x != 0.0)) {
+            let found =
+                format!("light {:?}, ambient {}, crease {}", self.light, self.ambient, self.crease);
+            return Err(Error::invalid(
+                "lighting",
+                "finite numbers and a light of some length",
+                found,
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// One picture per camera.
+///
+/// Depth and triangle id are those of the ray through the pixel's centre; colour is the mean of
+/// `supersampling²` rays spread evenly over the pixel, so a pixel at the silhouette may be tinted
+/// and yet have no triangle. Both sides of every triangle are drawn. Depth is kept as 1/z in f32
+/// and returned in f32: relative precision 2e-7. Triangles at the same f32 depth: the lowest id.
+///
+/// ```
+/// use semfm_geom::{Mesh, Task, math::DVec3};
+/// use semfm_views::{Paint, RenderSettings, RigSettings, render, rig};
+/// let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]])?;
+/// let cameras = rig(&mesh, &RigSettings::default())?;
+/// let views = render(&mesh, &Paint::default(), &cameras, &RenderSettings::default(), &Task::default())?;
+/// assert_eq!(views[0].rgb.len(), 224 * 224 * 3);
+/// # Ok::<(), semfm_views::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Invalid`] for a camera, settings or paint out of range, or more than 2²⁸ pixels in all;
+/// [`semfm_geom::Error::NoArea`] for a surface without area; [`semfm_geom::Error::Cancelled`].
+pub fn render(
+    mesh: &Mesh,
+    paint: &Paint<'_>,
+    cameras: &[Camera],
+    settings: &RenderSettings,
+    task: &Task,
+) -> Result<Vec<View>> {
+    settings.check()?;
+    paint.check(mesh)?;
+    for (k, camera) in cameras.iter().enumerate() {
+        camera.check(&format!("view {k}"))?;
+    }
+    let n_pixels: u64 = cameras.iter().map(|c| u64::from(c.width) * u64::from(c.height)).sum();
+    if n_pixels > MAX_PIXELS {
+        return Err(Error::invalid(
+            "pixels of all views",
+            format!("at most {MAX_PIXELS}"),
+            n_pixels.to_string(),
+        ));
+    }
+    if mesh.area() <= 0.0 {
+        return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
+    }
+    let normals = CornerNormals::new(mesh, settings.crease);
+    let done = AtomicUsize::new(0);
+    task.step("render", 0, cameras.len())?;
+    cameras
+        .par_iter()
+        .map(|camera| {
+            task.check()?;
+            let view = render_one(mesh, &normals, paint, camera, settings);
+            task.step("render", done.fetch_add(1, Ordering::Relaxed) + 1, cameras.len())?;
+            Ok(view)
+        })
+        .collect()
+}
+
+fn render_one(
+    mesh: &Mesh,
+    normals: &CornerNormals,
+    paint: &Paint<'_>,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> View {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let projection = Projection::new(mesh, camera);
+    let light = shade::Shader::new(&projection, normals, paint, settings);
+    let mut view = View {
+        camera: *camera,
+        rgb: vec![0; width * height * 3],
+        depth: vec![0.0; width * height],
+        triangles: vec![0; width * height],
+    };
+    let samples_per_row = width * (settings.supersampling as usize).pow(2);
+    let rows_per_band = (BAND_SAMPLES / samples_per_row).clamp(1, height);
+    let band_pixels = rows_per_band * width;
+    view.rgb
+        .par_chunks_mut(band_pixels * 3)
+        .zip(view.depth.par_chunks_mut(band_pixels).zip(view.triangles.par_chunks_mut(band_pixels)))
+        .enumerate()
+        .for_each(|(band, (rgb, (depth, triangles)))| {
+            let first = band * rows_per_band;
+            let rows = first..first + depth.len() / width;
+            trace(&projection, rows.clone(), depth, triangles);
+            light.colour(rows, rgb);
+        });
+    view
+}
+
+/// Depth and triangle at the centres of the pixels in `rows`.
+fn trace(
+    projection: &Projection<'_>,
+    rows: Range<usize>,
+    depth: &mut [f32],
+    triangles: &mut [i32],
+) {
+    let raster = Raster::new(projection, 1, rows);
+    for ((depth, triangle), hit) in depth.iter_mut().zip(triangles).zip(raster.hits) {
+        *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
+        *triangle = hit.face().map_or(-1, |face| face as i32);
+    }
+}

@@ -1,0 +1,302 @@
+//! The rig: cameras all around an object, posed in the object's own frame.
+
+use semfm_geom::Mesh;
+use semfm_geom::math::{DAffine3, DMat3, DVec3};
+
+use crate::camera::MAX_IMAGE_SIDE;
+use crate::frame::{principal_frame, surface_vertices};
+use crate::{Camera, Error, Result};
+
+/// The camera stands so that the bounding sphere fits its view with this much to spare.
+const STAND_OFF: f64 = 1.02;
+
+/// How many cameras there are and what each frames.
+///
+/// What the encoder is shown matters more than any later choice. The defaults were found on real
+/// meshes with a real encoder; the frame of the file instead of the principal one, a rig of two
+/// rings, and orthographic or unzoomed pictures were all worse.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigSettings {
+    /// Number of views N.
+    pub count: usize,
+    /// Side of the square images in pixels.
+    pub size: u32,
+    /// Full angle of view that the bounding sphere would fill, in radians.
+    pub field_of_view: f64,
+    /// Share of the image's side that the silhouette's longer side fills.
+    pub fill: f64,
+    /// Zoom at most this factor beyond the fit of the bounding sphere, so that an object seen
+    /// end-on stays small.
+    pub max_zoom: f64,
+    /// Pose the cameras in the object's principal frame (else in the file's, with z up).
+    pub principal_frame: bool,
+}
+
+impl Default for RigSettings {
+    fn default() -> Self {
+        Self {
+            count: 14,
+            size: 224,
+            field_of_view: 30f64.to_radians(),
+            fill: 0.8,
+            max_zoom: 1.5,
+            principal_frame: true,
+        }
+    }
+}
+
+impl RigSettings {
+    /// Cameras of the method `semfm`: the paper leaves them open, so these are the default ones;
+    /// what that method fixes is one upright picture per view, without rolls.
+    pub fn paper() -> Self {
+        Self::default()
+    }
+
+    fn check(&self) -> Result<()> {
+        let allow = |ok: bool, what: &str, expected: &str, found: String| {
+            if ok { Ok(()) } else { Err(Error::invalid(what, expected, found)) }
+        };
+        allow(
+            (1..=4096).contains(&self.count),
+            "views of the rig",
+            "1 to 4096",
+            self.count.to_string(),
+        )?;
+        let side = format!("1 to {MAX_IMAGE_SIDE} pixels");
+        let size_ok = (1..=MAX_IMAGE_SIDE).contains(&self.size);
+        allow(size_ok, "image size", &side, self.size.to_string())?;
+        let fov = self.field_of_view;
+        allow(
+            fov > 0.0 && fov < 3.0,
+            "field of view",
+            "more than 0 and less than 3 rad",
+            fov.to_string(),
+        )?;
+        let fill = self.fill;
+        allow(fill > 0.0 && fill <= 1.0, "fill", "more than 0 and at most 1", fill.to_string())?;
+        let zoom = self.max_zoom;
+        allow(
+            zoom >= 1.0 && zoom.is_finite(),
+            "largest zoom",
+            "a finite factor of at least 1",
+            zoom.to_string(),
+        )
+    }
+}
+
+/// Cameras at Fibonacci-sphere directions around the object, each zoomed and centred on the
+/// silhouette's bounding rectangle by its focal length and principal point.
+///
+/// ```
+/// use semfm_geom::{Mesh, math::DVec3};
+/// use semfm_views::rig::{RigSettings, rig};
+/// let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]])?;
+/// let cameras = rig(&mesh, &RigSettings { count: 6, ..Default::default() })?;
+/// assert_eq!(cameras.len(), 6);
+/// # Ok::<(), semfm_views::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Invalid`] for settings outside their range, [`semfm_geom::Error::NoArea`] for a
+/// surface without area.
+pub fn rig(mesh: &Mesh, settings: &RigSettings) -> Result<Vec<Camera>> {
+    settings.check()?;
+    let frame = principal_frame(mesh)?;
+    let frame = if settings.principal_frame { frame } else { DMat3::IDENTITY };
+    let object = Extent::new(mesh, frame);
+    fibonacci_directions(settings.count)
+        .map(|direction| object.camera(direction, settings))
+        .collect()
+}
+
+/// One camera that looks along `-direction` at the whole object with `up` upwards in the image
+/// (both in the mesh's frame), framed as the settings say: for pictures of results.
+///
+/// # Errors
+/// As [`rig`], and [`Error::Invalid`] for a direction or an up of no length.
+pub fn camera_towards(
+    mesh: &Mesh,
+    direction: DVec3,
+    up: DVec3,
+    settings: &RigSettings,
+) -> Result<Camera> {
+    settings.check()?;
+    let unit = |what: &str, v: DVec3| {
+        v.try_normalize()
+            .ok_or_else(|| Error::invalid(what, "a finite vector of some length", v.to_string()))
+    };
+    let (direction, up) = (unit("view direction", direction)?, unit("up", up)?);
+    let frame =
+        DMat3::from_cols(up.any_orthonormal_vector().cross(up), up.any_orthonormal_vector(), up);
+    let frame = frame.transpose();
+    let object = Extent::new(mesh, frame);
+    object.camera(frame * direction, settings)
+}
+
+/// `count` unit vectors spread evenly over the sphere along a golden-angle spiral, from +z down to
+/// −z and never exactly at a pole (offset Fibonacci lattice, González 2010).
+pub fn fibonacci_directions(count: usize) -> impl Iterator<Item = DVec3> {
+    let golden_turn = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    (0..count).map(move |i| {
+        let i = i as f64 + 0.5;
+        let z = 1.0 - 2.0 * i / count as f64;
+        let (sin, cos) = (golden_turn * i).sin_cos();
+        let ring = (1.0 - z * z).sqrt();
+        DVec3::new(ring * cos, ring * sin, z)
+    })
+}
+
+/// What a camera must frame: the surface's vertices and their bounding sphere, in a frame whose z
+/// is up.
+struct Extent {
+    vertices: Vec<DVec3>,
+    frame: DMat3,
+    /// Centre of the bounding box along the frame's axes.
+    centre: DVec3,
+    radius: f64,
+}
+
+impl Extent {
+    fn new(mesh: &Mesh, frame: DMat3) -> Self {
+        let vertices = surface_vertices(mesh);
+        let (low, high) = vertices
+            .iter()
+            .map(|&p| frame * p)
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            });
+        let centre = frame.transpose() * ((low + high) / 2.0);
+        let radius = vertices.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        Self { vertices, frame, centre, radius }
+    }
+
+    /// The camera in direction `direction` (in the frame) that frames the silhouette.
+    fn camera(&self, direction: DVec3, settings: &RigSettings) -> Result<Camera> {
+        // Rows of the rotation: image right, image down, and forward, away from the direction.
+        let right = DVec3::Z.cross(direction).try_normalize().unwrap_or(DVec3::X);
+        let up = direction.cross(right);
+        let camera_from_frame = DMat3::from_cols(right, -up, -direction).transpose();
+        let rotation = camera_from_frame * self.frame;
+        let distance = STAND_OFF * self.radius / (settings.field_of_view / 2.0).sin();
+        let translation = DVec3::Z * distance - rotation * self.centre;
+        let camera_from_object = DAffine3::from_mat3_translation(rotation, translation);
+
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &p in &self.vertices {
+            let p = camera_from_object.transform_point3(p);
+            let slope = p / p.z; // (x/z, y/z, 1)
+            (low, high) = (low.min(slope), high.max(slope));
+        }
+        let half = ((high - low) / 2.0).truncate().max_element();
+        let half_of_sphere = self.radius / distance;
+        let side = f64::from(settings.size);
+        let focal = settings.fill * side / 2.0 / half.max(half_of_sphere / settings.max_zoom);
+        let middle = (low + high) / 2.0;
+        let camera = Camera {
+            width: settings.size,
+            height: settings.size,
+            fx: focal,
+            fy: focal,
+            cx: side / 2.0 - focal * middle.x,
+            cy: side / 2.0 - focal * middle.y,
+            camera_from_object,
+        };
+        camera.check("fitted camera")?;
+        Ok(camera)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn knife() -> Mesh {
+        // A long thin wedge: 20 long, 2 wide, .3 thick, heavier at one end.
+        let corners =
+            [[0.0, 0.0, 0.0], [20.0, 0.5, 0.05], [0.0, 2.0, 0.0], [0.2, 0.4, 0.3], [6.0, 2.5, 0.1]];
+        let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [2, 4, 1]];
+        Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap()
+    }
+
+    fn extents(mesh: &Mesh, camera: &Camera) -> (DVec3, DVec3) {
+        mesh.vertices()
+            .iter()
+            .map(|&p| camera.project(p))
+            .fold((DVec3::INFINITY, -DVec3::INFINITY), |(low, high), (u, v, z)| {
+                (low.min(DVec3::new(u, v, z)), high.max(DVec3::new(u, v, z)))
+            })
+    }
+
+    #[test]
+    fn silhouettes_are_centred_and_fill_their_share() {
+        let mesh = knife();
+        let cameras = rig(&mesh, &RigSettings::default()).unwrap();
+        assert_eq!(cameras.len(), 14);
+        let mut fills = Vec::new();
+        for camera in &cameras {
+            let (low, high) = extents(&mesh, camera);
+            assert!(
+                ((low + high) / 2.0 - DVec3::splat(112.0)).truncate().abs().max_element() < 1e-6
+            );
+            fills.push((high - low).truncate().max_element() / 224.0);
+        }
+        assert!(fills.iter().all(|&fill| fill <= 0.8 + 1e-9), "{fills:?}");
+        assert!(fills.iter().filter(|&&fill| fill > 0.8 - 1e-9).count() >= 8, "{fills:?}");
+    }
+
+    #[test]
+    fn the_longest_axis_stands_upright() {
+        let mesh = knife();
+        for camera in rig(&mesh, &RigSettings::default()).unwrap() {
+            let (u0, v0, _) = camera.project(DVec3::new(0.0, 1.0, 0.0));
+            let (u1, v1, _) = camera.project(DVec3::new(20.0, 0.5, 0.05));
+            assert!((v1 - v0).abs() > 2.0 * (u1 - u0).abs(), "{u0} {v0} {u1} {v1}");
+            // The tip is the longer tail, so it is up: towards smaller v.
+            assert!(v1 < v0);
+        }
+    }
+
+    #[test]
+    fn the_rig_turns_with_the_object() {
+        let mesh = knife();
+        let turn = DMat3::from_rotation_y(0.4) * DMat3::from_rotation_x(2.2);
+        let vertices = mesh.vertices().iter().map(|&p| turn * p + DVec3::splat(5.0)).collect();
+        let turned = Mesh::new(vertices, mesh.faces().to_vec()).unwrap();
+        let settings = RigSettings::default();
+        let (still, moved) = (rig(&mesh, &settings).unwrap(), rig(&turned, &settings).unwrap());
+        for (a, b) in still.iter().zip(&moved) {
+            for (&p, &q) in mesh.vertices().iter().zip(turned.vertices()) {
+                let ((u, v, z), (u2, v2, z2)) = (a.project(p), b.project(q));
+                assert!((u - u2).abs() + (v - v2).abs() + (z - z2).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_single_camera_looks_where_it_is_told() {
+        let mesh = knife();
+        let settings = RigSettings { size: 400, ..Default::default() };
+        let camera = camera_towards(&mesh, DVec3::Z, DVec3::Y, &settings).unwrap();
+        let (u, v, z) = camera.project(DVec3::new(5.0, 1.0, 0.0));
+        let (right, _, _) = camera.project(DVec3::new(6.0, 1.0, 0.0));
+        let (_, above, _) = camera.project(DVec3::new(5.0, 2.0, 0.0));
+        let (_, _, nearer) = camera.project(DVec3::new(5.0, 1.0, 1.0));
+        assert!(right > u && above < v && (z - nearer - 1.0).abs() < 1e-9);
+        assert!(camera_towards(&mesh, DVec3::ZERO, DVec3::Y, &settings).is_err());
+        assert!(camera_towards(&mesh, DVec3::Y, DVec3::Y, &settings).is_ok());
+    }
+
+    #[test]
+    fn settings_out_of_range_are_named() {
+        for (settings, name) in [
+            (RigSettings { count: 0, ..Default::default() }, "views"),
+            (RigSettings { size: 0, ..Default::default() }, "image size"),
+            (RigSettings { size: 9000, ..Default::default() }, "image size"),
+            (RigSettings { fill: f64::NAN, ..Default::default() }, "fill"),
+            (RigSettings { field_of_view: 3.5, ..Default::default() }, "field of view"),
+        ] {
+            let message = rig(&knife(), &settings).unwrap_err().to_string();
+            assert!(message.contains(name), "{message}");
+        }
+    }
+}

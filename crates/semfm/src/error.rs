@@ -1,0 +1,76 @@
+//! What can go wrong on the way from two meshes to a region.
+
+use std::path::PathBuf;
+
+/// Result of a facade call.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// An error of any floor, or of a file that only the facade knows.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Meshes, matrices and their files.
+    #[error(transparent)]
+    Geom(#[from] semfm_geom::Error),
+    /// Views, embeddings and their files.
+    #[error(transparent)]
+    Views(#[from] semfm_views::Error),
+    /// Maps and regions.
+    #[error(transparent)]
+    Fmap(#[from] semfm_fmap::Error),
+    /// An argument outside what it may be.
+    #[error("{what}: expected {expected}, found {found}")]
+    Invalid {
+        /// Name of the argument.
+        what: String,
+        /// What is allowed.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// A file is not what its format demands.
+    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Field, line or element.
+        place: String,
+        /// What the format demands there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn invalid(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
+    }
+
+    /// A short name of the kind of failure, for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Geom(cause) => cause.code(),
+            Self::Views(cause) => cause.code(),
+            Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.code(),
+            Self::Fmap(_) | Self::Invalid { .. } => "invalid",
+            Self::Format { .. } => "format",
+        }
+    }
+
+    /// Where in the file, or which argument; `None` where the failure has no place.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::Geom(cause) => cause.place(),
+            Self::Views(cause) => cause.place(),
+            Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.place(),
+            Self::Fmap(_) => None,
+            Self::Invalid { what, .. } => Some(what.clone()),
+            Self::Format { place, .. } => Some(place.clone()),
+        }
+    }
+}

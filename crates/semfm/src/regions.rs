@@ -1,0 +1,166 @@
+//! Where a region comes from: a contact and a radius, a mask in a view, a painted mesh.
+
+use semfm_geom::geodesic::{HeatGeodesics, HeatSettings};
+use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, SurfaceIndex};
+use semfm_views::Camera;
+
+use crate::{Error, Region, Result};
+
+/// All vertices within the geodesic `radius` of the surface point nearest to `contact`.
+///
+/// Both are in the mesh's own frame and units. Distances are those of the heat method (Crane,
+/// Weischedel & Wardetzky 2013) from the corners of the triangle that was touched, each at its own
+/// distance from the contact.
+///
+/// # Errors
+/// [`Error::Invalid`] for a radius that is not positive or a contact that is not finite, or where
+/// no vertex is that near.
+pub fn near(mesh: &Mesh, contact: DVec3, radius: f64) -> Result<Region> {
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Err(Error::invalid("radius", "a positive length", radius.to_string()));
+    }
+    let touched = SurfaceIndex::new(mesh)?
+        .closest(contact)
+        .ok_or_else(|| Error::invalid("contact", "finite coordinates", contact.to_string()))?;
+    let corners = mesh.faces()[touched.face as usize];
+    let geodesics = HeatGeodesics::new(mesh, &HeatSettings::default())?;
+    let from_corners = geodesics.distances_from_each(&corners)?;
+    let offsets = corners.map(|v| mesh.vertices()[v as usize].distance(touched.point));
+    let inside: Vec<bool> = (0..mesh.n_vertices())
+        .map(|v| (0..3).any(|c| from_corners[(v, c)] + offsets[c] <= radius))
+        .collect();
+    if !inside.contains(&true) {
+        let nearest = offsets.iter().copied().fold(f64::INFINITY, f64::min);
+        let expected = format!("at least {nearest:.3e}, the distance to the nearest vertex");
+        return Err(Error::invalid("radius", expected, radius.to_string()));
+    }
+    Ok(Region::from_mask(&inside))
+}
+
+/// How far behind the visible surface a vertex may lie and still be seen, as a share of the
+/// bounding-sphere radius. Less loses vertices at grazing angles, more paints through thin walls.
+const SIGHT_TOLERANCE: f64 = 0.01;
+
+/// All vertices that `camera` sees inside `mask` (height × width, row-major).
+///
+/// # Errors
+/// [`Error::Invalid`] where the mask is not of the camera's size or shows no vertex.
+pub fn masked(mesh: &Mesh, camera: &Camera, mask: &[bool]) -> Result<Region> {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    if mask.len() != width * height {
+        let expected = format!("{} pixels ({width} × {height}, as the view)", width * height);
+        return Err(Error::invalid("mask", expected, format!("{} pixels", mask.len())));
+    }
+    let surface = SurfaceIndex::new(mesh)?;
+    let margin = SIGHT_TOLERANCE * mesh.bounding_sphere().1;
+    let eye = camera.eye();
+    let inside: Vec<bool> = mesh
+        .vertices()
+        .iter()
+        .map(|&p| {
+            let (u, v, z) = camera.project(p);
+            let on_image = z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
+            on_image && mask[v as usize * width + u as usize] && !surface.blocked(eye, p, margin)
+        })
+        .collect();
+    if !inside.contains(&true) {
+        let found = format!("none behind {} marked pixels", mask.iter().filter(|&&m| m).count());
+        return Err(Error::invalid("mask", "at least one visible vertex", found));
+    }
+    Ok(Region::from_mask(&inside))
+}
+
+/// How much redder than green and blue a vertex must be to count as painted. The colours that we
+/// write ourselves cross this at weight one half.
+const REDNESS: i16 = 90;
+
+/// How far a vertex's colour may be from the one asked for, in each channel.
+const PAINT_TOLERANCE: i16 = 60;
+
+/// All vertices painted red, or in the `paint` given (sRGB).
+///
+/// # Errors
+/// [`Error::Invalid`] where the mesh has no colours or none is of that paint.
+pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Region> {
+    let Some(colors) = colors else {
+        return Err(Error::invalid("vertex colours", "a painted mesh", "a mesh without colours"));
+    };
+    let is_painted = |color: &[u8; 4]| {
+        let [r, g, b, _] = color.map(i16::from);
+        match paint {
+            Some(paint) => [r, g, b]
+                .iter()
+                .zip(paint)
+                .all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE),
+            None => r - g.max(b) >= REDNESS,
+        }
+    };
+    let inside: Vec<bool> = colors.iter().map(is_painted).collect();
+    if !inside.contains(&true) {
+        let wanted = paint.map_or("red".into(), |[r, g, b]| format!("({r}, {g}, {b})"));
+        let expected = format!("at least one vertex painted {wanted}");
+        return Err(Error::invalid(
+            "vertex colours",
+            expected,
+            format!("none of {}", colors.len()),
+        ));
+    }
+    Ok(Region::from_mask(&inside))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::zoo;
+
+    #[test]
+    fn near_takes_a_geodesic_disc() {
+        let sphere = zoo::icosphere(4);
+        let region = near(&sphere, DVec3::new(0.0, 0.0, 1.2), 0.5).unwrap();
+        for (v, inside) in region.mask().into_iter().enumerate() {
+            let angle = sphere.vertices()[v].normalize().z.clamp(-1.0, 1.0).acos();
+            // Within the heat method's error at this resolution.
+            assert!(
+                (angle - 0.5).abs() < 0.05 || inside == (angle < 0.5),
+                "angle {angle}: {inside}"
+            );
+        }
+        assert!(near(&sphere, DVec3::Z, -1.0).is_err());
+        assert!(near(&sphere, DVec3::NAN, 0.5).is_err());
+    }
+
+    #[test]
+    fn a_mask_marks_what_faces_the_camera_only() {
+        let sphere = zoo::icosphere(3);
+        let camera = Camera {
+            width: 64,
+            height: 64,
+            fx: 100.0,
+            fy: 100.0,
+            cx: 32.0,
+            cy: 32.0,
+            camera_from_object: semfm_geom::math::DAffine3::from_translation(DVec3::new(
+                0.0, 0.0, 4.0,
+            )),
+        };
+        let region = masked(&sphere, &camera, &[true; 64 * 64]).unwrap();
+        let seen = region.vertices();
+        assert!(
+            seen.iter().all(|&v| sphere.vertices()[v as usize].z < 0.0),
+            "the far side is hidden"
+        );
+        assert!(seen.len() > sphere.n_vertices() / 4);
+        assert!(masked(&sphere, &camera, &[true; 10]).is_err());
+        assert!(masked(&sphere, &camera, &[false; 64 * 64]).is_err());
+    }
+
+    #[test]
+    fn paint_is_red_unless_said_otherwise() {
+        let colors = [[220, 40, 40, 255], [200, 200, 200, 255], [30, 40, 200, 255]];
+        assert_eq!(painted(Some(&colors), None).unwrap().vertices(), [0]);
+        assert_eq!(painted(Some(&colors), Some([20, 20, 220])).unwrap().vertices(), [2]);
+        assert!(painted(Some(&colors[1..2]), None).is_err());
+        assert!(painted(None, None).is_err());
+    }
+}

@@ -1,0 +1,3 @@
+"""SemFM: carry a grasp region from one object to another by semantic functional maps."""
+
+__version__ = "0.1.0"

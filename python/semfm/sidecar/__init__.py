@@ -1,0 +1,34 @@
+"""The sidecar: turns rendered views into patch embeddings with a pretrained image encoder.
+
+Models live in Python, geometry lives in Rust, and between them stand MCAP files::
+
+    semfm-cli views  mug.obj -o mug.views.mcap
+    semfm-embed      mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224
+
+The same from Python::
+
+    from semfm.sidecar import embed_file, open_encoder
+    encoder = open_encoder("mobilenet.json")
+    embed_file("mug.views.mcap", "mug.emb.mcap", encoder)
+
+How a view becomes a grid of vectors, and where to read about it:
+
+1. :mod:`.mcap_reader` reads the views file strictly, :mod:`.views_file` picks the pictures and
+   triangle images out of it;
+2. every picture is shown to the encoder upright and rolled by 90, 180 and 270 degrees
+   (:mod:`.patches`); an encoder is anything that keeps the small promise of :mod:`.encoder`:
+   :mod:`.onnx_encoder`, :mod:`.siglip`, :mod:`.dinov2`;
+3. per roll, tokens of outlying norm are dropped and the others scaled to unit length; the grids
+   are rolled back and averaged (:mod:`.patches`);
+4. :mod:`.coverage` says how much of each patch the object fills, and :mod:`.embeddings_file`
+   writes everything, whole or not at all, in the schema of :mod:`.schemas`.
+
+The base install needs neither torch nor onnxruntime: they are imported when an encoder is opened.
+"""
+
+from .embed import EmbedSettings, embed_file
+from .encoder import Encoder, Grid
+from .errors import SidecarError
+from .models import open_encoder
+
+__all__ = ["EmbedSettings", "Encoder", "Grid", "SidecarError", "embed_file", "open_encoder"]

@@ -1,0 +1,102 @@
+"""The command ``semfm-embed``: stdout says where it wrote, everything else goes to stderr."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Sequence
+
+from .. import __version__
+from .embed import EmbedSettings, embed_file
+from .embeddings_file import DTYPES
+from .errors import SidecarError
+from .models import DEVICES, open_encoder
+from .patches import ROLLS
+from .progress import MODES, open_progress
+
+_EPILOG = """\
+examples:
+  semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224
+  semfm-embed mug.views.mcap -o mug.emb.mcap --model mobilenet_v2.json --threads 2
+
+exit code: 0 written, 2 bad input or failure (nothing is written), 130 interrupted
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command's arguments."""
+    settings = EmbedSettings()
+    p = argparse.ArgumentParser(
+        prog="semfm-embed",
+        description="Patch embeddings of rendered views by a pretrained image encoder.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    p.add_argument("views", metavar="V.views.mcap", help="views, from `semfm-cli views`")
+    p.add_argument("-o", "--output", metavar="V.emb.mcap", required=True, help="file to write")
+    p.add_argument(
+        "--model",
+        required=True,
+        metavar="NAME|DIR|ENCODER.json",
+        help="SigLIP, SigLIP 2 or DINOv2 by its name on the Hugging Face hub or by folder, "
+        "or an ONNX encoder by its JSON",
+    )
+    p.add_argument(
+        "--rolls",
+        type=int,
+        choices=list(ROLLS),
+        default=settings.rolls,
+        help="average over this many rolls of each picture (default %(default)s)",
+    )
+    run = p.add_argument_group("how it runs")
+    run.add_argument("--device", choices=DEVICES, default="auto", help="default %(default)s")
+    run.add_argument(
+        "--batch",
+        type=int,
+        default=settings.batch,
+        metavar="N",
+        help="pictures at once (%(default)s)",
+    )
+    run.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
+    run.add_argument(
+        "--dtype", choices=list(DTYPES), default=settings.dtype, help="in the file (%(default)s)"
+    )
+    talk = p.add_argument_group("talk")
+    talk.add_argument("--progress", choices=MODES, default="auto", help="on stderr (%(default)s)")
+    talk.add_argument("--quiet", action="store_true", help="no talk but errors")
+    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    return p
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    args = parser().parse_args(argv)
+    try:
+        _run(args)
+    except SidecarError as error:
+        print(f"semfm-embed: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("semfm-embed: interrupted, nothing written", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _run(args: argparse.Namespace) -> None:
+    settings = EmbedSettings(args.rolls, args.batch, args.dtype)
+    for path in (args.views, os.path.dirname(os.path.abspath(args.output))):
+        if not os.path.exists(path):  # before minutes go into loading a model
+            raise SidecarError(f"{path}: No such file or directory")
+    encoder = open_encoder(args.model, args.device, args.threads)
+    start = time.perf_counter()
+    progress = open_progress("none" if args.quiet else args.progress)
+    try:
+        embed_file(args.views, args.output, encoder, settings, progress)
+    finally:
+        progress.close()
+    if not args.quiet and args.progress != "json":
+        took = time.perf_counter() - start
+        print(f"semfm-embed: {encoder.name}, {took:.1f} s", file=sys.stderr)
+    print(args.output)

@@ -1,0 +1,70 @@
+"""Progress on stderr: a bar for people, lines of JSON for a program that draws its own."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Protocol
+
+#: Values of ``--progress``. ``auto`` draws a bar when stderr is a terminal.
+MODES = ("auto", "json", "none")
+
+
+class Progress(Protocol):
+    """Takes how far the work has come; call :meth:`close` at the end."""
+
+    def __call__(self, done: int, total: int) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def open_progress(mode: str) -> Progress:
+    """The progress display of one of :data:`MODES`."""
+    if mode == "json":
+        return _JsonLines()
+    if mode == "none" or not sys.stderr.isatty():
+        return _Silent()
+    try:
+        return _TqdmBar()
+    except ImportError:
+        return _PlainBar()
+
+
+class _Silent:
+    def __call__(self, done: int, total: int) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class _JsonLines(_Silent):
+    """One object a line: {"event": "progress", "done": 28, "total": 56, "unit": "images"}."""
+
+    def __call__(self, done: int, total: int) -> None:
+        line = {"event": "progress", "done": done, "total": total, "unit": "images"}
+        print(json.dumps(line), file=sys.stderr, flush=True)
+
+
+class _PlainBar(_Silent):
+    def __call__(self, done: int, total: int) -> None:
+        filled = 30 * done // max(total, 1)
+        bar = "#" * filled + "." * (30 - filled)
+        print(f"\r[{bar}] {done}/{total} images", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        print(file=sys.stderr)
+
+
+class _TqdmBar(_Silent):
+    def __init__(self) -> None:
+        from tqdm import tqdm
+
+        self.bar = tqdm(unit=" images", file=sys.stderr, leave=False)
+
+    def __call__(self, done: int, total: int) -> None:
+        self.bar.total = total
+        self.bar.update(done - self.bar.n)
+
+    def close(self) -> None:
+        self.bar.close()

@@ -1,0 +1,187 @@
+//! How many tests passed, failed and were skipped, read from what the runners print.
+//!
+//! Rust's test harness knows no skipped tests: one that lacks its data prints a line that begins
+//! with `SKIPPED` and returns. Such a test is counted as skipped, not as passed.
+
+use std::fmt;
+
+/// Sums over all runners.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Tests that ran and held.
+    pub passed: usize,
+    /// Tests that did not hold, and runners that could not start.
+    pub failed: usize,
+    /// Tests that did not run.
+    pub skipped: usize,
+    /// Why, one line each.
+    pub reasons: Vec<String>,
+}
+
+impl Tally {
+    /// Counts one thing that either worked or did not.
+    pub fn count(&mut self, worked: bool) {
+        if worked { self.passed += 1 } else { self.failed += 1 }
+    }
+
+    /// Adds another sum to this one.
+    pub fn add(&mut self, other: Self) {
+        self.passed += other.passed;
+        self.failed += other.failed;
+        self.skipped += other.skipped;
+        self.reasons.extend(other.reasons);
+    }
+
+    /// A runner that failed without a failed test (it did not build, say) is one failure.
+    pub fn closed(mut self, succeeded: bool) -> Self {
+        if !succeeded && self.failed == 0 {
+            self.failed = 1;
+        }
+        self
+    }
+
+    /// Turns tests that were skipped for want of the shared data into failures.
+    pub fn demand_shared_data(&mut self) {
+        let wanting = self.reasons.iter().filter(|reason| reason.contains("shared")).count();
+        let wanting = wanting.min(self.skipped);
+        self.skipped -= wanting;
+        self.failed += wanting;
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} passed, {} failed, {} skipped", self.passed, self.failed, self.skipped)
+    }
+}
+
+/// Reads `cargo test -- --show-output`, line by line.
+#[derive(Default)]
+pub struct CargoTest {
+    tally: Tally,
+    /// Whether the test whose output is being read was already counted as skipped.
+    counted: bool,
+    /// Tests of this binary that returned early: the harness will count them as passed.
+    returned_early: usize,
+}
+
+impl CargoTest {
+    /// The next line of standard output.
+    pub fn read(&mut self, line: &str) {
+        if line.starts_with("---- ") {
+            self.counted = false;
+        } else if line.starts_with("SKIPPED") {
+            self.tally.reasons.push(line.to_owned());
+            if !self.counted {
+                self.counted = true;
+                self.returned_early += 1;
+            }
+        } else if let Some(result) = line.strip_prefix("test result: ") {
+            let early = std::mem::take(&mut self.returned_early);
+            self.counted = false;
+            self.tally.skipped += early;
+            // "ok. 3 passed; 0 failed; 1 ignored; 0 measured; …"
+            let counts = result.split_once(". ").map_or("", |(_, counts)| counts);
+            for (number, word) in counts.split("; ").filter_map(number_and_word) {
+                match word {
+                    "passed" => self.tally.passed += number.saturating_sub(early),
+                    "failed" => self.tally.failed += number,
+                    "ignored" => self.tally.skipped += number,
+                    _ => {}
+                }
+            }
+        }
+    }
+
+    /// The sum, once the runner has ended.
+    pub fn end(self, succeeded: bool) -> Tally {
+        self.tally.closed(succeeded)
+    }
+}
+
+/// Reads pytest's output, line by line.
+#[derive(Default)]
+pub struct Pytest(Tally);
+
+impl Pytest {
+    /// The next line of standard output.
+    pub fn read(&mut self, line: &str) {
+        if line.starts_with("SKIPPED [") {
+            self.0.reasons.push(line.to_owned());
+            return;
+        }
+        // "==== 3 passed, 1 skipped in 0.12s ===="
+        let Some((counts, _)) = line.trim_matches('=').trim().rsplit_once(" in ") else { return };
+        for (number, word) in counts.split(", ").filter_map(number_and_word) {
+            match word {
+                "passed" | "xfailed" => self.0.passed += number,
+                "failed" | "error" | "errors" | "xpassed" => self.0.failed += number,
+                "skipped" => self.0.skipped += number,
+                _ => {}
+            }
+        }
+    }
+
+    /// The sum, once the runner has ended.
+    pub fn end(self, succeeded: bool) -> Tally {
+        self.0.closed(succeeded)
+    }
+}
+
+fn number_and_word(text: &str) -> Option<(usize, &str)> {
+    let (number, word) = text.trim().split_once(' ')?;
+    Some((number.parse().ok()?, word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cargo_test(text: &str, succeeded: bool) -> String {
+        let mut reader = CargoTest::default();
+        text.lines().for_each(|line| reader.read(line));
+        reader.end(succeeded).to_string()
+    }
+
+    fn pytest(text: &str, succeeded: bool) -> String {
+        let mut reader = Pytest::default();
+        text.lines().for_each(|line| reader.read(line));
+        reader.end(succeeded).to_string()
+    }
+
+    #[test]
+    fn a_test_that_says_skipped_did_not_pass() {
+        let text = "running 3 tests\ntest a ... ok\n\nsuccesses:\n\n\
+            ---- a stdout ----\nSKIPPED: no shared data\nSKIPPED: nor this\n\n\
+            ---- b stdout ----\nSKIPPED: no shared data\n\nsuccesses:\n    a\n    b\n\n\
+            test result: ok. 3 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.1s\n\
+            test result: FAILED. 1 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.1s";
+        assert_eq!(cargo_test(text, false), "2 passed, 2 failed, 3 skipped");
+    }
+
+    #[test]
+    fn a_runner_that_could_not_start_is_a_failure() {
+        assert_eq!(cargo_test("error: could not compile", false), "0 passed, 1 failed, 0 skipped");
+        assert_eq!(pytest("no tests ran in 0.01s", false), "0 passed, 1 failed, 0 skipped");
+    }
+
+    #[test]
+    fn the_last_line_of_pytest_counts() {
+        let text = "SKIPPED [1] tests/a.py:3: no shared data\n\
+            ===== 1 failed, 31 passed, 2 skipped, 1 warning, 1 error in 3.21s =====";
+        assert_eq!(pytest(text, false), "31 passed, 2 failed, 2 skipped");
+        assert_eq!(pytest("5 passed in 0.10s", true), "5 passed, 0 failed, 0 skipped");
+        assert_eq!(
+            pytest("=== 4 passed in 61.02s (0:01:01) ===", true),
+            "4 passed, 0 failed, 0 skipped"
+        );
+    }
+
+    #[test]
+    fn missing_shared_data_can_be_made_a_failure() {
+        let reasons = vec!["SKIPPED: no shared data".into(), "SKIPPED: no CUDA".into()];
+        let mut tally = Tally { passed: 1, failed: 0, skipped: 2, reasons };
+        tally.demand_shared_data();
+        assert_eq!(tally.to_string(), "1 passed, 1 failed, 1 skipped");
+    }
+}
