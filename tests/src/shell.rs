@@ -51,6 +51,6 @@ pub fn shared(what: &str) -> Option<PathBuf> {
     if folder.exists() {
         return Some(folder);
     }
-    eprintln!("SKIPPED: no {}; set SEMFM_SHARED", folder.display());
+    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
     None
 }

@@ -42,7 +42,8 @@ impl Tally {
 
     /// Turns tests that were skipped for want of the shared data into failures.
     pub fn demand_shared_data(&mut self) {
-        let wanting = self.reasons.iter().filter(|reason| reason.contains("shared")).count();
+        let wants = |reason: &&String| reason.to_lowercase().contains("shared");
+        let wanting = self.reasons.iter().filter(wants).count();
         let wanting = wanting.min(self.skipped);
         self.skipped -= wanting;
         self.failed += wanting;

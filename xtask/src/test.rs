@@ -97,14 +97,13 @@ impl Steps<'_> {
         Ok(reader.end(succeeded))
     }
 
-    /// What every runner is told: whether this is the full run, where the binary is, and that
-    /// `semfm-embed` is the one in `.venv`.
+    /// What every runner is told: whether this is the full run, and that `semfm-embed` is the one in
+    /// `.venv`.
     fn with_settings(&self, process: Process) -> Result<Process> {
         let system = std::env::var_os("PATH").unwrap_or_default();
         let ours = [self.workspace.root.join(".venv/bin")];
         let path = std::env::join_paths(ours.into_iter().chain(std::env::split_paths(&system)))?;
-        let process =
-            process.env("PATH", path).env("SEMFM_CLI", self.workspace.built("debug/semfm-cli"));
+        let process = process.env("PATH", path);
         Ok(if self.full { process.env("SEMFM_FULL", "1") } else { process })
     }
 }

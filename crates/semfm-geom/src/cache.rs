@@ -8,11 +8,12 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 8 + 32 | `SEMFMSH1`, key |
-//! | 5 × 8 | n original vertices, n working vertices, m triangles, k, length of the report |
+//! | 8 + 32 | `SEMFMSH2`, key |
+//! | 6 × 8 | n original vertices, n working vertices, m triangles, k, e entries of the stiffness, length of the report |
 //! | 24 n_w + 12 m | working mesh |
 //! | 4 n + 4 n_w | `of_original`, `to_original` |
 //! | 36 n | carriers: weights of all, then corners of all |
+//! | 16 e | stiffness: values of all, then row and column of all |
 //! | 8 k + 8 n_w k + 8 n_w + 8 k | eigenvalues, eigenfunctions by column, mass, residuals |
 //! | report | JSON |
 //! | 32 | BLAKE3 of everything before |
@@ -23,16 +24,19 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use faer::Mat;
+use faer::sparse::{SparseColMat, Triplet};
 
 use crate::math::DVec3;
 use crate::working::{Carrier, WorkingMesh};
-use crate::{Eigenbasis, Error, Mesh, MeshHash, Result, Shape, ShapeReport, ShapeSettings, Task};
+use crate::{
+    Eigenbasis, Error, Laplacian, Mesh, MeshHash, Result, Shape, ShapeReport, ShapeSettings, Task,
+};
 
 /// Names format and version. A change of the layout *or of any step that leads to a shape* must
 /// change it: entries of other versions are never read.
-const MAGIC: [u8; 8] = *b"SEMFMSH1";
+const MAGIC: [u8; 8] = *b"SEMFMSH2";
 const SUFFIX: &str = "shape";
-const HEADER: usize = 8 + 32 + 5 * 8;
+const HEADER: usize = 8 + 32 + 6 * 8;
 const TRAILER: usize = 32;
 
 /// Where prepared shapes are kept.

@@ -19,7 +19,7 @@ fn corpus() -> Option<PathBuf> {
     if folder.join("MANIFEST.tsv").is_file() {
         return Some(folder);
     }
-    eprintln!("SKIPPED: no corpus at {}; set SEMFM_SHARED", folder.display());
+    eprintln!("SKIPPED: no shared corpus at {}; set SEMFM_SHARED", folder.display());
     None
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use semfm_geom::clean::CleanSettings;
-use semfm_geom::math::DVec3;
+use semfm_geom::io::read_mesh;
 use semfm_geom::simplify::{SimplifyReport, SimplifySettings};
 use semfm_geom::{Mesh, Task, WorkingMesh};
 
@@ -31,46 +31,9 @@ fn shared() -> Option<PathBuf> {
     let root = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join("data");
     let found = root.join("objects").is_dir();
     if !found {
-        eprintln!("SKIPPED: no real objects under {}", root.display());
+        eprintln!("SKIPPED: no shared objects under {}", root.display());
     }
     found.then_some(root)
-}
-
-/// Vertices and triangles of an OBJ, which is all that these files hold.
-fn read_obj(path: &Path) -> Mesh {
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let (kind, rest) = line.split_once(' ').unwrap_or((line, ""));
-        let words = rest.split_whitespace();
-        match kind {
-            "v" => {
-                let x: Vec<f64> = words.take(3).map(|word| word.parse().unwrap()).collect();
-                vertices.push(DVec3::from_slice(&x));
-            }
-            "f" => {
-                let ids = words.map(|word| word.split('/').next().unwrap().parse::<u32>().unwrap());
-                let ids: Vec<u32> = ids.map(|id| id - 1).collect();
-                faces.push([ids[0], ids[1], ids[2]]);
-            }
-            _ => {}
-        }
-    }
-    Mesh::new(vertices, faces).unwrap()
-}
-
-fn read_glb(path: &Path) -> Mesh {
-    let file = gltf::Gltf::open(path).unwrap();
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for primitive in file.meshes().flat_map(|mesh| mesh.primitives()) {
-        let reader = primitive.reader(|_| file.blob.as_deref());
-        let first = vertices.len() as u32;
-        vertices.extend(reader.read_positions().unwrap().map(|p| DVec3::from(p.map(f64::from))));
-        let ids: Vec<u32> =
-            reader.read_indices().unwrap().into_u32().map(|id| first + id).collect();
-        faces.extend(ids.as_chunks::<3>().0);
-    }
-    Mesh::new(vertices, faces).unwrap()
 }
 
 fn working(name: &str, mesh: &Mesh, target_vertices: usize) -> (WorkingMesh, SimplifyReport) {
@@ -105,7 +68,7 @@ fn slivers(mesh: &Mesh) -> f64 {
 fn real_objects_keep_their_topology_and_their_place() {
     let Some(root) = shared() else { return };
     for name in OBJECTS {
-        let mesh = read_obj(&root.join("objects").join(name).with_extension("obj"));
+        let mesh = read_mesh(root.join("objects").join(name).with_extension("obj")).unwrap().mesh;
         for target in [10_000, 4_000] {
             let (working, report) = working(name, &mesh, target);
             assert_eq!(report.topology, report.topology_before, "{name} at {target}");
@@ -118,7 +81,7 @@ fn real_objects_keep_their_topology_and_their_place() {
 #[test]
 fn a_generated_object_keeps_its_many_handles() {
     let Some(root) = shared() else { return };
-    let mesh = read_glb(&root.join("sam3d/sam3d_sample.glb"));
+    let mesh = read_mesh(root.join("sam3d/sam3d_sample.glb")).unwrap().mesh;
     let (_, report) = working("sam3d", &mesh, 10_000);
     assert_eq!(report.topology, report.topology_before);
     assert!(report.distance <= 0.01, "{}", report.distance);
@@ -132,7 +95,7 @@ fn labelled_regions_survive_the_way_there_and_back() {
         let Ok(label) = std::fs::read_to_string(path.with_extension("json")) else { continue };
         let label: serde_json::Value = serde_json::from_str(&label).unwrap();
         let ids = label["region"]["vertices"].as_array().unwrap();
-        let mesh = read_obj(&path.with_extension("obj"));
+        let mesh = read_mesh(path.with_extension("obj")).unwrap().mesh;
         let mut region = vec![0.0; mesh.n_vertices()];
         ids.iter().for_each(|id| region[id.as_u64().unwrap() as usize] = 1.0);
         // A border drawn through triangles twelve times as large is off by part of one of them.
