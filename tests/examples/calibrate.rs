@@ -12,7 +12,8 @@ use semfm_tests::calibration::{Plan, Result, Scores};
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let n_objects = arguments.next().map_or(Ok(4), |text| text.parse())?;
-    let named = arguments.map(|text| text.parse()).collect::<std::result::Result<Vec<Level>, _>>()?;
+    let named =
+        arguments.map(|text| text.parse()).collect::<std::result::Result<Vec<Level>, _>>()?;
     let levels = if named.is_empty() { Level::ALL.to_vec() } else { named };
     for level in levels {
         let plan = Plan { level, methods: &Method::ALL, seeds: 0..2, n_objects };

@@ -3,9 +3,7 @@
 
 use semfm::fmap::{Method, metrics::iou};
 use semfm::{Meaning, PipelineSettings, PreparedObject, Region, Task, transfer};
-use semfm_synth::{
-    Category, Level, ObjectSettings, SynthObject, embed, make_object, render_views,
-};
+use semfm_synth::{Category, Level, ObjectSettings, SynthObject, embed, make_object, render_views};
 
 /// What to measure.
 #[derive(Clone, Debug)]

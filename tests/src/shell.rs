@@ -10,7 +10,8 @@ use std::process::{Command, Output};
 /// Where it was not built: `cargo test --workspace` builds it.
 pub fn semfm_cli() -> Command {
     let test = std::env::current_exe().expect("a running test has a path");
-    let folder = test.parent().and_then(Path::parent).expect("tests run from target/<profile>/deps");
+    let folder =
+        test.parent().and_then(Path::parent).expect("tests run from target/<profile>/deps");
     let program = folder.join(format!("semfm-cli{}", std::env::consts::EXE_SUFFIX));
     assert!(program.is_file(), "{} is not built: run `cargo test --workspace`", program.display());
     let mut command = Command::new(program);

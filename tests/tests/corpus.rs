@@ -45,7 +45,11 @@ fn disputed() -> HashSet<&'static str> {
         include_str!("../../crates/semfm-geom/tests/corpus_disputed.tsv"),
         include_str!("../../crates/semfm-views/tests/corpus_disputed_mcap.tsv"),
     ];
-    lists.into_iter().flat_map(|list| list.lines().skip(1)).filter_map(|line| line.split('\t').next()).collect()
+    lists
+        .into_iter()
+        .flat_map(|list| list.lines().skip(1))
+        .filter_map(|line| line.split('\t').next())
+        .collect()
 }
 
 #[test]
@@ -54,7 +58,9 @@ fn every_file_of_the_corpus_gets_its_verdict_and_none_a_crash() {
     let manifest = std::fs::read_to_string(corpus.join("MANIFEST.tsv")).unwrap();
     let disputed = disputed();
     let (mut faults, mut n_files) = (Vec::new(), 0);
-    for line in manifest.lines().filter(|line| line.starts_with("mesh/") || line.starts_with("mcap/")) {
+    for line in
+        manifest.lines().filter(|line| line.starts_with("mesh/") || line.starts_with("mcap/"))
+    {
         let columns: Vec<&str> = line.split('\t').collect();
         let (path, expected) = (columns[0], columns[4]);
         let told = info(&corpus.join(path));
@@ -76,10 +82,13 @@ fn fault(expected: &str, disputed: bool, told: &Answer) -> Option<String> {
         Some(2) => false,
         _ => return Some(format!("exit {:?}: {}", told.code, told.err)),
     };
-    if !accepted && !(report["error"]["code"].is_string() && report["error"]["message"].is_string()) {
+    if !accepted && !(report["error"]["code"].is_string() && report["error"]["message"].is_string())
+    {
         return Some(format!("a refusal without code and message: {report}"));
     }
-    let may = |verdict: &str| expected.starts_with(verdict) || expected.contains(&format!("or {verdict}"));
+    let may = |verdict: &str| {
+        expected.starts_with(verdict) || expected.contains(&format!("or {verdict}"))
+    };
     if disputed || expected.starts_with("any") {
         return None;
     }

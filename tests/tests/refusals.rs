@@ -38,11 +38,16 @@ impl Files {
 
     fn transfer(&self, more: &[&str]) -> Answer {
         let text = |path: &Path| path.to_str().unwrap().to_owned();
-        let mut arguments: Vec<String> = vec!["transfer".into(), text(&self.source), text(&self.target)];
+        let mut arguments: Vec<String> =
+            vec!["transfer".into(), text(&self.source), text(&self.target)];
         arguments.extend(["--region".into(), text(&self.region)]);
         arguments.extend(["--source-embeddings".into(), text(&self.source_embeddings)]);
         arguments.extend(["--target-embeddings".into(), text(&self.target_embeddings)]);
-        arguments.extend(["-o".into(), text(&self.folder.path().join("refused")), "--quiet".into()]);
+        arguments.extend([
+            "-o".into(),
+            text(&self.folder.path().join("refused")),
+            "--quiet".into(),
+        ]);
         arguments.extend(more.iter().map(|&word| word.to_owned()));
         run(&arguments)
     }
@@ -71,8 +76,16 @@ fn a_transfer_of_the_wrong_things_is_refused_before_anything_is_written() {
     for (name, text, words) in [
         ("empty.json", r#"{"vertices": []}"#, &["empty.json", "vertices", "empty region"][..]),
         ("beyond.json", r#"{"vertices": [1, 99999]}"#, &["beyond.json", "vertices[1]", "99999"]),
-        ("other.json", r#"{"mesh": {"n_vertices": 7}, "vertices": [1]}"#, &["other.json", "n_vertices", "7"]),
-        ("weights.json", r#"{"vertices": [1], "weights": [-1]}"#, &["weights.json", "weights[0]", "-1"]),
+        (
+            "other.json",
+            r#"{"mesh": {"n_vertices": 7}, "vertices": [1]}"#,
+            &["other.json", "n_vertices", "7"],
+        ),
+        (
+            "weights.json",
+            r#"{"vertices": [1], "weights": [-1]}"#,
+            &["weights.json", "weights[0]", "-1"],
+        ),
         ("broken.json", r#"{"vertices": [1"#, &["broken.json", "line 1"]),
     ] {
         good.region = good.write(name, text);
@@ -131,7 +144,11 @@ fn every_command_says_what_it_was_given_and_what_it_wanted() {
         let answer = run(&arguments);
         assert_eq!(answer.code, Some(2), "{arguments:?}: {answer:?}");
         for word in words {
-            assert!(answer.err.contains(word), "{arguments:?}: `{word}` is missing in: {}", answer.err);
+            assert!(
+                answer.err.contains(word),
+                "{arguments:?}: `{word}` is missing in: {}",
+                answer.err
+            );
         }
         assert!(!answer.err.contains("panicked"), "{arguments:?}: {}", answer.err);
         assert!(!out.exists(), "{arguments:?} wrote something");
@@ -142,7 +159,10 @@ fn every_command_says_what_it_was_given_and_what_it_wanted() {
 fn feature_arrays_are_checked_against_the_mesh() {
     let good = files();
     let npy = |descr: &str, shape: &str, data: &[u8]| {
-        let header = format!("{:<117}\n", format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}"));
+        let header = format!(
+            "{:<117}\n",
+            format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}")
+        );
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((header.len() as u16).to_le_bytes());
         bytes.extend(header.bytes());
@@ -162,8 +182,17 @@ fn feature_arrays_are_checked_against_the_mesh() {
         let (source, target) = (good.source.to_str().unwrap(), good.target.to_str().unwrap());
         let out = good.folder.path().join("refused");
         let answer = run(&[
-            "transfer", source, target, "--region", good.region.to_str().unwrap(), "-o", out.to_str().unwrap(),
-            "--source-features", path, "--target-features", path,
+            "transfer",
+            source,
+            target,
+            "--region",
+            good.region.to_str().unwrap(),
+            "-o",
+            out.to_str().unwrap(),
+            "--source-features",
+            path,
+            "--target-features",
+            path,
         ]);
         assert_eq!(answer.code, Some(2), "{name}: {answer:?}");
         for word in words {

@@ -13,7 +13,9 @@ fn demo(category: &str, seed: &str) -> (TempDir, [PathBuf; 6]) {
     let arguments = ["demo", "--quiet", "--category", category, "--seed", seed, "-o", at];
     let answer = run(&arguments);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    let name = |i: usize, extension: &str| folder.path().join(format!("{category}_{i}_s{seed}.{extension}"));
+    let name = |i: usize, extension: &str| {
+        folder.path().join(format!("{category}_{i}_s{seed}.{extension}"))
+    };
     let files = [
         name(0, "obj"),
         name(1, "obj"),
@@ -51,7 +53,8 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     let [carried, demonstrated] =
         [&out, &folder.path().join("transfer")].map(|out| json(&out.join("region.json")));
     assert_eq!(carried, demonstrated, "the demo and the command by hand differ");
-    let truth: Vec<u64> = serde_json::from_value(json(&files[3])["region"]["vertices"].clone()).unwrap();
+    let truth: Vec<u64> =
+        serde_json::from_value(json(&files[3])["region"]["vertices"].clone()).unwrap();
     let found: Vec<u64> = serde_json::from_value(carried["vertices"].clone()).unwrap();
     let both = found.iter().filter(|v| truth.binary_search(v).is_ok()).count();
     let iou = both as f64 / (found.len() + truth.len() - both) as f64;
@@ -62,7 +65,8 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     for key in ["settings", "seeds", "stages_ms", "anchors", "map", "confidence", "verdict"] {
         assert!(!report[key].is_null(), "report.json lacks {key}");
     }
-    let map: Vec<u32> = serde_json::from_value(json(&out.join("point_map.json"))["source_of"].clone()).unwrap();
+    let map: Vec<u32> =
+        serde_json::from_value(json(&out.join("point_map.json"))["source_of"].clone()).unwrap();
     assert_eq!(map.len() as u64, carried["mesh"]["n_vertices"].as_u64().unwrap());
     for name in ["target.ply", "target.glb"] {
         let told = run(&["info", "--json", out.join(name).to_str().unwrap()]);
@@ -102,12 +106,14 @@ fn a_painted_mesh_gives_its_region_back() {
     let (folder, files) = demo("cutting", "0");
     let painted = folder.path().join("transfer/target.ply");
     let region = folder.path().join("painted.json");
-    let arguments = ["region", painted.to_str().unwrap(), "--ply-color", "-o", region.to_str().unwrap()];
+    let arguments =
+        ["region", painted.to_str().unwrap(), "--ply-color", "-o", region.to_str().unwrap()];
     let answer = run(&arguments);
     assert_eq!(answer.code, Some(0), "{answer:?}");
     let carried = json(&folder.path().join("transfer/region.json"));
     let painted = json(&region);
-    let ids = |value: &Value| -> Vec<u64> { serde_json::from_value(value["vertices"].clone()).unwrap() };
+    let ids =
+        |value: &Value| -> Vec<u64> { serde_json::from_value(value["vertices"].clone()).unwrap() };
     let (carried, painted) = (ids(&carried), ids(&painted));
     let shared = painted.iter().filter(|v| carried.binary_search(v).is_ok()).count();
     // Colours have eight bits: a weight of exactly one half may fall on either side.
@@ -118,18 +124,41 @@ fn a_painted_mesh_gives_its_region_back() {
 #[test]
 fn views_lead_to_a_region_by_a_mask() {
     let (folder, files) = demo("shoes", "0");
-    let [views, mask, region] = ["v.views.mcap", "mask.png", "r.json"].map(|name| folder.path().join(name));
+    let [views, mask, region] =
+        ["v.views.mcap", "mask.png", "r.json"].map(|name| folder.path().join(name));
     let text = |path: &Path| path.to_str().unwrap().to_owned();
-    let answer = run(&["views", &text(&files[0]), "-o", &text(&views), "--count", "3", "--size", "96", "--quiet"]);
+    let answer = run(&[
+        "views",
+        &text(&files[0]),
+        "-o",
+        &text(&views),
+        "--count",
+        "3",
+        "--size",
+        "96",
+        "--quiet",
+    ]);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    image::GrayImage::from_fn(96, 96, |x, _| image::Luma([if x < 48 { 255 } else { 0 }])).save(&mask).unwrap();
+    image::GrayImage::from_fn(96, 96, |x, _| image::Luma([if x < 48 { 255 } else { 0 }]))
+        .save(&mask)
+        .unwrap();
     let view = format!("{}#001", text(&views));
-    let arguments = ["region", &text(&files[0]), "--mask", &text(&mask), "--view", &view, "-o", &text(&region)];
+    let arguments =
+        ["region", &text(&files[0]), "--mask", &text(&mask), "--view", &view, "-o", &text(&region)];
     let answer = run(&arguments);
     assert_eq!(answer.code, Some(0), "{answer:?}");
     let n = json(&region)["vertices"].as_array().unwrap().len();
     assert!(n > 50, "half of a picture shows more than {n} vertices");
-    let other = run(&["region", &text(&files[1]), "--mask", &text(&mask), "--view", &view, "-o", "never.json"]);
+    let other = run(&[
+        "region",
+        &text(&files[1]),
+        "--mask",
+        &text(&mask),
+        "--view",
+        &view,
+        "-o",
+        "never.json",
+    ]);
     assert_eq!(other.code, Some(2), "views of another mesh: {other:?}");
 }
 
@@ -139,9 +168,13 @@ fn per_vertex_features_from_anywhere_carry_a_region() {
     // Features that know the answer: the true grip, one-hot. Any method is then near its ceiling.
     let features = [(0, 2), (1, 3)].map(|(mesh, truth)| {
         let about = run(&["info", "--json", files[mesh].to_str().unwrap()]);
-        let n = serde_json::from_str::<Value>(&about.out).unwrap()["n_vertices"].as_u64().unwrap() as usize;
-        let inside: Vec<u64> = serde_json::from_value(json(&files[truth])["region"]["vertices"].clone()).unwrap();
-        let row = |v: usize| if inside.binary_search(&(v as u64)).is_ok() { [1.0, 0.0] } else { [0.0, 1.0f32] };
+        let n = serde_json::from_str::<Value>(&about.out).unwrap()["n_vertices"].as_u64().unwrap()
+            as usize;
+        let inside: Vec<u64> =
+            serde_json::from_value(json(&files[truth])["region"]["vertices"].clone()).unwrap();
+        let row = |v: usize| {
+            if inside.binary_search(&(v as u64)).is_ok() { [1.0, 0.0] } else { [0.0, 1.0f32] }
+        };
         let path = folder.path().join(format!("{mesh}.npy"));
         let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({n}, 2), }}");
         let header = format!("{header:<117}\n");
@@ -155,12 +188,24 @@ fn per_vertex_features_from_anywhere_carry_a_region() {
     let out = folder.path().join("features");
     let text = |path: &Path| path.to_str().unwrap().to_owned();
     let answer = run(&[
-        "transfer", &text(&files[0]), &text(&files[1]), "--region", &text(&files[2]), "-o", &text(&out),
-        "--source-features", &features[0], "--target-features", &features[1], "--quiet",
+        "transfer",
+        &text(&files[0]),
+        &text(&files[1]),
+        "--region",
+        &text(&files[2]),
+        "-o",
+        &text(&out),
+        "--source-features",
+        &features[0],
+        "--target-features",
+        &features[1],
+        "--quiet",
     ]);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    let found: Vec<u64> = serde_json::from_value(json(&out.join("region.json"))["vertices"].clone()).unwrap();
-    let truth: Vec<u64> = serde_json::from_value(json(&files[3])["region"]["vertices"].clone()).unwrap();
+    let found: Vec<u64> =
+        serde_json::from_value(json(&out.join("region.json"))["vertices"].clone()).unwrap();
+    let truth: Vec<u64> =
+        serde_json::from_value(json(&files[3])["region"]["vertices"].clone()).unwrap();
     let both = found.iter().filter(|v| truth.binary_search(v).is_ok()).count();
     let iou = both as f64 / (found.len() + truth.len() - both) as f64;
     assert!(iou > 0.7, "IoU {iou} with features that tell the grip");

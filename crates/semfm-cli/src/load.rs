@@ -28,16 +28,20 @@ pub fn embeddings(path: &Path, mesh: &Mesh) -> Result<EmbeddingsFile> {
 pub fn features(path: &Path, mesh: &Mesh) -> Result<Vec<f32>> {
     let place = path.display();
     let bytes = std::fs::read(path).map_err(|error| anyhow::anyhow!("{place}: {error}"))?;
-    let array = npyz::NpyFile::new(&bytes[..])
-        .map_err(|error| anyhow::anyhow!("{place}: header: expected a NumPy array, found {error}"))?;
+    let array = npyz::NpyFile::new(&bytes[..]).map_err(|error| {
+        anyhow::anyhow!("{place}: header: expected a NumPy array, found {error}")
+    })?;
     let shape = array.shape().to_vec();
     let n = mesh.n_vertices() as u64;
+    let found = shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     if shape.len() != 2 || shape[0] != n || shape[1] == 0 {
-        bail!("{place}: shape: expected ({n}, d), one row per vertex, found {shape:?}");
+        bail!("{place}: shape: expected ({n}, d), one row per vertex, found ({found})");
     }
     let held = bytes.len() as u64;
     if shape[1].checked_mul(n).is_none_or(|count| count > held) {
-        bail!("{place}: shape: expected no more values than the file's {held} bytes, found {shape:?}");
+        bail!(
+            "{place}: shape: expected no more values than the file's {held} bytes, found ({found})"
+        );
     }
     let (d, by_columns) = (shape[1] as usize, array.order() == npyz::Order::Fortran);
     let kind = array.dtype().descr();
@@ -52,8 +56,12 @@ pub fn features(path: &Path, mesh: &Mesh) -> Result<Vec<f32>> {
     }
     .map_err(|error| anyhow::anyhow!("{place}: data: expected {n} × {d} values, found {error}"))?;
     if let Some(at) = values.iter().position(|x| !x.is_finite()) {
-        let (row, column) = if by_columns { (at % n as usize, at / n as usize) } else { (at / d, at % d) };
-        bail!("{place}: row {row}, column {column}: expected a finite number, found {}", values[at]);
+        let (row, column) =
+            if by_columns { (at % n as usize, at / n as usize) } else { (at / d, at % d) };
+        bail!(
+            "{place}: row {row}, column {column}: expected a finite number, found {}",
+            values[at]
+        );
     }
     if !by_columns {
         return Ok(values);

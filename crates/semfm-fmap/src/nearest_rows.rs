@@ -4,38 +4,98 @@
 //! turns the search into matrix products. They run in f32, which finds the winner up to rounding;
 //! rows within the rounding bound of the winner are compared again in f64, so the answer is exact.
 
+use std::borrow::Cow;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
-/// Queries per product. Fewer repack the points too often, more push the scores out of the L2 cache.
-const QUERY_BLOCK: usize = 96;
-/// Points per product: 96 × 2048 scores fill 768 kB.
-const POINT_BLOCK: usize = 2048;
-/// Rows transposed together.
-const STRIP: usize = 64;
+/// Queries per product, at most. Fewer repack the points too often, more push the scores out of the
+/// L2 cache.
+const QUERY_BLOCK: usize = 192;
+/// Points per product: 192 × 1024 scores fill 768 kB.
+const POINT_BLOCK: usize = 1024;
 /// Scores looked at together: a group whose largest is beaten is never read again.
-const GROUP: usize = 32;
+const GROUP: usize = 128;
+/// Lanes of the running maximum: four AVX2 registers.
+const LANES: usize = 32;
 
 /// For each row of `queries` (q × k) the nearest row of `points` (p × k), ties to the lowest row.
 ///
 /// Both matrices must have the same number of columns, `points` at least one row. The answer is
 /// that of exact f64 distances and does not depend on the number of threads.
 pub fn nearest_rows(queries: MatRef<'_, f64>, points: MatRef<'_, f64>) -> Vec<u32> {
-    assert_eq!(queries.ncols(), points.ncols(), "one space for both");
-    assert!(points.nrows() > 0, "a nearest row needs rows");
-    let search = Search::new(queries, points);
-    let starts: Vec<usize> = (0..queries.nrows()).step_by(QUERY_BLOCK).collect();
-    let found: Vec<Vec<u32>> = starts.par_iter().map(|&start| search.block(start)).collect();
-    found.concat()
+    Rows::of(queries).nearest_of(&Rows::of(points))
 }
 
-/// The two matrices as the products want them. Distances do not change under a common shift, so
+/// Rows put together from the columns of one or two matrices, without copying them:
+/// \[left, scale · right\], on some rows or on all.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows<'a> {
+    /// One column each, and what it is multiplied by.
+    columns: Vec<(Cow<'a, [f64]>, f64)>,
+    /// Which rows; `None` for all.
+    ids: Option<&'a [u32]>,
+    n_rows: usize,
+}
+
+impl<'a> Rows<'a> {
+    pub fn of(matrix: MatRef<'a, f64>) -> Self {
+        let rows = Self { columns: Vec::new(), ids: None, n_rows: matrix.nrows() };
+        rows.beside(matrix, 1.0)
+    }
+
+    /// The same rows continued by those of another matrix, scaled.
+    pub fn beside(mut self, matrix: MatRef<'a, f64>, scale: f64) -> Self {
+        assert_eq!(matrix.nrows(), self.n_rows, "one row beside one row");
+        self.columns.extend(matrix.col_iter().map(|column| match column.try_as_col_major() {
+            Some(column) => (Cow::Borrowed(column.as_slice()), scale),
+            None => (Cow::Owned(column.iter().copied().collect()), scale),
+        }));
+        self
+    }
+
+    /// Only the rows with these ids, in that order.
+    pub fn chosen(mut self, ids: &'a [u32]) -> Self {
+        self.ids = Some(ids);
+        self
+    }
+
+    fn len(&self) -> usize {
+        self.ids.map_or(self.n_rows, <[u32]>::len)
+    }
+
+    fn row(&self, i: usize) -> impl Iterator<Item = f64> {
+        let row = self.ids.map_or(i, |ids| ids[i] as usize);
+        self.columns.iter().map(move |(column, scale)| scale * column[row])
+    }
+
+    /// For each of these rows the nearest of `points`, ties to the first.
+    pub fn nearest_of(&self, points: &Rows<'_>) -> Vec<u32> {
+        assert_eq!(self.columns.len(), points.columns.len(), "one space for both");
+        assert!(points.len() > 0, "a nearest row needs rows");
+        let search = Search::new(self, points);
+        // Even blocks, an even number of them: the answer does not depend on where they are cut.
+        let n_blocks = self.len().div_ceil(QUERY_BLOCK).next_multiple_of(2);
+        let size = self.len().div_ceil(n_blocks).max(1);
+        let starts: Vec<usize> = (0..self.len()).step_by(size).collect();
+        let room = || Mat::<f32>::zeros(POINT_BLOCK.min(points.len()), size);
+        let found: Vec<Vec<u32>> = starts
+            .par_iter()
+            .map_init(room, |scores, &start| {
+                search.block(start, size.min(self.len() - start), scores)
+            })
+            .collect();
+        found.concat()
+    }
+}
+
+/// The two sets of rows as the products want them. Distances do not change under a common shift, so
 /// the points are centred first: that keeps the rounding bound small.
 struct Search<'a> {
-    queries: MatRef<'a, f64>,
-    points: MatRef<'a, f64>,
-    /// Queries, centred, and a last row of ones (k + 1 × q).
+    queries: &'a Rows<'a>,
+    points: &'a Rows<'a>,
+    /// Queries, centred, one per column, and a last row of ones (k + 1 × q).
     queries32: Mat<f32>,
     /// Points, centred, and a last row of −‖p‖²/2 (k + 1 × p): the product with a query is its score.
     points32: Mat<f32>,
@@ -43,55 +103,49 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(queries: MatRef<'a, f64>, points: MatRef<'a, f64>) -> Self {
-        let k = points.ncols();
-        let mean: Vec<f64> =
-            (0..k).map(|c| points.col(c).iter().sum::<f64>() / points.nrows() as f64).collect();
-        let centred = |rows: MatRef<'_, f64>| {
-            let mut out = Mat::<f32>::zeros(k + 1, rows.nrows());
-            // Transposed in strips that stay in the L1 cache.
-            for start in (0..rows.nrows()).step_by(STRIP) {
-                let n = STRIP.min(rows.nrows() - start);
-                let mut strip = out.as_mut().subcols_mut(start, n);
-                for c in 0..k {
-                    for (i, x) in rows.col(c).subrows(start, n).iter().enumerate() {
-                        strip[(c, i)] = (x - mean[c]) as f32;
-                    }
-                }
-            }
-            out
+    fn new(queries: &'a Rows<'a>, points: &'a Rows<'a>) -> Self {
+        let k = points.columns.len();
+        // Any shift will do, so the mean is taken over all rows, chosen or not.
+        let mean = |(column, scale): &(Cow<'_, [f64]>, f64)| {
+            scale * column.iter().sum::<f64>() / column.len() as f64
         };
-        let (mut queries32, mut points32) = (centred(queries), centred(points));
-        queries32.row_mut(k).fill(1.0);
+        let mean: Vec<f64> = points.columns.iter().map(mean).collect();
         let mut longest = 0.0f32;
-        for i in 0..points.nrows() {
-            let square: f32 = points32.col(i).iter().map(|x| x * x).sum();
-            points32[(k, i)] = -0.5 * square;
+        let mut points32 = centred(points, &mean);
+        for i in 0..points.len() {
+            let column = points32.col_as_slice_mut(i);
+            let square: f32 = column[..k].iter().map(|x| x * x).sum();
+            column[k] = -0.5 * square;
             longest = longest.max(square);
         }
-        Self { queries, points, queries32, points32, longest_point: longest.sqrt() }
+        Self {
+            queries,
+            points,
+            queries32: centred(queries, &mean),
+            points32,
+            longest_point: longest.sqrt(),
+        }
     }
 
-    /// Answers for the queries `start .. start + QUERY_BLOCK`.
-    fn block(&self, start: usize) -> Vec<u32> {
+    /// Answers for `n` queries from `start`; `scores` is room for a block of products.
+    fn block(&self, start: usize, n: usize, scores: &mut Mat<f32>) -> Vec<u32> {
         let k = self.points32.nrows();
-        let n = QUERY_BLOCK.min(self.queries32.ncols() - start);
         let queries = self.queries32.as_ref().subcols(start, n);
         let slack: Vec<f32> = (0..n)
             .map(|j| {
                 // Rounding of a (k + 1)-term product: |error| ≤ (k + 2) u Σ|aᵢ bᵢ|, Cauchy–Schwarz.
-                let length = queries.col(j).iter().take(k - 1).map(|x| x * x).sum::<f32>().sqrt();
+                let query = &self.queries32.col_as_slice(start + j)[..k - 1];
+                let length = query.iter().map(|x| x * x).sum::<f32>().sqrt();
                 let scale = length * self.longest_point + 0.5 * self.longest_point.powi(2);
                 2.0 * (k + 2) as f32 * f32::EPSILON * scale
             })
             .collect();
         let mut best = vec![f32::NEG_INFINITY; n];
         let mut close: Vec<Vec<(f32, u32)>> = vec![Vec::new(); n];
-        let mut scores = Mat::<f32>::zeros(POINT_BLOCK.min(self.points32.ncols()), n);
         for first in (0..self.points32.ncols()).step_by(POINT_BLOCK) {
             let m = POINT_BLOCK.min(self.points32.ncols() - first);
             let points = self.points32.as_ref().subcols(first, m);
-            let mut block = scores.as_mut().subrows_mut(0, m);
+            let mut block = scores.as_mut().submatrix_mut(0, 0, m, n);
             matmul(block.as_mut(), Accum::Replace, points.transpose(), queries, 1.0, Par::Seq);
             for j in 0..n {
                 let scores = &scores.col_as_slice(j)[..m];
@@ -124,9 +178,25 @@ impl<'a> Search<'a> {
     }
 
     fn distance(&self, query: usize, point: u32) -> f64 {
-        let (a, b) = (self.queries.row(query), self.points.row(point as usize));
-        a.iter().zip(b.iter()).map(|(x, y)| (x - y) * (x - y)).sum()
+        let rows = self.queries.row(query).zip(self.points.row(point as usize));
+        rows.map(|(x, y)| (x - y) * (x - y)).sum()
     }
+}
+
+/// Rows less `mean`, one per column, in f32, and a last row of ones (k + 1 × rows).
+fn centred(rows: &Rows<'_>, mean: &[f64]) -> Mat<f32> {
+    let k = mean.len();
+    let mut out = Mat::<f32>::zeros(k + 1, rows.len());
+    for i in 0..rows.len() {
+        let column = out.col_as_slice_mut(i);
+        column[..k]
+            .iter_mut()
+            .zip(rows.row(i))
+            .zip(mean)
+            .for_each(|((x, r), mean)| *x = (r - mean) as f32);
+        column[k] = 1.0;
+    }
+    out
 }
 
 /// Keeps the points whose score comes within `slack` of the best so far. A value and not a
@@ -145,33 +215,43 @@ impl pulp::WithSimd for Gather<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
+        // Neighbouring points have neighbouring ids, so the best rises step by step along a row:
+        // knowing every group's top first saves looking into all the steps.
+        let mut tops = [f32::NEG_INFINITY; POINT_BLOCK.div_ceil(GROUP)];
+        for (top, group) in tops.iter_mut().zip(self.scores.chunks(GROUP)) {
+            *top = largest(group);
+            *self.best = self.best.max(*top);
+        }
+        let cut = *self.best - self.slack;
         for (g, group) in self.scores.chunks(GROUP).enumerate() {
-            let top = largest(group);
-            if top < *self.best - self.slack {
-                continue;
-            }
-            *self.best = if top > *self.best { top } else { *self.best };
-            for (i, &score) in group.iter().enumerate() {
-                if score >= *self.best - self.slack {
-                    self.close.push((score, self.first + (g * GROUP + i) as u32));
+            if tops[g] >= cut {
+                for (i, &score) in group.iter().enumerate() {
+                    if score >= cut {
+                        self.close.push((score, self.first + (g * GROUP + i) as u32));
+                    }
                 }
             }
         }
     }
 }
 
-/// Largest of a group, eight lanes at a time (a plain `f32::max` fold cannot be reordered).
+/// Largest of a group, in lanes that are folded in halves (a plain `f32::max` fold cannot be
+/// reordered, so it would run one by one).
 #[inline(always)]
 fn largest(group: &[f32]) -> f32 {
-    let mut lanes = [f32::NEG_INFINITY; 8];
-    let (eights, rest) = group.as_chunks::<8>();
-    for eight in eights {
-        for (lane, &x) in lanes.iter_mut().zip(eight) {
-            *lane = if x > *lane { x } else { *lane };
-        }
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    let (blocks, rest) = group.as_chunks::<LANES>();
+    for block in blocks {
+        lanes = std::array::from_fn(|i| lanes[i].max(block[i]));
     }
-    let larger = |a: f32, &b: &f32| if b > a { b } else { a };
-    rest.iter().fold(lanes.iter().fold(f32::NEG_INFINITY, larger), larger)
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            lanes[i] = lanes[i].max(lanes[i + half]);
+        }
+        half /= 2;
+    }
+    rest.iter().fold(lanes[0], |a, &b| a.max(b))
 }
 
 #[cfg(test)]

@@ -10,8 +10,9 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use semfm_geom::{Eigenbasis, Task};
 
 use crate::functional_map::check_size;
+use crate::nearest_rows::Rows;
 use crate::point_map::rows_of;
-use crate::{Error, FunctionalMap, PointMap, Result, nearest_rows};
+use crate::{Error, FunctionalMap, PointMap, Result};
 
 /// Tikhonov weight per sample in the projection onto sampled eigenfunctions. Far smaller, and 600
 /// samples no longer hold 50 functions apart on thin blades; larger shrinks the map.
@@ -161,7 +162,7 @@ fn search(
     let scale = weight * (map.k_target() as f64).sqrt();
     let points = with_features(carried.as_ref(), source.features, scale, &[]);
     let queries = with_features(target.basis.first(map.k_target()), target.features, scale, rows);
-    nearest_rows(queries.as_ref(), points.as_ref())
+    queries.nearest_of(&points)
 }
 
 /// For each of the source's `rows` (all, where empty) the nearest target vertex.
@@ -176,31 +177,21 @@ fn search_back(
     let scale = weight * (map.k_target() as f64).sqrt();
     let points = with_features(target.basis.first(map.k_target()), target.features, scale, &[]);
     let queries = with_features(carried.as_ref(), source.features, scale, rows);
-    nearest_rows(queries.as_ref(), points.as_ref())
+    queries.nearest_of(&points)
 }
 
 /// \[spectral, scale · features\] on the chosen rows, or on all of them where none is chosen.
-fn with_features(
-    spectral: MatRef<'_, f64>,
-    features: Option<MatRef<'_, f64>>,
+fn with_features<'a>(
+    spectral: MatRef<'a, f64>,
+    features: Option<MatRef<'a, f64>>,
     scale: f64,
-    rows: &[u32],
-) -> Mat<f64> {
-    let chosen = |matrix: MatRef<'_, f64>| {
-        if rows.is_empty() { matrix.to_owned() } else { rows_of(matrix, rows) }
+    rows: &'a [u32],
+) -> Rows<'a> {
+    let both = match features.filter(|_| scale > 0.0) {
+        Some(features) => Rows::of(spectral).beside(features, scale),
+        None => Rows::of(spectral),
     };
-    let left = chosen(spectral);
-    match features.filter(|_| scale > 0.0) {
-        None => left,
-        Some(features) => {
-            let right = chosen(features) * faer::Scale(scale);
-            let k = left.ncols();
-            let mut both = Mat::zeros(left.nrows(), k + right.ncols());
-            both.as_mut().subcols_mut(0, k).copy_from(&left);
-            both.as_mut().subcols_mut(k, right.ncols()).copy_from(&right);
-            both
-        }
-    }
+    if rows.is_empty() { both } else { both.chosen(rows) }
 }
 
 /// C of least Σ ‖Aᵢ C − Bᵢ‖² + ridge ‖C‖² over stacked blocks (Aᵢ, Bᵢ).

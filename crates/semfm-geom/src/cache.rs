@@ -8,11 +8,12 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 8 + 32 | `SEMFMSH1`, key |
-//! | 5 × 8 | n original vertices, n working vertices, m triangles, k, length of the report |
+//! | 8 + 32 | `SEMFMSH2`, key |
+//! | 6 × 8 | n original vertices, n working vertices, m triangles, k, e entries of the stiffness, length of the report |
 //! | 24 n_w + 12 m | working mesh |
 //! | 4 n + 4 n_w | `of_original`, `to_original` |
 //! | 36 n | carriers: weights of all, then corners of all |
+//! | 16 e | stiffness: values of all, then row and column of all |
 //! | 8 k + 8 n_w k + 8 n_w + 8 k | eigenvalues, eigenfunctions by column, mass, residuals |
 //! | report | JSON |
 //! | 32 | BLAKE3 of everything before |
@@ -23,16 +24,19 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use faer::Mat;
+use faer::sparse::{SparseColMat, Triplet};
 
 use crate::math::DVec3;
 use crate::working::{Carrier, WorkingMesh};
-use crate::{Eigenbasis, Error, Mesh, MeshHash, Result, Shape, ShapeReport, ShapeSettings, Task};
+use crate::{
+    Eigenbasis, Error, Laplacian, Mesh, MeshHash, Result, Shape, ShapeReport, ShapeSettings, Task,
+};
 
 /// Names format and version. A change of the layout *or of any step that leads to a shape* must
 /// change it: entries of other versions are never read.
-const MAGIC: [u8; 8] = *b"SEMFMSH1";
+const MAGIC: [u8; 8] = *b"SEMFMSH2";
 const SUFFIX: &str = "shape";
-const HEADER: usize = 8 + 32 + 5 * 8;
+const HEADER: usize = 8 + 32 + 6 * 8;
 const TRAILER: usize = 32;
 
 /// Where prepared shapes are kept.
@@ -171,18 +175,19 @@ fn write(folder: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// The shape in the file; gives the mesh back where there is none.
 fn read(path: &Path, key: &[u8; 32], mesh: Mesh) -> std::result::Result<Shape, Box<Mesh>> {
-    let Some((working, basis, report)) =
+    let Some((working, laplacian, basis, report)) =
         fs::read(path).ok().and_then(|bytes| decode(&bytes, key, &mesh))
     else {
         return Err(Box::new(mesh));
     };
     // Marks the entry as used; a folder that may only be read is still a good cache.
     let _ = File::options().append(true).open(path).and_then(|f| f.set_modified(SystemTime::now()));
-    Ok(Shape::from_parts(mesh, working, basis, report))
+    Ok(Shape::from_parts(mesh, working, laplacian, basis, report))
 }
 
 fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
     let (working, basis) = (shape.working(), shape.basis());
+    let stiffness = &shape.laplacian().stiffness;
     let report = serde_json::to_vec(shape.report())
         .map_err(|source| Error::Io { path: "the shape's report".into(), source: source.into() })?;
     let counts = [
@@ -190,6 +195,7 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
         working.mesh.n_vertices(),
         working.mesh.n_faces(),
         basis.k(),
+        stiffness.val().len(),
         report.len(),
     ];
     let mut bytes = Vec::with_capacity(total_bytes(counts).unwrap_or(0));
@@ -210,6 +216,10 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
         &mut working.carriers.iter().flat_map(|carrier| carrier.weights),
         &mut working.carriers.iter().flat_map(|carrier| carrier.corners),
     );
+    put(
+        &mut stiffness.triplet_iter().map(|entry| *entry.val),
+        &mut stiffness.triplet_iter().flat_map(|entry| [entry.row as u32, entry.col as u32]),
+    );
     let functions = (0..basis.k()).flat_map(|j| basis.functions.col(j).iter().copied());
     let rest = basis.mass.iter().chain(&basis.residuals).copied();
     put(&mut basis.values.iter().copied().chain(functions).chain(rest), &mut std::iter::empty());
@@ -219,12 +229,13 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
 }
 
 /// Length of an entry with these counts; `None` where no file is that long.
-fn total_bytes([n, n_working, m, k, report]: [usize; 5]) -> Option<usize> {
+fn total_bytes([n, n_working, m, k, n_entries, report]: [usize; 6]) -> Option<usize> {
     let terms = [
         n.checked_mul(4 + 36)?,
         n_working.checked_mul(24 + 4 + 8)?,
         m.checked_mul(12)?,
         k.checked_mul(16)?,
+        n_entries.checked_mul(8 + 8)?,
         n_working.checked_mul(k)?.checked_mul(8)?,
         report,
     ];
@@ -236,13 +247,13 @@ fn decode(
     bytes: &[u8],
     key: &[u8; 32],
     original: &Mesh,
-) -> Option<(WorkingMesh, Eigenbasis, ShapeReport)> {
+) -> Option<(WorkingMesh, Laplacian, Eigenbasis, ShapeReport)> {
     let (body, trailer) = bytes.split_last_chunk::<TRAILER>()?;
     let mut reader = Reader(body);
     if reader.take(8)? != MAGIC || reader.take(32)? != key {
         return None;
     }
-    let mut counts = [0; 5];
+    let mut counts = [0; 6];
     for count in &mut counts {
         *count = usize::try_from(u64::from_le_bytes(reader.take(8)?.try_into().ok()?)).ok()?;
     }
@@ -250,7 +261,7 @@ fn decode(
     if total_bytes(counts)? != bytes.len() || blake3::hash(body).as_bytes() != trailer {
         return None;
     }
-    let [n, n_working, m, k, n_report] = counts;
+    let [n, n_working, m, k, n_entries, n_report] = counts;
     let coordinates = reader.floats(3 * n_working)?;
     let points = coordinates.as_chunks::<3>().0.iter().map(|&p| DVec3::from_array(p)).collect();
     let faces = reader.ids(3 * m)?.as_chunks::<3>().0.to_vec();
@@ -260,6 +271,8 @@ fn decode(
         .zip(corners.as_chunks::<3>().0)
         .map(|(&weights, &corners)| Carrier { corners, weights })
         .collect();
+    let entries = reader.floats(n_entries)?;
+    let places = reader.ids(2 * n_entries)?;
     let values = reader.floats(k)?;
     let functions = reader.floats(n_working * k)?;
     let functions = Mat::from_fn(n_working, k, |i, j| functions[j * n_working + i]);
@@ -270,10 +283,17 @@ fn decode(
     let sound = n == original.n_vertices()
         && in_range(&of_original, n_working)
         && in_range(&to_original, n)
+        && in_range(&places, n_working)
         && carriers.iter().all(|carrier| in_range(&carrier.corners, n_working));
     let mesh = Mesh::new(points, faces).ok().filter(|_| sound)?;
+    let (pairs, _) = places.as_chunks::<2>();
+    let entries: Vec<Triplet<usize, usize, f64>> = (pairs.iter().zip(entries))
+        .map(|(&[row, col], value)| Triplet::new(row as usize, col as usize, value))
+        .collect();
+    let stiffness = SparseColMat::try_new_from_triplets(n_working, n_working, &entries).ok()?;
+    let laplacian = Laplacian { stiffness, mass: mass.clone() };
     let basis = Eigenbasis { values, functions, mass, residuals };
-    Some((WorkingMesh { mesh, of_original, to_original, carriers }, basis, report))
+    Some((WorkingMesh { mesh, of_original, to_original, carriers }, laplacian, basis, report))
 }
 
 /// Takes numbers off the front of a slice; `None` where it is too short.
@@ -323,6 +343,7 @@ mod tests {
         assert_eq!((&a.basis().values, &a.basis().mass), (&b.basis().values, &b.basis().mass));
         assert_eq!(a.basis().residuals, b.basis().residuals);
         assert_eq!(a.basis().functions, b.basis().functions);
+        assert_eq!(a.laplacian().stiffness.val(), b.laplacian().stiffness.val());
         assert_eq!(a.report(), b.report());
     }
 

@@ -23,7 +23,12 @@ impl SemanticCloud {
     /// # Errors
     /// [`Error::Length`] where counts differ or nothing is there, [`Error::OutOfRange`] where a
     /// coordinate or a feature is not finite.
-    pub fn new(points: Vec<DVec3>, features: Vec<f32>, dim: usize, n_views: Vec<u32>) -> Result<Self> {
+    pub fn new(
+        points: Vec<DVec3>,
+        features: Vec<f32>,
+        dim: usize,
+        n_views: Vec<u32>,
+    ) -> Result<Self> {
         if points.is_empty() || dim == 0 {
             let expected = "at least one point and one feature dimension".into();
             let found = format!("{} points of {dim} dimensions", points.len());
@@ -36,11 +41,19 @@ impl SemanticCloud {
         length("view counts", points.len(), n_views.len())?;
         if let Some(j) = points.iter().position(|p| !p.is_finite()) {
             let (what, expected) = ("semantic cloud point", "finite coordinates".into());
-            return Err(Error::OutOfRange { what, expected, found: format!("{} at point {j}", points[j]) });
+            return Err(Error::OutOfRange {
+                what,
+                expected,
+                found: format!("{} at point {j}", points[j]),
+            });
         }
         if let Some(i) = features.iter().position(|x| !x.is_finite()) {
             let found = format!("{} at point {}, dimension {}", features[i], i / dim, i % dim);
-            return Err(Error::OutOfRange { what: "semantic cloud feature", expected: "finite numbers".into(), found });
+            return Err(Error::OutOfRange {
+                what: "semantic cloud feature",
+                expected: "finite numbers".into(),
+                found,
+            });
         }
         Ok(Self { points, features, dim, n_views })
     }
@@ -83,9 +96,11 @@ mod tests {
     #[test]
     fn rows_are_points_and_bad_numbers_are_named() {
         let points = vec![DVec3::ZERO, DVec3::X];
-        let cloud = SemanticCloud::new(points.clone(), vec![1.0, 2.0, 3.0, 4.0], 2, vec![1, 0]).unwrap();
+        let cloud =
+            SemanticCloud::new(points.clone(), vec![1.0, 2.0, 3.0, 4.0], 2, vec![1, 0]).unwrap();
         assert_eq!(cloud.feature(1), [3.0, 4.0]);
-        let error = SemanticCloud::new(points, vec![1.0, 2.0, f32::NAN, 4.0], 2, vec![1, 0]).unwrap_err();
+        let error =
+            SemanticCloud::new(points, vec![1.0, 2.0, f32::NAN, 4.0], 2, vec![1, 0]).unwrap_err();
         assert!(error.to_string().contains("point 1, dimension 0"), "{error}");
     }
 }

@@ -11,7 +11,9 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub enum Error {
     // ---- meshes
     /// A mesh needs at least one vertex and one triangle.
-    #[error("empty mesh: {n_vertices} vertices and {n_faces} triangles, expected at least one of each")]
+    #[error(
+        "empty mesh: {n_vertices} vertices and {n_faces} triangles, expected at least one of each"
+    )]
     EmptyMesh {
         /// Vertices given.
         n_vertices: usize,
@@ -31,7 +33,9 @@ pub enum Error {
         z: f64,
     },
     /// A triangle names a vertex that does not exist.
-    #[error("triangle {face} names vertex {vertex}, but there are {n_vertices} vertices (ids from 0)")]
+    #[error(
+        "triangle {face} names vertex {vertex}, but there are {n_vertices} vertices (ids from 0)"
+    )]
     VertexOutOfRange {
         /// Triangle id, 0-based.
         face: usize,
@@ -71,7 +75,9 @@ pub enum Error {
 
     // ---- eigenbasis
     /// More eigenpairs were asked for than the mesh has.
-    #[error("{asked} eigenpairs asked of a mesh with {n_vertices} vertices, which has at most {n_vertices}")]
+    #[error(
+        "{asked} eigenpairs asked of a mesh with {n_vertices} vertices, which has at most {n_vertices}"
+    )]
     TooManyEigenpairs {
         /// Pairs asked.
         asked: usize,

@@ -5,6 +5,7 @@
 //! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
 //! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
 
+pub mod algebra;
 pub mod cache;
 pub mod cholesky;
 pub mod clean;
@@ -15,8 +16,8 @@ pub mod descriptors;
 pub mod eigenbasis;
 pub mod eigensolver;
 mod error;
-pub mod io;
 pub mod geodesic;
+pub mod io;
 pub mod laplacian;
 pub mod math;
 pub mod mesh;

@@ -149,7 +149,9 @@ pub struct MeshHash(pub [u8; 32]);
 impl MeshHash {
     /// Reads the form that [`Display`](fmt::Display) writes; `None` where the text is not one.
     pub fn parse(text: &str) -> Option<Self> {
-        blake3::Hash::from_hex(text.strip_prefix("blake3:")?).ok().map(|hash| Self(*hash.as_bytes()))
+        blake3::Hash::from_hex(text.strip_prefix("blake3:")?)
+            .ok()
+            .map(|hash| Self(*hash.as_bytes()))
     }
 }
 
@@ -192,14 +194,20 @@ mod tests {
     #[test]
     fn the_door_refuses_what_is_not_a_mesh() {
         let points = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
-        assert!(matches!(Mesh::new(points.clone(), vec![]), Err(Error::EmptyMesh { n_faces: 0, .. })));
+        assert!(matches!(
+            Mesh::new(points.clone(), vec![]),
+            Err(Error::EmptyMesh { n_faces: 0, .. })
+        ));
         assert!(matches!(
             Mesh::new(points, vec![[0, 1, 3]]),
             Err(Error::VertexOutOfRange { face: 0, vertex: 3, n_vertices: 3 })
         ));
         let mut points = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
         points[1].y = f64::NAN;
-        assert!(matches!(Mesh::new(points, vec![[0, 1, 2]]), Err(Error::NotFinite { vertex: 1, .. })));
+        assert!(matches!(
+            Mesh::new(points, vec![[0, 1, 2]]),
+            Err(Error::NotFinite { vertex: 1, .. })
+        ));
     }
 
     #[test]

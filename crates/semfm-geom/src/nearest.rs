@@ -42,14 +42,16 @@ impl PointIndex {
 
     /// Id of the point nearest to `query`, and its distance.
     pub fn nearest(&self, query: DVec3) -> (usize, f64) {
-        let hit = self.tree.query(&query.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
+        let hit =
+            self.tree.query(&query.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
         (hit.item as usize, hit.distance.sqrt())
     }
 
     /// The `k` nearest points (fewer where there are fewer), nearest first, ties by id.
     pub fn k_nearest(&self, query: DVec3, k: usize) -> Vec<(usize, f64)> {
         let Some(k) = NonZero::new(k.min(self.n_points)) else { return Vec::new() };
-        let hits = self.tree.query(&query.to_array()).nearest_n::<SquaredEuclidean<f64>>(k).execute();
+        let hits =
+            self.tree.query(&query.to_array()).nearest_n::<SquaredEuclidean<f64>>(k).execute();
         sorted(hits.into_iter().map(|hit| (hit.item as usize, hit.distance.sqrt())).collect())
     }
 

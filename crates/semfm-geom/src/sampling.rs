@@ -46,7 +46,11 @@ fn sample_one(mesh: &Mesh, cumulative: &[f64], rng: &mut impl Rng) -> SurfaceSam
     let [a, b, c] = mesh.corners(face);
     let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
     let point = (1.0 - u) * a + u * (1.0 - v) * b + u * v * c;
-    SurfaceSample { face: face as u32, point, normal: mesh.face_normal_scaled(face).normalize_or_zero() }
+    SurfaceSample {
+        face: face as u32,
+        point,
+        normal: mesh.face_normal_scaled(face).normalize_or_zero(),
+    }
 }
 
 /// `n` farthest-point samples out of `6 n` area-uniform ones: near-even cover of the surface.

@@ -2,8 +2,10 @@
 
 use std::time::Instant;
 
+use faer::Mat;
 use serde::{Deserialize, Serialize};
 
+use crate::cholesky::SparseCholesky;
 use crate::clean::{CleanReport, CleanSettings};
 use crate::eigensolver::{EigenSettings, eigenbasis};
 use crate::laplacian::{BridgeSettings, Laplacian, LaplacianKind, bridge, laplacian};
@@ -98,6 +100,7 @@ pub struct ShapeTimes {
 pub struct Shape {
     original: Mesh,
     working: WorkingMesh,
+    laplacian: Laplacian,
     basis: Eigenbasis,
     report: ShapeReport,
 }
@@ -141,18 +144,19 @@ impl Shape {
             stages_ms,
         };
         task.step("eigenbasis", 3, 3)?;
-        Ok(Self { original, working, basis, report })
+        Ok(Self { original, working, laplacian: operator.laplacian, basis, report })
     }
 
-    /// Puts a shape together from its parts, as the cache does. `working` and `basis` must be of
+    /// Puts a shape together from its parts, as the cache does. All of them must be of
     /// `original`.
     pub(crate) fn from_parts(
         original: Mesh,
         working: WorkingMesh,
+        laplacian: Laplacian,
         basis: Eigenbasis,
         report: ShapeReport,
     ) -> Self {
-        Self { original, working, basis, report }
+        Self { original, working, laplacian, basis, report }
     }
 
     /// The mesh as the caller gave it.
@@ -168,6 +172,38 @@ impl Shape {
     /// The mesh that maps are computed on (n_working vertices, units of the original).
     pub fn mesh(&self) -> &Mesh {
         &self.working.mesh
+    }
+
+    /// Laplacian of the working mesh at area 1, bridges included.
+    pub fn laplacian(&self) -> &Laplacian {
+        &self.laplacian
+    }
+
+    /// One implicit step of heat diffusion, (M + t L) u = M f, on the working vertices at area 1.
+    ///
+    /// Unlike [`Eigenbasis::diffuse`] it is not cut off at the k-th frequency: a region smaller
+    /// than the wavelengths of the basis (the handle of a kettle) keeps its outline.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`] for a negative `t`, [`Error::Length`] for a function on
+    /// other vertices.
+    pub fn smooth(&self, function: &[f64], t: f64) -> Result<Vec<f64>> {
+        let Laplacian { stiffness, mass } = &self.laplacian;
+        if function.len() != mass.len() {
+            let (expected, found) = (mass.len(), function.len());
+            return Err(Error::Length { what: "values on the working mesh", expected, found });
+        }
+        let mut system = stiffness.clone();
+        for j in 0..system.ncols() {
+            let rows = system.row_idx_of_col_raw(j).to_vec();
+            for (value, i) in system.val_of_col_mut(j).iter_mut().zip(rows) {
+                *value = t * *value + if i == j { mass[j] } else { 0.0 };
+            }
+        }
+        let heat = function.iter().zip(mass).map(|(f, m)| f * m).collect::<Vec<_>>();
+        let mut heat = Mat::from_fn(heat.len(), 1, |i, _| heat[i]);
+        SparseCholesky::new(system.as_ref())?.solve_in_place(heat.as_mut());
+        Ok(heat.col(0).iter().copied().collect())
     }
 
     /// Eigenbasis of the working mesh at area 1 (n_working × k).

@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 
 use semfm_geom::Task;
 use semfm_geom::io::{write_atomically, write_mesh};
-use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata,
-};
+use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
 use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
 
 use crate::{Level, Result, SynthObject, embed};
@@ -49,11 +47,8 @@ pub fn write_object(
 ) -> Result<ObjectFiles> {
     let name = object.name();
     let path = |extension: &str| folder.join(format!("{name}.{extension}"));
-    let files = ObjectFiles {
-        mesh: path("obj"),
-        truth: path("json"),
-        embeddings: path("emb.mcap"),
-    };
+    let files =
+        ObjectFiles { mesh: path("obj"), truth: path("json"), embeddings: path("emb.mcap") };
     let views = render_views(object, task)?;
     let embeddings = EmbeddingsFile {
         path: PathBuf::new(),

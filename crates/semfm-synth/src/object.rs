@@ -10,9 +10,9 @@ use isosurface::sampler::Sampler;
 use isosurface::source::ScalarSource;
 use rayon::prelude::*;
 use semfm_geom::connectivity::components;
+use semfm_geom::math::{DMat3, DVec3, bounds};
 use semfm_geom::simplify::{SimplifySettings, simplify};
 use semfm_geom::{Mesh, Task};
-use semfm_geom::math::{DMat3, DVec3, bounds};
 
 use crate::sdf::smooth_min;
 use crate::seed::{Draw, stream};

@@ -96,8 +96,15 @@ mod tests {
     fn a_pixel_ray_projects_back_onto_its_pixel() {
         let turn = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-0.3);
         let pose = DAffine3::from_mat3_translation(turn, DVec3::new(0.1, -0.2, 3.0));
-        let camera =
-            Camera { width: 64, height: 48, fx: 70.0, fy: 71.0, cx: 31.0, cy: 25.0, camera_from_object: pose };
+        let camera = Camera {
+            width: 64,
+            height: 48,
+            fx: 70.0,
+            fy: 71.0,
+            cx: 31.0,
+            cy: 25.0,
+            camera_from_object: pose,
+        };
         let (u, v, z) = camera.project(camera.eye() + 2.5 * camera.ray(10.5, 40.25));
         assert!((u - 10.5).abs() < 1e-9 && (v - 40.25).abs() < 1e-9 && (z - 2.5).abs() < 1e-9);
     }

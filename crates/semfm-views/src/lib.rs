@@ -10,16 +10,16 @@ pub mod embeddings;
 mod error;
 pub mod frame;
 pub mod lift;
-pub mod render;
-pub mod rig;
 #[cfg(feature = "mcap")]
 pub mod mcap;
+pub mod render;
+pub mod rig;
 pub mod view;
 
 pub use camera::Camera;
 pub use embeddings::{EmbeddedView, PatchEmbeddings};
+pub use error::{Error, Fault, Result};
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
 pub use render::{Paint, RenderSettings, render};
 pub use rig::{RigSettings, rig};
-pub use error::{Error, Fault, Result};
 pub use view::View;

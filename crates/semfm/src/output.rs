@@ -34,20 +34,29 @@ pub fn write_transfer(
 
     write_json(&at("region.json"), &carried_json(target, transfer))?;
     write_json(&at("report.json"), &report)?;
-    write_json(&at("point_map.json"), &json!({
-        "format": "semfm.point_map/1",
-        "source": source.shape.original().hash().to_string(),
-        "target": mesh.hash().to_string(),
-        "source_of": transfer.point_map.source_of,
-    }))?;
+    write_json(
+        &at("point_map.json"),
+        &json!({
+            "format": "semfm.point_map/1",
+            "source": source.shape.original().hash().to_string(),
+            "target": mesh.hash().to_string(),
+            "source_of": transfer.point_map.source_of,
+        }),
+    )?;
     let bytes = |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c: f32| (c * 255.0).round() as u8);
     let colors: Vec<[u8; 4]> = weight_colors(transfer.weights()).into_iter().map(bytes).collect();
     let paint = Paint { colors: Some(&colors), scalars: &[("weight", transfer.weights())] };
     write_painted_mesh(at("target.ply"), mesh, &paint)?;
     write_painted_mesh(at("target.glb"), mesh, &paint)?;
     write_picture(&at("transfer.png"), source, target, region, transfer, task)?;
-    let mut names =
-        vec!["region.json", "report.json", "point_map.json", "target.ply", "target.glb", "transfer.png"];
+    let mut names = vec![
+        "region.json",
+        "report.json",
+        "point_map.json",
+        "target.ply",
+        "target.glb",
+        "transfer.png",
+    ];
     #[cfg(feature = "mcap")]
     {
         scene::write(&at("transfer.mcap"), source, target, region, transfer, &report)?;
@@ -90,7 +99,8 @@ fn report_json(
         "source": object_json(source),
         "target": object_json(target),
     });
-    let stages = stages_ms(source, target, transfer).into_iter().map(|(name, ms)| (name, json!(ms)));
+    let stages =
+        stages_ms(source, target, transfer).into_iter().map(|(name, ms)| (name, json!(ms)));
     if let Value::Object(details) = json!(transfer.report) {
         for (key, value) in details {
             report[key] = value;
@@ -110,7 +120,11 @@ pub fn stages_ms(
     transfer: &Transfer,
 ) -> Vec<(String, f64)> {
     let of = |side: &'static str, object: &PreparedObject| {
-        object.stages_ms.iter().map(move |&(name, ms)| (format!("{name}_{side}"), ms)).collect::<Vec<_>>()
+        object
+            .stages_ms
+            .iter()
+            .map(move |&(name, ms)| (format!("{name}_{side}"), ms))
+            .collect::<Vec<_>>()
     };
     let mut stages = of("source", source);
     stages.extend(of("target", target));

@@ -87,7 +87,9 @@ fn viewpoints(mesh: &Mesh, weights: &[f64], task: &Task) -> Result<[Camera; 2]> 
         .iter()
         .map(|view| {
             let inside = |&t: &i32| {
-                usize::try_from(t).is_ok_and(|t| mesh.faces()[t].iter().any(|&v| weights[v as usize] >= Region::COUNTS))
+                usize::try_from(t).is_ok_and(|t| {
+                    mesh.faces()[t].iter().any(|&v| weights[v as usize] >= Region::COUNTS)
+                })
             };
             // A region hidden from everywhere still deserves the fullest view of the object.
             let object = view.triangles.iter().filter(|&&t| t >= 0).count();
@@ -108,7 +110,11 @@ fn sheet(pictures: &[View], columns: usize) -> Vec<u8> {
     let line = 3 * SIDE as usize;
     pictures
         .chunks(columns)
-        .flat_map(|row| (0..SIDE as usize).flat_map(move |y| row.iter().flat_map(move |view| &view.rgb[y * line..(y + 1) * line])))
+        .flat_map(|row| {
+            (0..SIDE as usize).flat_map(move |y| {
+                row.iter().flat_map(move |view| &view.rgb[y * line..(y + 1) * line])
+            })
+        })
         .copied()
         .collect()
 }

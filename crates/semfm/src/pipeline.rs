@@ -41,7 +41,8 @@ impl PipelineSettings {
     /// A method's own constants. `semfm` has its own lifting, as the paper has it; every other
     /// method uses ours.
     pub fn of(method: Method) -> Self {
-        let lift = if method == Method::Semfm { LiftSettings::paper() } else { LiftSettings::default() };
+        let lift =
+            if method == Method::Semfm { LiftSettings::paper() } else { LiftSettings::default() };
         let transfer = TransferSettings::of(method);
         Self { shape: ShapeSettings::default(), lift, transfer, cache: ShapeCache::off() }
     }
@@ -143,7 +144,11 @@ fn cloud_of_vertices(mesh: &Mesh, features: &[f32], n_points: usize) -> Result<S
     let n = mesh.n_vertices();
     if features.is_empty() || !features.len().is_multiple_of(n) {
         let expected = format!("a whole number of values for each of {n} vertices");
-        return Err(Error::invalid("per-vertex features", expected, format!("{} values", features.len())));
+        return Err(Error::invalid(
+            "per-vertex features",
+            expected,
+            format!("{} values", features.len()),
+        ));
     }
     let dim = features.len() / n;
     // Vertices that no triangle uses are no part of the surface.
@@ -151,7 +156,8 @@ fn cloud_of_vertices(mesh: &Mesh, features: &[f32], n_points: usize) -> Result<S
     used.sort_unstable();
     used.dedup();
     let positions: Vec<DVec3> = used.iter().map(|&v| mesh.vertices()[v as usize]).collect();
-    let chosen = farthest_points(&positions, n_points).into_iter().map(|i| used[i as usize] as usize);
+    let chosen =
+        farthest_points(&positions, n_points).into_iter().map(|i| used[i as usize] as usize);
     let chosen: Vec<usize> = chosen.collect();
     let points = chosen.iter().map(|&v| mesh.vertices()[v]).collect();
     let rows = chosen.iter().flat_map(|&v| &features[v * dim..(v + 1) * dim]).copied().collect();

@@ -28,8 +28,9 @@ pub fn read_region(path: &Path, mesh: &Mesh) -> Result<Region> {
     };
     let bytes = std::fs::read(path)
         .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
-    let value: Value = serde_json::from_slice(&bytes)
-        .map_err(|error| fault(&format!("line {}", error.line()), "JSON".into(), error.to_string()))?;
+    let value: Value = serde_json::from_slice(&bytes).map_err(|error| {
+        fault(&format!("line {}", error.line()), "JSON".into(), error.to_string())
+    })?;
     let value = value.get("region").unwrap_or(&value);
     let file = RegionFile::deserialize(value).map_err(|error| {
         fault("region", "an object with `vertices`, a list of vertex ids".into(), error.to_string())
@@ -133,10 +134,15 @@ impl MeshName {
             }
         }
         if let Some(text) = &self.hash {
-            let named = MeshHash::parse(text)
-                .ok_or_else(|| ("mesh.hash", "blake3: and 64 hexadecimal digits".into(), text.clone()))?;
+            let named = MeshHash::parse(text).ok_or_else(|| {
+                ("mesh.hash", "blake3: and 64 hexadecimal digits".into(), text.clone())
+            })?;
             if named != mesh.hash() {
-                return Err(("mesh.hash", format!("{}, the mesh given", mesh.hash()), text.clone()));
+                return Err((
+                    "mesh.hash",
+                    format!("{}, the mesh given", mesh.hash()),
+                    text.clone(),
+                ));
             }
         }
         Ok(())

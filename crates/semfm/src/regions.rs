@@ -89,7 +89,10 @@ pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Reg
     let is_painted = |color: &[u8; 4]| {
         let [r, g, b, _] = color.map(i16::from);
         match paint {
-            Some(paint) => [r, g, b].iter().zip(paint).all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE),
+            Some(paint) => [r, g, b]
+                .iter()
+                .zip(paint)
+                .all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE),
             None => r - g.max(b) >= REDNESS,
         }
     };
@@ -97,7 +100,11 @@ pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Reg
     if !inside.contains(&true) {
         let wanted = paint.map_or("red".into(), |[r, g, b]| format!("({r}, {g}, {b})"));
         let expected = format!("at least one vertex painted {wanted}");
-        return Err(Error::invalid("vertex colours", expected, format!("none of {}", colors.len())));
+        return Err(Error::invalid(
+            "vertex colours",
+            expected,
+            format!("none of {}", colors.len()),
+        ));
     }
     Ok(Region::from_mask(&inside))
 }
@@ -114,7 +121,10 @@ mod tests {
         for (v, inside) in region.mask().into_iter().enumerate() {
             let angle = sphere.vertices()[v].normalize().z.clamp(-1.0, 1.0).acos();
             // Within the heat method's error at this resolution.
-            assert!((angle - 0.5).abs() < 0.05 || inside == (angle < 0.5), "angle {angle}: {inside}");
+            assert!(
+                (angle - 0.5).abs() < 0.05 || inside == (angle < 0.5),
+                "angle {angle}: {inside}"
+            );
         }
         assert!(near(&sphere, DVec3::Z, -1.0).is_err());
         assert!(near(&sphere, DVec3::NAN, 0.5).is_err());
@@ -130,11 +140,16 @@ mod tests {
             fy: 100.0,
             cx: 32.0,
             cy: 32.0,
-            camera_from_object: semfm_geom::math::DAffine3::from_translation(DVec3::new(0.0, 0.0, 4.0)),
+            camera_from_object: semfm_geom::math::DAffine3::from_translation(DVec3::new(
+                0.0, 0.0, 4.0,
+            )),
         };
         let region = masked(&sphere, &camera, &[true; 64 * 64]).unwrap();
         let seen = region.vertices();
-        assert!(seen.iter().all(|&v| sphere.vertices()[v as usize].z < 0.0), "the far side is hidden");
+        assert!(
+            seen.iter().all(|&v| sphere.vertices()[v as usize].z < 0.0),
+            "the far side is hidden"
+        );
         assert!(seen.len() > sphere.n_vertices() / 4);
         assert!(masked(&sphere, &camera, &[true; 10]).is_err());
         assert!(masked(&sphere, &camera, &[false; 64 * 64]).is_err());

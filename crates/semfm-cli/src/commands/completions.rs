@@ -8,7 +8,9 @@ use super::Outcome;
 
 /// Print a completion script for a shell
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  semfm-cli completions bash > ~/.local/share/bash-completion/completions/semfm-cli")]
+#[command(
+    after_help = "Example:\n  semfm-cli completions bash > ~/.local/share/bash-completion/completions/semfm-cli"
+)]
 pub struct Completions {
     /// The shell
     shell: Shell,

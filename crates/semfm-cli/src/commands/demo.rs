@@ -74,7 +74,9 @@ impl Demo {
             carried: &carried,
         };
         let folder = self.output.join("transfer");
-        let outcome = job.finish(&folder, about, &task, common)?;
+        // A demonstration shows where the time goes.
+        let talkative = Common { verbose: !common.quiet, ..*common };
+        let outcome = job.finish(&folder, about, &task, &talkative)?;
         if !common.json {
             talk::say(format_args!("IoU         {overlap:.2} with the true grip"));
             talk::say(format_args!("picture     {}", folder.join("transfer.png").display()));

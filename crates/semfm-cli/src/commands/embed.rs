@@ -76,7 +76,8 @@ impl Encoder {
 
     /// A name for the embeddings: of this mesh, these pictures, this encoder.
     fn key(&self, file: &MeshFile, colored: bool) -> String {
-        let mut words = vec![file.mesh.hash().to_string(), self.model.clone(), self.rolls.to_string()];
+        let mut words =
+            vec![file.mesh.hash().to_string(), self.model.clone(), self.rolls.to_string()];
         words.push(format!("{:?}", RigSettings::default()));
         if colored {
             words.push(format!("{:?}", file.appearance));
@@ -94,6 +95,9 @@ pub fn announce(name: &str, embeddings: &EmbeddingsFile, common: &Common) {
     if common.verbose {
         let about = &embeddings.metadata;
         let views = embeddings.views.len();
-        talk::remark(format_args!("{name}: {views} views by {} ({} rolls)", about.encoder, about.rolls));
+        talk::remark(format_args!(
+            "{name}: {views} views by {} ({} rolls)",
+            about.encoder, about.rolls
+        ));
     }
 }

@@ -37,10 +37,15 @@ impl Info {
             };
             if common.json {
                 let mut line = json!({ "file": path.display().to_string() });
-                line.as_object_mut().into_iter().for_each(|line| line.extend(report.as_object().cloned().unwrap_or_default()));
+                line.as_object_mut()
+                    .into_iter()
+                    .for_each(|line| line.extend(report.as_object().cloned().unwrap_or_default()));
                 talk::say(line);
             } else if let Some(error) = report.get("error") {
-                talk::remark(format_args!("error: {}", error["message"].as_str().unwrap_or_default()));
+                talk::remark(format_args!(
+                    "error: {}",
+                    error["message"].as_str().unwrap_or_default()
+                ));
             } else {
                 show(path, &report);
             }
@@ -79,7 +84,9 @@ fn is_mcap(path: &Path) -> bool {
     }
     let mut start = [0; 8];
     MeshFormat::from_path(path).is_none()
-        && std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start)).is_ok()
+        && std::fs::File::open(path)
+            .and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start))
+            .is_ok()
         && start == *b"\x89MCAP0\r\n"
 }
 

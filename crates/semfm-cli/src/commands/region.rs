@@ -28,10 +28,22 @@ pub struct MakeRegion {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// A contact point in the mesh's frame and units; needs --radius
-    #[arg(long, value_name = "X,Y,Z", requires = "radius", allow_hyphen_values = true, help_heading = "How")]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "radius",
+        allow_hyphen_values = true,
+        help_heading = "How"
+    )]
     near: Option<String>,
     /// Geodesic radius around the contact, in the mesh's units
-    #[arg(long, value_name = "LENGTH", requires = "near", help_heading = "How")]
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        requires = "near",
+        allow_negative_numbers = true,
+        help_heading = "How"
+    )]
     radius: Option<f64>,
     /// A picture of the size of a view, bright where the region is; needs --view
     #[arg(long, value_name = "IMAGE", requires = "view", help_heading = "How")]
@@ -86,7 +98,9 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     let Some((path, number)) = view.rsplit_once('#') else {
         bail!("--view: expected V.views.mcap#NNN, found `{view}`");
     };
-    let number = number.parse().with_context(|| format!("--view: expected a number after #, found `{number}`"))?;
+    let number = number
+        .parse()
+        .with_context(|| format!("--view: expected a number after #, found `{number}`"))?;
     let path = Path::new(path);
     let (metadata, view) = read_view(path, number)?;
     metadata.mesh.check(mesh, path)?;
@@ -94,7 +108,10 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     let (width, height) = (view.camera.width, view.camera.height);
     if picture.dimensions() != (width, height) {
         let (w, h) = picture.dimensions();
-        bail!("{}: size: expected {width} × {height}, as the view, found {w} × {h}", mask.display());
+        bail!(
+            "{}: size: expected {width} × {height}, as the view, found {w} × {h}",
+            mask.display()
+        );
     }
     let marked: Vec<bool> = picture.pixels().map(|pixel| pixel.0[0] >= 128).collect();
     Ok(regions::masked(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())?)

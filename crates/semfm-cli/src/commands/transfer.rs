@@ -11,7 +11,8 @@ use semfm::region_file::read_region;
 use semfm::views::EmbeddedView;
 use semfm::views::lift::LiftSettings;
 use semfm::{
-    Meaning, Method, PipelineSettings, PreparedObject, Region, Rule, Task, Transfer, Verdict, transfer,
+    Meaning, Method, PipelineSettings, PreparedObject, Region, Rule, Task, Transfer, Verdict,
+    transfer,
 };
 use serde_json::{Map, Value, json};
 
@@ -147,18 +148,19 @@ impl Carry {
             let (source, target) = rayon::join(|| new(source, &a), || new(target, &b));
             return Ok((source?, target?));
         }
-        let (a, b) = if let (Some(a), Some(b)) = (&meaning.source_embeddings, &meaning.target_embeddings) {
-            (load::embeddings(a, &source.mesh)?, load::embeddings(b, &target.mesh)?)
-        } else {
-            let model = meaning.encoder.as_deref().context("--encoder is missing")?;
-            let default_rolls = if self.matching.method == Method::Semfm { 1 } else { 4 };
-            let scratch = tempfile::tempdir().context("a folder for embeddings")?;
-            let rolls = meaning.rolls.unwrap_or(default_rolls);
-            let encoder = Encoder::new(model, rolls, !self.matching.no_cache, scratch.path())?;
-            // Colour on one side alone misleads the encoder.
-            let colored = !source.appearance.is_plain() && !target.appearance.is_plain();
-            (encoder.embed(&source, colored, common)?, encoder.embed(&target, colored, common)?)
-        };
+        let (a, b) =
+            if let (Some(a), Some(b)) = (&meaning.source_embeddings, &meaning.target_embeddings) {
+                (load::embeddings(a, &source.mesh)?, load::embeddings(b, &target.mesh)?)
+            } else {
+                let model = meaning.encoder.as_deref().context("--encoder is missing")?;
+                let default_rolls = if self.matching.method == Method::Semfm { 1 } else { 4 };
+                let scratch = tempfile::tempdir().context("a folder for embeddings")?;
+                let rolls = meaning.rolls.unwrap_or(default_rolls);
+                let encoder = Encoder::new(model, rolls, !self.matching.no_cache, scratch.path())?;
+                // Colour on one side alone misleads the encoder.
+                let colored = !source.appearance.is_plain() && !target.appearance.is_plain();
+                (encoder.embed(&source, colored, common)?, encoder.embed(&target, colored, common)?)
+            };
         announce("source", &a, common);
         announce("target", &b, common);
         let new = |file: MeshFile, views: &[EmbeddedView]| {
@@ -204,7 +206,8 @@ impl Job<'_> {
         let files = write_transfer(output, source, target, region, carried, about, task)?;
         let stages = stages_ms(source, target, carried);
         if common.json {
-            let stages: Map<String, Value> = stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect();
+            let stages: Map<String, Value> =
+                stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect();
             talk::say(json!({
                 "verdict": carried.verdict,
                 "confidence": carried.confidence,
@@ -226,7 +229,10 @@ fn tell(job: &Job<'_>, stages: &[(String, f64)], files: &[PathBuf], common: &Com
     let verdict = json!(carried.verdict);
     let (verdict, confidence) = (verdict.as_str().unwrap_or_default(), carried.confidence);
     talk::say(format_args!("verdict     {verdict} (confidence {confidence:.2})"));
-    talk::say(format_args!("region      {n} of {} vertices of the target", carried.region.n_vertices()));
+    talk::say(format_args!(
+        "region      {n} of {} vertices of the target",
+        carried.region.n_vertices()
+    ));
     if carried.hypotheses.len() > 1 {
         let shares: Vec<String> =
             carried.hypotheses.iter().map(|h| format!("{:.0} %", 100.0 * h.probability)).collect();

@@ -69,7 +69,10 @@ impl Views {
         }
         let file = load::mesh(&self.mesh, self.texture.as_deref())?;
         if common.verbose {
-            file.appearance.notes.iter().for_each(|note| talk::remark(format_args!("note: {note}")));
+            file.appearance
+                .notes
+                .iter()
+                .for_each(|note| talk::remark(format_args!("note: {note}")));
         }
         make_views(&file, !self.grey, &self.rig.settings(), &self.output, common)?;
         talk::say(self.output.display());
@@ -98,7 +101,8 @@ pub fn make_views(
         rig: format!("fibonacci {}, principal frame", settings.count),
         background: "white".into(),
         seed: 0,
-        more: [("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned())].into(),
+        more: [("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned())]
+            .into(),
     };
     let colors: Option<Vec<[u8; 3]>> = appearance
         .and_then(|appearance| appearance.vertex_colors.as_ref())

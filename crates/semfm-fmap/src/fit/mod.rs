@@ -72,6 +72,7 @@ pub fn fit(
     settings: &FitSettings,
     task: &Task,
 ) -> Result<Fit> {
+    semfm_geom::algebra::keep_sequential();
     Error::length("descriptors of the target", a.ncols(), b.ncols())?;
     Error::length("coefficients per descriptor of the target", a.nrows(), b.nrows())?;
     check_size("the descriptors", a.nrows(), source, target)?;

@@ -131,6 +131,7 @@ impl<'a> Matching<'a> {
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
+        semfm_geom::algebra::keep_sequential();
         settings.check()?;
         let settings = settings.clipped(source.shape().basis().k().min(target.shape().basis().k()));
         let mut stages = Stages::default();
@@ -204,17 +205,15 @@ impl<'a> Matching<'a> {
         let start = Instant::now();
         let (shape, areas) = (self.target.shape(), &self.target.shape().basis().mass);
         let inside = self.source.region_on_working(&region.mask());
-        let votes = self.votes(&inside);
+        let votes = self.votes(&inside)?;
         let by_transport =
             at_threshold(&self.votes_by_transport(&inside), Method::Sinkhorn.threshold());
         let second = match &self.witness {
             None => by_transport.clone(),
             Some(map) => {
                 let diffusion = Method::Fused.diffusion();
-                at_threshold(
-                    &self.votes_by_map(map, Rule::Preimage, diffusion, &inside),
-                    Method::Fused.threshold(),
-                )
+                let votes = self.votes_by_map(map, Rule::Preimage, diffusion, &inside)?;
+                at_threshold(&votes, Method::Fused.threshold())
             }
         };
         let agreement = overlap(&mask(&votes), &mask(&second), areas);
@@ -232,7 +231,7 @@ impl<'a> Matching<'a> {
                 Ok(Hypothesis { region: onto_original(&weights)?, probability })
             })
             .collect::<Result<Vec<_>>>()?;
-        let other = self.other_rule(&inside);
+        let other = self.other_rule(&inside)?;
         let other_rule = other.as_deref().map(onto_original).transpose()?;
         let other_iou = other.map(|other| overlap(&mask(&votes), &mask(&other), areas));
         let region = onto_original(&votes)?;
@@ -253,10 +252,10 @@ impl<'a> Matching<'a> {
     }
 
     /// The method's vote on the target's working vertices, threshold at [`Region::COUNTS`].
-    fn votes(&self, inside: &[bool]) -> Vec<f64> {
+    fn votes(&self, inside: &[bool]) -> Result<Vec<f64>> {
         let raw = match &self.voter {
             Voter::Map { diffusion } => {
-                self.votes_by_map(&self.matched, self.settings.rule, *diffusion, inside)
+                self.votes_by_map(&self.matched, self.settings.rule, *diffusion, inside)?
             }
             Voter::Transport => self.votes_by_transport(inside),
             Voter::Nearest(neighbours) => {
@@ -268,7 +267,7 @@ impl<'a> Matching<'a> {
                 self.target.onto_vertices(&neighbours.iter().map(mean).collect::<Vec<f64>>())
             }
         };
-        at_threshold(&raw, self.settings.threshold)
+        Ok(at_threshold(&raw, self.settings.threshold))
     }
 
     fn votes_by_map(
@@ -277,7 +276,7 @@ impl<'a> Matching<'a> {
         rule: Rule,
         diffusion: f64,
         inside: &[bool],
-    ) -> Vec<f64> {
+    ) -> Result<Vec<f64>> {
         let hit = match (rule, &matched.reverse) {
             (Rule::Image, Some(reverse)) => {
                 let mut hit = vec![0.0; self.target.shape().mesh().n_vertices()];
@@ -295,7 +294,10 @@ impl<'a> Matching<'a> {
                 .map(|b| f64::from(u8::from(b)))
                 .collect(),
         };
-        if diffusion > 0.0 { self.target.shape().basis().diffuse(&hit, diffusion) } else { hit }
+        if diffusion == 0.0 {
+            return Ok(hit);
+        }
+        Ok(self.target.shape().smooth(&hit, diffusion)?)
     }
 
     fn votes_by_transport(&self, inside: &[bool]) -> Vec<f64> {
@@ -308,17 +310,17 @@ impl<'a> Matching<'a> {
     }
 
     /// The vote under the rule that was not asked for, where both maps are at hand (`semfm`).
-    fn other_rule(&self, inside: &[bool]) -> Option<Vec<f64>> {
+    fn other_rule(&self, inside: &[bool]) -> Result<Option<Vec<f64>>> {
         if self.settings.method != Method::Semfm {
-            return None;
+            return Ok(None);
         }
         let votes = self.votes_by_map(
             &self.matched,
             self.settings.rule.other(),
             self.settings.diffusion,
             inside,
-        );
-        Some(at_threshold(&votes, self.settings.threshold))
+        )?;
+        Ok(Some(at_threshold(&votes, self.settings.threshold)))
     }
 }
 

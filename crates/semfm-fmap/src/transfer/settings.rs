@@ -58,9 +58,10 @@ impl Method {
         if self == Self::Fused { 0.4 } else { 0.5 }
     }
 
-    /// Heat time (area 1) that smooths the vote of a map: .001 leaves specks, .01 eats handles.
+    /// Heat time (area 1) of the implicit step that smooths the vote of a map. On the truth itself
+    /// it costs IoU 0 to .09; .003 on 60 eigenfunctions cost up to .3 on the handle of a kettle.
     pub(super) fn diffusion(self) -> f64 {
-        if matches!(self, Self::Fused | Self::Anchored) { 0.003 } else { 0.0 }
+        if matches!(self, Self::Fused | Self::Anchored) { 0.001 } else { 0.0 }
     }
 
     fn zoomout(self) -> ZoomOutSettings {

@@ -95,6 +95,7 @@ pub fn eigenbasis(
     settings: &EigenSettings,
     task: &Task,
 ) -> Result<Eigenbasis> {
+    crate::algebra::keep_sequential();
     let n_vertices = laplacian.n_vertices();
     if k == 0 {
         let (expected, found) = ("1 or more".to_owned(), "0".to_owned());
