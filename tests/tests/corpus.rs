@@ -82,18 +82,24 @@ fn fault(expected: &str, disputed: bool, told: &Answer) -> Option<String> {
         Some(2) => false,
         _ => return Some(format!("exit {:?}: {}", told.code, told.err)),
     };
-    if !accepted && !(report["error"]["code"].is_string() && report["error"]["message"].is_string())
-    {
+    let reason = &report["error"];
+    let reasoned = reason["code"].is_string() && reason["message"].is_string();
+    if !accepted && !reasoned {
         return Some(format!("a refusal without code and message: {report}"));
     }
-    let may = |verdict: &str| {
-        expected.starts_with(verdict) || expected.contains(&format!("or {verdict}"))
-    };
     if disputed || expected.starts_with("any") {
         return None;
     }
-    if accepted != may("accept") && accepted == may("refuse") {
+    let verdict = if accepted { "accept" } else { "refuse" };
+    if !(expected.starts_with(verdict) || expected.contains(&format!("or {verdict}"))) {
         return Some(format!("found {report}"));
     }
-    None
+    // Where one plain count is expected, it is this one.
+    let plain = accepted && !expected.contains('[') && !expected.contains(" or ");
+    let counts = [("v=", "n_vertices"), ("f=", "n_faces"), ("tri=", "n_triangles")];
+    counts.into_iter().filter(|_| plain).find_map(|(key, field)| {
+        let word = expected.split_whitespace().find_map(|word| word.strip_prefix(key))?;
+        let count: u64 = word.trim_end_matches(',').parse().ok()?;
+        (report[field] != count).then(|| format!("{field}: found {}", report[field]))
+    })
 }

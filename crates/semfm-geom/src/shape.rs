@@ -194,10 +194,10 @@ impl Shape {
             return Err(Error::Length { what: "values on the working mesh", expected, found });
         }
         let mut system = stiffness.clone();
-        for j in 0..system.ncols() {
-            let rows = system.row_idx_of_col_raw(j).to_vec();
-            for (value, i) in system.val_of_col_mut(j).iter_mut().zip(rows) {
-                *value = t * *value + if i == j { mass[j] } else { 0.0 };
+        for (j, &mass) in mass.iter().enumerate() {
+            let rows = stiffness.row_idx_of_col_raw(j);
+            for (value, &i) in system.val_of_col_mut(j).iter_mut().zip(rows) {
+                *value = t * *value + if i == j { mass } else { 0.0 };
             }
         }
         let heat = function.iter().zip(mass).map(|(f, m)| f * m).collect::<Vec<_>>();

@@ -114,5 +114,5 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
         );
     }
     let marked: Vec<bool> = picture.pixels().map(|pixel| pixel.0[0] >= 128).collect();
-    Ok(regions::masked(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())?)
+    regions::masked(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())
 }
