@@ -102,7 +102,7 @@ impl SurfaceIndex {
     /// The first triangle on the ray `origin + t · direction`, t ≥ 0; `None` for a miss, for a
     /// direction of length 0 and for numbers that are not finite.
     ///
-    /// Rays do not slip through between two triangles that share an edge (see [`WatertightRay`]).
+    /// Rays do not slip through between two triangles that share an edge (see `WatertightRay`).
     pub fn first_hit(&self, origin: DVec3, direction: DVec3) -> Option<RayHit> {
         let watertight = WatertightRay::new(origin, direction)?;
         let ray = Ray::new(origin, direction);

@@ -24,7 +24,7 @@ pub struct ObjectFiles {
 /// The pictures that the simulated encoder is shown: the default rig and light, in grey.
 ///
 /// # Errors
-/// As [`rig`] and [`render`], which a procedural object never causes; cancellation.
+/// As [`rig()`] and [`render()`], which a procedural object never causes; cancellation.
 pub fn render_views(object: &SynthObject, task: &Task) -> Result<Vec<View>> {
     let cameras = rig(&object.mesh, &RigSettings::default())?;
     let settings = RenderSettings::default();

@@ -1,7 +1,7 @@
 //! Rendered views, patch embeddings, and lifting them to the surface (sections IV-C of the paper).
 //!
-//! A [`rig`] places cameras around an object, the renderer makes a [`View`] from each, an encoder
-//! outside this crate turns the views into [`PatchEmbeddings`], and [`lift`] carries those onto the
+//! A [`rig()`] places cameras around an object, the renderer makes a [`View`] from each, an encoder
+//! outside this crate turns the views into [`PatchEmbeddings`], and [`lift()`] carries those onto the
 //! surface as a [`SemanticCloud`](semfm_geom::SemanticCloud). Views and embeddings travel in MCAP
 //! files (feature `mcap`).
 

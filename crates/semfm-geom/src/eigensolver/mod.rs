@@ -1,8 +1,8 @@
 //! The first eigenpairs of a Laplacian.
 //!
-//! Constants first ([`nullspace`]), then block Lanczos ([`lanczos`]) on the shift-inverted operator
-//! ([`shift_invert`]), then proof that nothing is wrong or missing ([`check`]). Small meshes are
-//! solved densely ([`dense`]).
+//! Constants first (`nullspace`), then block Lanczos (`lanczos`) on the shift-inverted operator
+//! (`shift_invert`), then proof that nothing is wrong or missing (`check`). Small meshes are
+//! solved densely (`dense`).
 
 mod check;
 mod dense;
