@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 
 use semfm_geom::Task;
 use semfm_geom::io::{write_atomically, write_mesh};
-use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata,
-};
+use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
 use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
 
 use crate::{Level, Result, SynthObject, embed};
@@ -26,7 +24,7 @@ pub struct ObjectFiles {
 /// The pictures that the simulated encoder is shown: the default rig and light, in grey.
 ///
 /// # Errors
-/// As [`rig`] and [`render`], which a procedural object never causes; cancellation.
+/// As [`rig()`] and [`render()`], which a procedural object never causes; cancellation.
 pub fn render_views(object: &SynthObject, task: &Task) -> Result<Vec<View>> {
     let cameras = rig(&object.mesh, &RigSettings::default())?;
     let settings = RenderSettings::default();
@@ -49,11 +47,8 @@ pub fn write_object(
 ) -> Result<ObjectFiles> {
     let name = object.name();
     let path = |extension: &str| folder.join(format!("{name}.{extension}"));
-    let files = ObjectFiles {
-        mesh: path("obj"),
-        truth: path("json"),
-        embeddings: path("emb.mcap"),
-    };
+    let files =
+        ObjectFiles { mesh: path("obj"), truth: path("json"), embeddings: path("emb.mcap") };
     let views = render_views(object, task)?;
     let embeddings = EmbeddingsFile {
         path: PathBuf::new(),
