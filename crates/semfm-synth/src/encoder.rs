@@ -354,3 +354,88 @@ fn scaled(vector: &[f32], by: f32) -> Vec<f32> {
 fn add(sum: &mut [f32], vector: &[f32], weight: f32) {
     sum.iter_mut().zip(vector).for_each(|(s, x)| *s += weight * x);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Category, ObjectSettings, make_object, render_views};
+    use semfm_geom::Task;
+
+    /// Nothing but what a patch covers.
+    const CLEAN: Strengths = Strengths {
+        common: 0.55,
+        instance: 0.0,
+        instance_part: 0.0,
+        smooth: 0.0,
+        position: 0.0,
+        noise: 0.0,
+        view: 0.0,
+        context: 0.0,
+        blur: 0.0,
+        background: 0.0,
+    };
+
+    #[test]
+    fn without_disturbance_a_patch_on_one_part_is_that_parts_prototype() {
+        let settings = ObjectSettings { n_vertices: 1500, ..ObjectSettings::default() };
+        let mut n_met = 0;
+        for category in Category::ALL {
+            let object = make_object(category, 0, &settings).unwrap();
+            let views = render_views(&object, &Task::default()).unwrap();
+            let clean = Appearance::new(&object, &CLEAN);
+            let mut met = vec![false; object.part_names.len()];
+            for (number, view) in views.iter().enumerate() {
+                let patches = clean.embed(&object, view, number).unwrap().patches;
+                for (patch, token) in patches.data.chunks_exact(DIM).enumerate() {
+                    let (row, col) = (patch / patches.cols, patch % patches.cols);
+                    let shares = clean.look(&object, view, row, col).unwrap().shares;
+                    let Some(own) = shares.iter().position(|&share| share == 1.0) else { continue };
+                    met[own] = true;
+                    for (part, prototype) in clean.prototypes.iter().enumerate() {
+                        let apart = token.iter().zip(prototype).map(|(a, b)| (a - b).powi(2));
+                        let apart = apart.sum::<f32>();
+                        assert_eq!(apart < 1e-6, part == own, "{category}: {apart}");
+                    }
+                }
+            }
+            n_met += met.iter().filter(|&&met| met).count();
+        }
+        assert!(n_met >= 10, "{n_met} parts fill a patch");
+    }
+
+    #[test]
+    fn parts_of_a_category_share_the_squared_cosine_that_the_level_sets() {
+        let object = make_object(Category::Tools, 0, &ObjectSettings::default()).unwrap();
+        let prototypes = Appearance::new(&object, &CLEAN).prototypes;
+        for (i, a) in prototypes.iter().enumerate() {
+            for (j, b) in prototypes.iter().enumerate() {
+                let cosine: f32 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+                // Random directions in 384 dimensions are at right angles to about ±.1; parts of
+                // one group share up to a third of what the category leaves.
+                let (low, high) = if i == j { (0.8, 1.2) } else { (0.4, 0.85) };
+                assert!((low..high).contains(&cosine), "{i} {j}: {cosine}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_view_of_another_mesh_is_refused() {
+        let make = |n_vertices| {
+            let settings = ObjectSettings { n_vertices, ..ObjectSettings::default() };
+            make_object(Category::Containers, 0, &settings).unwrap()
+        };
+        let (small, large) = (make(500), make(3000));
+        let views = render_views(&large, &Task::default()).unwrap();
+        let error = embed(&small, &views, Level::Easy).unwrap_err().to_string();
+        assert!(error.contains(&format!("{} triangles", small.mesh.n_faces())), "{error}");
+    }
+
+    #[test]
+    fn level_names_are_read_back_and_strangers_refused() {
+        for level in Level::ALL {
+            assert_eq!(level.name().parse::<Level>().unwrap(), level);
+        }
+        let error = "extreme".parse::<Level>().unwrap_err().to_string();
+        assert!(error.contains("extreme") && error.contains("easy, medium, hard"), "{error}");
+    }
+}

@@ -68,7 +68,14 @@ impl SynthObject {
 
 /// Makes the `instance`-th object of a category.
 ///
-/// The same arguments give the same object on every machine and thread count.
+/// The same arguments give the same object at every thread count.
+///
+/// ```
+/// use semfm_synth::{Category, ObjectSettings, make_object};
+/// let mug = make_object(Category::Containers, 0, &ObjectSettings::default())?;
+/// assert_eq!((mug.kind, &mug.part_names[..]), ("mug", &["body", "handle"][..]));
+/// # Ok::<(), semfm_synth::Error>(())
+/// ```
 ///
 /// # Errors
 /// Only where the ground floor refuses the mesh, which a blueprint never causes.
@@ -84,7 +91,7 @@ pub fn make_object(
         let distances = plan.parts.iter().map(|part| part.field.at(p).distance);
         distances.reduce(|a, b| smooth_min(a, b, plan.blend)).unwrap_or(f64::INFINITY)
     };
-    let grid = Grid::around(&field, settings.n_vertices);
+    let grid = Grid::around(&field, settings.n_vertices)?;
     let mut distances = grid.sample(&field);
     grid.float(&mut distances, settings.floaters, &mut draw);
     let dense = grid.mesh(&distances)?;
@@ -139,37 +146,31 @@ struct Grid {
 const WORLD: (DVec3, DVec3) = (DVec3::new(-1.6, -1.2, -1.2), DVec3::new(1.9, 1.2, 2.0));
 /// Spacing of the first look at where the object is.
 const COARSE: f64 = 0.05;
-/// Marching cubes gives about this many vertices per lattice square of surface.
-const VERTICES_PER_SQUARE: f64 = 1.5;
-/// Finer than aimed at by this factor, then thinned out: evener triangles than marching cubes'.
-const OVERSAMPLING: f64 = 1.6;
+/// Finer than aimed at by this factor, then thinned out to the count asked for. 1.6 makes triangles
+/// a little better shaped on average (.82 for .80) but spends them where the surface bends: edges on
+/// flat blades grow to 3.5 times the median, with 1.25 to 3 times.
+const OVERSAMPLING: f64 = 1.25;
+/// Distances on the lattice are at least this share of its spacing, so that no vertex falls on a
+/// lattice point: without it there are triangles of no area, .2 keeps their quality above .1.
+const CLEARANCE: f64 = 0.2;
 /// Thinning may move the surface by this share of the object's diagonal; no blueprint comes near.
 const FARTHEST_FROM_LATTICE: f64 = 0.05;
 /// Finest and coarsest lattice: thin blades need .03, memory forbids less than .008.
 const SPACING: (f64, f64) = (0.008, 0.03);
 
 impl Grid {
-    fn around(field: &(impl Fn(DVec3) -> f64 + Sync), n_vertices: usize) -> Self {
-        let extent = (WORLD.1 - WORLD.0) / COARSE;
-        let [nx, ny, nz] = [extent.x, extent.y, extent.z].map(|e| e.ceil() as usize);
-        let near: Vec<(DVec3, f64)> = (0..nx * ny * nz)
-            .into_par_iter()
-            .map(|i| {
-                WORLD.0
-                    + COARSE
-                        * DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64)
-            })
-            .map(|p| (p, field(p)))
-            .filter(|&(_, d)| d < 0.06)
-            .collect();
-        let points: Vec<DVec3> = near.iter().map(|&(p, _)| p).collect();
-        let (low, high) =
-            bounds(&points).expect("a blueprint has at least one part inside the world");
-        let (low, high) = (low - 0.16, high + 0.16);
-        let shell = near.iter().filter(|(_, d)| d.abs() < COARSE / 2.0).count();
-        let area = shell as f64 * COARSE * COARSE;
+    /// Fine enough that the zero level of `field` has some more than `n_vertices`.
+    fn around(field: &(impl Fn(DVec3) -> f64 + Sync), n_vertices: usize) -> Result<Self> {
+        let (low, high) = surroundings(field);
+        // The number of vertices goes with the inverse square of the spacing.
+        let coarse = Self::new(low, high, SPACING.1);
+        let n_coarse = coarse.mesh(&coarse.sample(field))?.n_vertices() as f64;
         let wanted = n_vertices as f64 * OVERSAMPLING;
-        let spacing = (VERTICES_PER_SQUARE * area / wanted).sqrt().clamp(SPACING.0, SPACING.1);
+        let spacing = SPACING.1 * (n_coarse / wanted).sqrt();
+        Ok(Self::new(low, high, spacing.clamp(SPACING.0, SPACING.1)))
+    }
+
+    fn new(low: DVec3, high: DVec3, spacing: f64) -> Self {
         let used = ((high - low) / spacing).to_array().map(|e| e.ceil() as usize + 1);
         Self { origin: low, spacing, n: used.into_iter().max().unwrap_or(2), used }
     }
@@ -207,7 +208,12 @@ impl Grid {
                 let [x, y, z] = [p.x, p.y, p.z].map(|t| (t * steps).round() as usize);
                 let [nx, ny, nz] = self.0.used;
                 let outside = x >= nx || y >= ny || z >= nz;
-                Signed(if outside { f32::MAX } else { self.1[(z * ny + y) * nx + x] })
+                if outside {
+                    return Signed(f32::MAX);
+                }
+                let distance = self.1[(z * ny + y) * nx + x];
+                let least = (CLEARANCE * self.0.spacing) as f32;
+                Signed(distance.abs().max(least).copysign(distance))
             }
         }
         let (mut coordinates, mut ids) = (Vec::new(), Vec::new());
@@ -222,9 +228,21 @@ impl Grid {
             .iter()
             .map(|c| self.origin + side * DVec3::new(c[0].into(), c[1].into(), c[2].into()))
             .collect();
+        // The extractor winds clockwise as seen from outside.
         let (faces, _) = ids.as_chunks::<3>();
-        Ok(Mesh::new(vertices, faces.to_vec())?)
+        let faces = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        Ok(Mesh::new(vertices, faces)?)
     }
+}
+
+/// A box around the object with room for floaters.
+fn surroundings(field: &(impl Fn(DVec3) -> f64 + Sync)) -> (DVec3, DVec3) {
+    let look = Grid::new(WORLD.0, WORLD.1, COARSE);
+    let distances = look.sample(field);
+    let near = (0..distances.len()).filter(|&i| distances[i] < 1.2 * COARSE as f32);
+    let near: Vec<DVec3> = near.map(|i| look.point(i)).collect();
+    let (low, high) = bounds(&near).expect("a blueprint has at least one part inside the world");
+    (low - 0.16, high + 0.16)
 }
 
 /// The component with most vertices: thin parts of a coarse lattice may leave crumbs.

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A stream of random numbers named by `key`: the same key gives the same numbers everywhere.
+/// A stream of random numbers named by `key`: the same key gives the same numbers.
 pub(crate) fn stream(key: &[&str]) -> Draw {
     let hash = blake3::hash(key.join("\u{1f}").as_bytes());
     Draw(ChaCha8Rng::from_seed(*hash.as_bytes()))
