@@ -93,7 +93,8 @@ const BEFORE_TESTS: [&str; 5] = ["fmt", "deny", "lint", "doc", "features"];
 /// All jobs, the tests last so that their summary is the last line; a failed job stops no other.
 fn ci(workspace: &Workspace) -> bool {
     let mut failed = Vec::new();
-    for (name, work) in JOBS.iter().filter(|(name, _)| BEFORE_TESTS.contains(name)) {
+    let jobs = BEFORE_TESTS.iter().filter_map(|name| JOBS.iter().find(|(job, _)| job == name));
+    for (name, work) in jobs {
         println!("== {name}");
         if let Err(error) = work(workspace) {
             eprintln!("error: {name}: {error:#}");

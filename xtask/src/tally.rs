@@ -42,8 +42,12 @@ impl Tally {
 
     /// Turns tests that were skipped for want of the shared data into failures.
     pub fn demand_shared_data(&mut self) {
-        let wants = |reason: &&String| reason.to_lowercase().contains("shared");
-        let wanting = self.reasons.iter().filter(wants).count();
+        let wanting: usize = self
+            .reasons
+            .iter()
+            .filter(|reason| reason.to_lowercase().contains("shared"))
+            .map(|reason| tests_behind(reason))
+            .sum();
         let wanting = wanting.min(self.skipped);
         self.skipped -= wanting;
         self.failed += wanting;
@@ -129,6 +133,12 @@ impl Pytest {
     }
 }
 
+/// Pytest says in brackets how many tests a reason stands for.
+fn tests_behind(reason: &str) -> usize {
+    let number = reason.strip_prefix("SKIPPED [").and_then(|rest| rest.split_once(']'));
+    number.and_then(|(number, _)| number.parse().ok()).unwrap_or(1)
+}
+
 fn number_and_word(text: &str) -> Option<(usize, &str)> {
     let (number, word) = text.trim().split_once(' ')?;
     Some((number.parse().ok()?, word))
@@ -180,9 +190,11 @@ mod tests {
 
     #[test]
     fn missing_shared_data_can_be_made_a_failure() {
-        let reasons = vec!["SKIPPED: no shared data".into(), "SKIPPED: no CUDA".into()];
-        let mut tally = Tally { passed: 1, failed: 0, skipped: 2, reasons };
+        let reasons =
+            ["SKIPPED: no shared data", "SKIPPED: no CUDA", "SKIPPED [2] a.py: no shared data"];
+        let reasons = reasons.map(String::from).to_vec();
+        let mut tally = Tally { passed: 1, failed: 0, skipped: 4, reasons };
         tally.demand_shared_data();
-        assert_eq!(tally.to_string(), "1 passed, 1 failed, 1 skipped");
+        assert_eq!(tally.to_string(), "1 passed, 3 failed, 1 skipped");
     }
 }
