@@ -1,4 +1,4 @@
-//! Tools with handles; one holds the lower part of the handle.
+//! Tools with handles; one holds the handle, short of the head.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ pub(super) fn generate(kind: usize, draw: &mut Draw) -> Blueprint {
     let radius = draw.between(0.045, 0.075);
     let bend = draw.between(-0.12, 0.12);
     let waves = draw.between(0.6, 1.3);
-    let held = draw.between(0.5, 0.62);
+    let held = draw.between(0.7, 0.85);
     let flatness = draw.between(0.55, 0.9);
     let y = v(0.0, 1.0, 0.0);
     let heights: Vec<f64> = (0..7).map(|i| f64::from(i) / 6.0).collect();
