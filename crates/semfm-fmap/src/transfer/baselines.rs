@@ -3,15 +3,13 @@
 use faer::Mat;
 use rayon::prelude::*;
 use semfm_geom::Eigenbasis;
+use semfm_geom::descriptors::{WksSettings, wks};
 
 use super::{Matched, Pair, Rule, Stages, Voter};
 use crate::descriptors::normalised_coefficients;
 use crate::fit::{Fit, fit};
 use crate::zoomout::{MapSide, point_map, zoomout};
 use crate::{PointMap, Result};
-
-/// Energies of the wave kernel signature.
-const N_ENERGIES: usize = 100;
 
 /// The map of the transport plan: each vertex goes to the vertex of the source point that its own
 /// nearest point gets most of its mass from.
@@ -67,10 +65,11 @@ pub(super) fn match_by_wks(pair: &Pair<'_>, stages: &mut Stages) -> Result<Match
     let road = |a: &MapSide<'_>, b: &MapSide<'_>, stages: &mut Stages| -> Result<(Fit, PointMap)> {
         let k = pair.settings.zoomout.k_start;
         let start = std::time::Instant::now();
-        let describe = |basis: &Eigenbasis| {
-            normalised_coefficients(basis, wave_kernel_signature(basis).as_ref(), k)
+        let describe = |basis: &Eigenbasis| -> Result<Mat<f64>> {
+            let signature = wks(basis, &WksSettings::default())?;
+            Ok(normalised_coefficients(basis, signature.as_ref(), k))
         };
-        let (on_a, on_b) = (describe(a.basis), describe(b.basis));
+        let (on_a, on_b) = (describe(a.basis)?, describe(b.basis)?);
         let mut fit =
             fit((on_a.as_ref(), on_b.as_ref()), a.basis, b.basis, &pair.settings.fit, pair.task)?;
         stages.put("fit", start.elapsed());
@@ -88,30 +87,4 @@ pub(super) fn match_by_wks(pair: &Pair<'_>, stages: &mut Stages) -> Result<Match
         Rule::Preimage => None,
     };
     Ok(Matched { point_map: points, reverse: back, map: Some(forth.map), fit: Some(forth.report) })
-}
-
-/// Wave kernel signature (n × 100; Aubry, Schlickewei & Cremers 2011): log-normal band passes over
-/// the spectrum without its constant functions, each scaled by its total.
-fn wave_kernel_signature(basis: &Eigenbasis) -> Mat<f64> {
-    let largest = basis.values.last().copied().unwrap_or(0.0);
-    let constants = basis.values.iter().take_while(|&&l| l <= 1e-8 * largest).count();
-    let logs: Vec<f64> = basis.values[constants..].iter().map(|l| l.ln()).collect();
-    let (Some(&low), Some(&high)) = (logs.first(), logs.last()) else {
-        return Mat::zeros(basis.n_vertices(), N_ENERGIES);
-    };
-    let width = (7.0 * (high - low) / N_ENERGIES as f64).max(1e-6);
-    let bands = Mat::from_fn(logs.len(), N_ENERGIES, |i, e| {
-        let (first, last) = (low + 2.0 * width, high - 2.0 * width);
-        let energy = first + (last - first) * e as f64 / (N_ENERGIES - 1) as f64;
-        (-(energy - logs[i]).powi(2) / (2.0 * width * width)).exp()
-    });
-    let squares = Mat::from_fn(basis.n_vertices(), logs.len(), |v, i| {
-        basis.functions[(v, constants + i)].powi(2)
-    });
-    let mut signature = squares * &bands;
-    for e in 0..N_ENERGIES {
-        let total: f64 = bands.col(e).iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        signature.col_mut(e).iter_mut().for_each(|x| *x /= total);
-    }
-    signature
 }

@@ -111,10 +111,7 @@ pub fn eigenbasis(
     let (values, mut vectors) = if kernel.ncols() == k {
         (vec![0.0; k], kernel)
     } else if n_vertices <= DENSE_VERTICES.max(DENSE_VERTICES_PER_PAIR * k) {
-        let (mut values, mut vectors) = dense::first_pairs(laplacian, k)?;
-        values[..kernel.ncols()].fill(0.0);
-        vectors.as_mut().subcols_mut(0, kernel.ncols()).copy_from(&kernel);
-        (values, vectors)
+        dense::first_pairs(laplacian, kernel.as_ref(), k)?
     } else {
         iterate(laplacian, kernel, k, settings, task)?
     };

@@ -1,7 +1,7 @@
 //! Files that are written whole or not at all.
 
 use std::fs::File;
-use std::io::{BufWriter, Error as IoError, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use crate::{Error, Result};
@@ -25,13 +25,22 @@ pub fn write_atomically(
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {
     let path = path.as_ref();
-    replace(path, write).map_err(|source| Error::Io { path: path.to_owned(), source })
+    replace_atomically(path, |file| {
+        let mut out = BufWriter::new(file);
+        let written = write(&mut out).and_then(|()| out.flush());
+        written.map_err(|source| Error::Io { path: path.to_owned(), source })
+    })
 }
 
-fn replace(
+/// As [`write_atomically`], for writers that seek and fail in ways of their own.
+///
+/// # Errors
+/// What `fill` reports, or [`Error::Io`] with the target's path.
+pub fn replace_atomically<E: From<Error>>(
     path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> std::io::Result<()> {
+    fill: impl FnOnce(&mut File) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
+    let io = |source| Error::Io { path: path.to_owned(), source };
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -46,15 +55,10 @@ fn replace(
         let ordinary = std::fs::Permissions::from_mode(0o666);
         builder.permissions(std::fs::metadata(path).map_or(ordinary, |old| old.permissions()));
     }
-    let mut out = BufWriter::new(builder.tempfile_in(folder)?);
-    write(&mut out)?;
-    let file = out.into_inner().map_err(|error| IoError::other(error.to_string()))?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|error| error.error)?;
-    // The rename itself lives in the folder; not every file system lets a folder be flushed.
-    if let Ok(folder) = File::open(folder) {
-        let _ = folder.sync_all();
-    }
+    let mut temporary = builder.tempfile_in(folder).map_err(io)?;
+    fill(temporary.as_file_mut())?;
+    temporary.as_file().sync_all().map_err(io)?;
+    temporary.persist(path).map_err(|error| io(error.error))?;
     Ok(())
 }
 

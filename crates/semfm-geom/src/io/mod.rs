@@ -25,7 +25,7 @@ mod write;
 use std::path::Path;
 
 pub use self::appearance::{Appearance, Material};
-pub use self::atomic::write_atomically;
+pub use self::atomic::{replace_atomically, write_atomically};
 pub use self::image::{Texture, Wrap};
 use self::input::{Input, quote, read_file};
 pub use self::write::{Paint, write_mesh, write_painted_mesh};

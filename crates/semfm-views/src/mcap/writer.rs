@@ -7,6 +7,7 @@ use std::path::Path;
 
 use foxglove::Encode;
 use foxglove::messages::Timestamp;
+use semfm_geom::io::replace_atomically;
 
 use crate::{Error, Result};
 
@@ -41,7 +42,7 @@ pub(super) fn write_file(
     packing: Packing,
     fill: impl FnOnce(&mut McapFile<'_>) -> Result<()>,
 ) -> Result<()> {
-    write_atomically(path, |file| {
+    replace_atomically(path, |file| {
         let compression = match packing {
             Packing::Plain => None,
             Packing::Lz4 => Some(mcap::Compression::Lz4),
@@ -124,23 +125,4 @@ fn failure(path: &Path, error: mcap::McapError) -> Error {
 
 fn io_error(path: &Path, source: std::io::Error) -> Error {
     Error::Io { path: path.to_path_buf(), source }
-}
-
-/// Fills a temporary file beside `path`, forces it to the disk and renames it into place.
-fn write_atomically(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".semfm-");
-    #[cfg(unix)]
-    {
-        // As any other new file: the default of temporary files is for the owner alone.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut temporary =
-        builder.tempfile_in(folder.unwrap_or(Path::new("."))).map_err(|e| io_error(path, e))?;
-    fill(temporary.as_file_mut())?;
-    temporary.as_file().sync_all().map_err(|e| io_error(path, e))?;
-    temporary.persist(path).map_err(|e| io_error(path, e.error))?;
-    Ok(())
 }
