@@ -73,7 +73,7 @@ mod tests {
         write_atomically(&path, |out| out.write_all(b"old")).unwrap();
         let error = write_atomically(&path, |out| {
             out.write_all(b"half of the n")?;
-            Err(IoError::other("the disk is full"))
+            Err(std::io::Error::other("the disk is full"))
         });
         assert!(error.unwrap_err().to_string().contains("kept.txt: the disk is full"));
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
