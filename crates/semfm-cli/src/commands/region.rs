@@ -64,7 +64,8 @@ impl MakeRegion {
         let file = load::mesh(&self.mesh, None)?;
         let region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
             let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
-            regions::near(&file.mesh, DVec3::new(x, y, z), radius)?
+            regions::near(&file.mesh, DVec3::new(x, y, z), radius)
+                .with_context(|| self.mesh.display().to_string())?
         } else if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
             from_mask(&file.mesh, mask, view)?
         } else if let Some(paint) = &self.ply_color {

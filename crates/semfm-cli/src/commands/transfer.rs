@@ -146,7 +146,7 @@ impl Carry {
                 PreparedObject::new(file.mesh, Meaning::PerVertex(values), settings, task)
             };
             let (source, target) = rayon::join(|| new(source, &a), || new(target, &b));
-            return Ok((source?, target?));
+            return self.named(source, target);
         }
         let (a, b) =
             if let (Some(a), Some(b)) = (&meaning.source_embeddings, &meaning.target_embeddings) {
@@ -167,7 +167,17 @@ impl Carry {
             PreparedObject::new(file.mesh, Meaning::Views(views), settings, task)
         };
         let (source, target) = rayon::join(|| new(source, &a.views), || new(target, &b.views));
-        Ok((source?, target?))
+        self.named(source, target)
+    }
+
+    /// Both or the first failure, which names its file.
+    fn named(
+        &self,
+        source: semfm::Result<PreparedObject>,
+        target: semfm::Result<PreparedObject>,
+    ) -> Result<(PreparedObject, PreparedObject)> {
+        let source = source.with_context(|| self.source.display().to_string())?;
+        Ok((source, target.with_context(|| self.target.display().to_string())?))
     }
 
     fn about(&self, lift: &LiftSettings) -> Map<String, Value> {

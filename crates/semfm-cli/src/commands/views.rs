@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use semfm::geom::io::MeshFile;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
@@ -74,7 +74,8 @@ impl Views {
                 .iter()
                 .for_each(|note| talk::remark(format_args!("note: {note}")));
         }
-        make_views(&file, !self.grey, &self.rig.settings(), &self.output, common)?;
+        make_views(&file, !self.grey, &self.rig.settings(), &self.output, common)
+            .with_context(|| self.mesh.display().to_string())?;
         talk::say(self.output.display());
         Ok(Outcome::Done)
     }
