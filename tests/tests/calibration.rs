@@ -1,5 +1,6 @@
 //! The simulated features are as informative as they are meant to be: the methods stand to each
 //! other, and to the truth, as they did on the procedural objects of the design study.
+#![allow(clippy::print_stderr)]
 
 use semfm::fmap::Method;
 use semfm_synth::Level;
@@ -27,7 +28,7 @@ fn medium_features_tell_the_methods_apart() {
 #[test]
 fn every_level_is_where_it_was_calibrated() {
     if std::env::var_os("SEMFM_FULL").is_none_or(|full| full != "1") {
-        eprintln!("skipped: set SEMFM_FULL=1 to measure all levels on all pairs");
+        eprintln!("SKIPPED: set SEMFM_FULL=1 to measure all levels on all pairs");
         return;
     }
     let [easy, medium, hard] = Level::ALL.map(|level| measure(level, 0..2, 4));
