@@ -76,7 +76,7 @@ pub fn with_paint<T>(
     appearance: Option<&Appearance>,
     work: impl FnOnce(&Paint<'_>) -> T,
 ) -> T {
-    match appearance.filter(|appearance| !appearance.is_plain()) {
+    match appearance {
         None => work(&Paint::default()),
         Some(appearance) => {
             let color = |face: usize, weights: [f64; 3]| {

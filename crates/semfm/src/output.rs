@@ -170,27 +170,28 @@ mod scene {
         report: &Value,
     ) -> Result<()> {
         let [source_meaning, target_meaning] = meaning_colors(&source.cloud, &target.cloud)?;
-        let mesh = |topic, frame_id, object: &'_ PreparedObject| {
-            let mesh = object.shape.original();
-            (topic, frame_id, mesh.vertices().to_vec(), mesh.faces().to_vec())
+        let bytes = |weights: &[f64]| -> Vec<[u8; 3]> {
+            let colors = weight_colors(weights).into_iter();
+            colors.map(|c| c.map(|x| (x * 255.0).round() as u8)).collect()
         };
-        let bytes = |colors: Vec<[f32; 3]>| -> Vec<[u8; 3]> {
-            colors.into_iter().map(|c| c.map(|x| (x * 255.0).round() as u8)).collect()
-        };
-        let sides = [
-            (mesh("/source/mesh", "source", source), bytes(weight_colors(region.weights()))),
-            (mesh("/target/mesh", "target", target), bytes(weight_colors(transfer.weights()))),
+        let (marked, carried) = (bytes(region.weights()), bytes(transfer.weights()));
+        let (source_mesh, target_mesh) = (source.shape.original(), target.shape.original());
+        let meshes = [
+            SceneMesh {
+                topic: "/source/mesh",
+                frame_id: "source",
+                vertices: source_mesh.vertices(),
+                faces: source_mesh.faces(),
+                colors: Some(&marked),
+            },
+            SceneMesh {
+                topic: "/target/mesh",
+                frame_id: "target",
+                vertices: target_mesh.vertices(),
+                faces: target_mesh.faces(),
+                colors: Some(&carried),
+            },
         ];
-        let meshes: Vec<SceneMesh<'_>> = sides
-            .iter()
-            .map(|((topic, frame_id, vertices, faces), colors)| SceneMesh {
-                topic,
-                frame_id,
-                vertices,
-                faces,
-                colors: Some(colors),
-            })
-            .collect();
         let clouds = [
             ScenePoints {
                 topic: "/source/cloud",

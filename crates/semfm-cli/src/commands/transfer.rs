@@ -8,7 +8,6 @@ use semfm::geom::ShapeCache;
 use semfm::geom::io::MeshFile;
 use semfm::output::{stages_ms, write_transfer};
 use semfm::region_file::read_region;
-use semfm::views::EmbeddedView;
 use semfm::views::lift::LiftSettings;
 use semfm::{
     Meaning, Method, PipelineSettings, PreparedObject, Region, Rule, Task, Transfer, Verdict,
@@ -142,11 +141,8 @@ impl Carry {
         let meaning = &self.meaning;
         if let (Some(a), Some(b)) = (&meaning.source_features, &meaning.target_features) {
             let (a, b) = (load::features(a, &source.mesh)?, load::features(b, &target.mesh)?);
-            let new = |file: MeshFile, values: &[f32]| {
-                PreparedObject::new(file.mesh, Meaning::PerVertex(values), settings, task)
-            };
-            let (source, target) = rayon::join(|| new(source, &a), || new(target, &b));
-            return self.named(source, target);
+            let (a, b) = (Meaning::PerVertex(&a), Meaning::PerVertex(&b));
+            return self.both((source, a), (target, b), settings, task);
         }
         let (a, b) =
             if let (Some(a), Some(b)) = (&meaning.source_embeddings, &meaning.target_embeddings) {
@@ -163,21 +159,25 @@ impl Carry {
             };
         announce("source", &a, common);
         announce("target", &b, common);
-        let new = |file: MeshFile, views: &[EmbeddedView]| {
-            PreparedObject::new(file.mesh, Meaning::Views(views), settings, task)
-        };
-        let (source, target) = rayon::join(|| new(source, &a.views), || new(target, &b.views));
-        self.named(source, target)
+        let (a, b) = (Meaning::Views(&a.views), Meaning::Views(&b.views));
+        self.both((source, a), (target, b), settings, task)
     }
 
-    /// Both or the first failure, which names its file.
-    fn named(
+    /// Both objects prepared side by side, or the first failure, which names its file.
+    fn both(
         &self,
-        source: semfm::Result<PreparedObject>,
-        target: semfm::Result<PreparedObject>,
+        source: (MeshFile, Meaning<'_>),
+        target: (MeshFile, Meaning<'_>),
+        settings: &PipelineSettings,
+        task: &Task,
     ) -> Result<(PreparedObject, PreparedObject)> {
-        let source = source.with_context(|| self.source.display().to_string())?;
-        Ok((source, target.with_context(|| self.target.display().to_string())?))
+        let new = |(file, meaning): (MeshFile, Meaning<'_>), path: &Path| {
+            PreparedObject::new(file.mesh, meaning, settings, task)
+                .with_context(|| path.display().to_string())
+        };
+        let (source, target) =
+            rayon::join(|| new(source, &self.source), || new(target, &self.target));
+        Ok((source?, target?))
     }
 
     fn about(&self, lift: &LiftSettings) -> Map<String, Value> {

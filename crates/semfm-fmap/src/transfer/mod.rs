@@ -98,7 +98,7 @@ struct Matched {
 /// How a method turns a region on the source into a vote on the target.
 enum Voter {
     /// A point map carries it.
-    Map { diffusion: f64 },
+    Map,
     /// The nearest source points of each target point are asked (M_target × neighbours).
     Nearest(Vec<Vec<u32>>),
     /// The transport plan carries it.
@@ -159,17 +159,16 @@ impl<'a> Matching<'a> {
             )
         })?;
         let pair = Pair { source, target, joint: &joint, settings: &settings, task };
-        let map_voter = Voter::Map { diffusion: settings.diffusion };
         let (matched, voter) = match settings.method {
-            Method::Fused => (fused::match_pair(&pair, &plan, &mut stages)?, map_voter),
-            Method::Semfm => (semfm::match_pair(&pair, &anchors, &mut stages)?, map_voter),
-            Method::Anchored => (anchored::match_pair(&pair, &anchors, &mut stages)?, map_voter),
-            Method::Wks => (baselines::match_by_wks(&pair, &mut stages)?, map_voter),
+            Method::Fused => (fused::match_pair(&pair, &plan, &mut stages)?, Voter::Map),
+            Method::Semfm => (semfm::match_pair(&pair, &anchors, &mut stages)?, Voter::Map),
+            Method::Anchored => (anchored::match_pair(&pair, &anchors, &mut stages)?, Voter::Map),
+            Method::Wks => (baselines::match_by_wks(&pair, &mut stages)?, Voter::Map),
             Method::Sinkhorn => (baselines::match_by_plan(&pair, &plan), Voter::Transport),
             Method::Nearest => baselines::match_by_neighbours(&pair, &mut stages),
         };
         let witness = match voter {
-            Voter::Map { .. } => None,
+            Voter::Map => None,
             _ => {
                 let fused_settings =
                     settings.as_fused(source.shape().basis().k().min(target.shape().basis().k()));
@@ -254,8 +253,9 @@ impl<'a> Matching<'a> {
     /// The method's vote on the target's working vertices, threshold at [`Region::COUNTS`].
     fn votes(&self, inside: &[bool]) -> Result<Vec<f64>> {
         let raw = match &self.voter {
-            Voter::Map { diffusion } => {
-                self.votes_by_map(&self.matched, self.settings.rule, *diffusion, inside)?
+            Voter::Map => {
+                let Self { matched, settings, .. } = self;
+                self.votes_by_map(matched, settings.rule, settings.diffusion, inside)?
             }
             Voter::Transport => self.votes_by_transport(inside),
             Voter::Nearest(neighbours) => {
