@@ -28,6 +28,7 @@
 
 pub use semfm_fmap as fmap;
 pub use semfm_geom as geom;
+pub use semfm_grasp as grasp;
 pub use semfm_views as views;
 
 mod error;

@@ -1,0 +1,90 @@
+//! SemFM at the shell: arguments in, facade calls, files out.
+//!
+//! stdout is data, stderr is talk. Exit codes: 0 success, 1 a sound run without an answer (verdict
+//! `refuse`), 2 bad input or failure.
+
+mod commands;
+mod load;
+mod options;
+mod talk;
+
+use std::ffi::OsString;
+
+use clap::{Parser, Subcommand};
+
+use commands::{Outcome, completions, demo, info, region, transfer, views};
+use options::Common;
+
+/// Carry a demonstrated region from one object to another.
+///
+/// A demonstration touches one object (the handle of a mug). SemFM finds where to act on a different
+/// object of the same kind (a kettle).
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, after_help = "Start with:  semfm-cli demo")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Views(views::Views),
+    Region(region::MakeRegion),
+    Transfer(Box<transfer::Carry>),
+    Info(info::Info),
+    Completions(completions::Completions),
+}
+
+/// Runs one command line, the program's name first, and returns the exit code: 0 success, 1 a sound
+/// run without an answer, 2 bad input or failure. The binary and the Python package call it.
+pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    let common = arguments.common;
+    let outcome = common.apply().and_then(|()| match arguments.command {
+        Command::Demo(command) => command.run(&common),
+        Command::Views(command) => command.run(&common),
+        Command::Region(command) => command.run(&common),
+        Command::Transfer(command) => command.run(&common),
+        Command::Info(command) => command.run(&common),
+        Command::Completions(command) => command.run(),
+    });
+    match outcome {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::NoAnswer) => 1,
+        Ok(Outcome::Refused) => 2,
+        Err(error) => {
+            talk::complain(&error);
+            2
+        }
+    }
+}
+
+/// The command line itself, for completions and for the test that checks it.
+fn command_line() -> clap::Command {
+    <Arguments as clap::CommandFactory>::command()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::command_line().debug_assert();
+    }
+
+    #[test]
+    fn every_command_shows_an_example() {
+        for command in super::command_line().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("semfm-cli"), "{} has no example", command.get_name());
+        }
+    }
+}

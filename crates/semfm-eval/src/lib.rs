@@ -1,0 +1,1 @@
+//! Evaluation of transfers: datasets, methods, statistics, tables and the report.

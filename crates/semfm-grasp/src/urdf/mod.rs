@@ -1,0 +1,1 @@
+//! Robot descriptions, read behind our own limits and checks.
