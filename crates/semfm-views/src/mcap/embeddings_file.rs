@@ -104,7 +104,7 @@ impl EmbeddingsFile {
     /// [`Error::Invalid`] where [`read`](Self::read) would refuse the file, [`Error::Io`].
     pub fn write(&self, path: &Path, dtype: Dtype) -> Result<()> {
         self.check()?;
-        write_file(path, Packing::Plain, |file| {
+        write_file(path, "", Packing::Plain, |file| {
             file.metadata(METADATA_NAME, self.metadata.entries(self.views.len()))?;
             for (view, embedded) in self.views.iter().enumerate() {
                 write_view(file, view, embedded, dtype)?;

@@ -69,7 +69,7 @@ pub fn write_scene(
         check_length(cloud.topic, "colours", cloud.points.len(), cloud.colors.len())?;
         check_finite(cloud.topic, cloud.points)?;
     }
-    write_file(path, Packing::Lz4, |file| {
+    write_file(path, "", Packing::Lz4, |file| {
         let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
         file.metadata(METADATA_NAME, entries.map(|(k, v)| (k.to_owned(), v)).into())?;
         for placed in side_by_side(meshes, clouds) {

@@ -65,7 +65,7 @@ pub fn write_views(
         colors,
     };
     shown.check()?;
-    write_file(path, Packing::Lz4, |file| {
+    write_file(path, "", Packing::Lz4, |file| {
         file.metadata(METADATA_NAME, metadata.entries(views.len()))?;
         file.log(shown.topic, 0, &scene_update(&shown))?;
         for (view, rendered) in views.iter().enumerate() {

@@ -33,12 +33,14 @@ pub(super) struct McapFile<'a> {
     buffer: Vec<u8>,
 }
 
-/// Writes a file through `fill` and puts it in place when it is complete.
+/// Writes a file of an MCAP profile (`""`: none) through `fill` and puts it in place when it is
+/// complete.
 ///
 /// # Errors
 /// [`Error::Io`], or what `fill` returns; `path` is then as it was before.
 pub(super) fn write_file(
     path: &Path,
+    profile: &str,
     packing: Packing,
     fill: impl FnOnce(&mut McapFile<'_>) -> Result<()>,
 ) -> Result<()> {
@@ -48,6 +50,7 @@ pub(super) fn write_file(
             Packing::Lz4 => Some(mcap::Compression::Lz4),
         };
         let writer = mcap::WriteOptions::new()
+            .profile(profile)
             .compression(compression)
             .chunk_size(Some(CHUNK_BYTES))
             .library(concat!("semfm ", env!("CARGO_PKG_VERSION")))
@@ -78,6 +81,26 @@ impl McapFile<'_> {
         self.writer
             .write_to_known_channel(&header, &self.buffer)
             .map_err(|error| failure(self.path, error))
+    }
+
+    /// Writes a message that is encoded already, as the only one of its topic; `schema` is name,
+    /// encoding and text.
+    pub fn log_bytes(
+        &mut self,
+        topic: &str,
+        (name, encoding, text): (&str, &str, &[u8]),
+        message_encoding: &str,
+        message: &[u8],
+    ) -> Result<()> {
+        let failure = |error| failure(self.path, error);
+        let schema_id = self.writer.add_schema(name, encoding, text).map_err(failure)?;
+        let channel_id = self
+            .writer
+            .add_channel(schema_id, topic, message_encoding, &BTreeMap::new())
+            .map_err(failure)?;
+        let header =
+            mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+        self.writer.write_to_known_channel(&header, message).map_err(failure)
     }
 
     /// Writes a metadata record.

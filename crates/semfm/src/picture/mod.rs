@@ -1,8 +1,7 @@
-//! `transfer.png`: the source with its region and the target with what arrived, side by side.
-//!
-//! One row for each object, source above. The first two pictures show the region in red from where
-//! it is seen best and from another side; the third paints the source by position and carries the
-//! colours over with the point map, so that equal colours are matched places.
+//! Pictures of results: what was carried where, and how a hand takes it.
+
+mod grasps;
+mod transfer;
 
 use std::path::Path;
 
@@ -11,7 +10,10 @@ use semfm_geom::math::{DVec3, bounds};
 use semfm_geom::{Mesh, Task};
 use semfm_views::{Camera, Paint, RenderSettings, RigSettings, View, render, rig};
 
-use crate::{PreparedObject, Region, Result, Transfer};
+pub use grasps::write_grasp_picture;
+pub use transfer::write_picture;
+
+use crate::{Region, Result};
 
 /// Side of each picture in pixels.
 const SIDE: u32 = 420;
@@ -38,44 +40,6 @@ pub fn position_colors(points: &[DVec3]) -> Vec<[f32; 3]> {
     let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
     let color = |&p: &DVec3| ((p - low) / extent * 0.8 + 0.15).as_vec3().to_array();
     points.iter().map(color).collect()
-}
-
-/// Writes the picture of a transfer.
-///
-/// # Errors
-/// Whatever rendering or writing reports.
-pub fn write_picture(
-    path: &Path,
-    source: &PreparedObject,
-    target: &PreparedObject,
-    region: &Region,
-    transfer: &Transfer,
-    task: &Task,
-) -> Result<()> {
-    let (source, target) = (source.shape.original(), target.shape.original());
-    let source_places = position_colors(source.vertices());
-    let matched: Vec<[f32; 3]> =
-        transfer.point_map.source_of.iter().map(|&v| source_places[v as usize]).collect();
-    let mut pictures = row(source, region.weights(), &source_places, task)?;
-    pictures.extend(row(target, transfer.weights(), &matched, task)?);
-    let sheet = sheet(&pictures, 3);
-    let (width, height) = (3 * SIDE, 2 * SIDE);
-    semfm_geom::io::write_atomically(path, |out| {
-        PngEncoder::new(out)
-            .write_image(&sheet, width, height, ExtendedColorType::Rgb8)
-            .map_err(std::io::Error::other)
-    })?;
-    Ok(())
-}
-
-/// The three pictures of one object.
-fn row(mesh: &Mesh, weights: &[f64], places: &[[f32; 3]], task: &Task) -> Result<Vec<View>> {
-    let [best, other] = viewpoints(mesh, weights, task)?;
-    let marked = weight_colors(weights);
-    let light = RenderSettings::default();
-    let mut pictures = render(mesh, &Paint::Vertices(&marked), &[best, other], &light, task)?;
-    pictures.extend(render(mesh, &Paint::Vertices(places), &[best], &light, task)?);
-    Ok(pictures)
 }
 
 /// From where the region shows the most pixels, and the best view from another side.
@@ -105,10 +69,10 @@ fn viewpoints(mesh: &Mesh, weights: &[f64], task: &Task) -> Result<[Camera; 2]> 
     Ok([full[best], full[other]])
 }
 
-/// Pictures of equal size in rows of `columns`.
-fn sheet(pictures: &[View], columns: usize) -> Vec<u8> {
+/// Writes pictures of [`SIDE`] pixels as one PNG, in rows of `columns`, whole or not at all.
+fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()> {
     let line = 3 * SIDE as usize;
-    pictures
+    let sheet: Vec<u8> = pictures
         .chunks(columns)
         .flat_map(|row| {
             (0..SIDE as usize).flat_map(move |y| {
@@ -116,5 +80,12 @@ fn sheet(pictures: &[View], columns: usize) -> Vec<u8> {
             })
         })
         .copied()
-        .collect()
+        .collect();
+    let (width, height) = (columns as u32 * SIDE, (pictures.len() / columns) as u32 * SIDE);
+    semfm_geom::io::write_atomically(path, |out| {
+        PngEncoder::new(out)
+            .write_image(&sheet, width, height, ExtendedColorType::Rgb8)
+            .map_err(std::io::Error::other)
+    })?;
+    Ok(())
 }

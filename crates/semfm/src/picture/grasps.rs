@@ -1,0 +1,142 @@
+//! The picture of grasps: hands at the object, drawn as the collision shapes that were checked.
+//!
+//! Above, all the grasps from two sides, the better the bluer; below, the first one alone.
+
+use std::path::Path;
+
+use parry3d_f64::math::Pose;
+#[cfg(test)]
+use parry3d_f64::shape::SharedShape;
+use parry3d_f64::shape::{Shape, TypedShape};
+use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, Task};
+use semfm_grasp::{Grasp, Gripper};
+use semfm_views::{Paint, RenderSettings, View, render};
+
+use super::{viewpoints, weight_colors, write_sheet};
+use crate::Result;
+
+/// Colour of the worst and of the best hand shown, as sRGB in 0..1.
+const WORST: [f32; 3] = [0.95, 0.75, 0.30];
+const BEST: [f32; 3] = [0.13, 0.42, 0.80];
+/// More hands than this hide each other and the object.
+const SHOWN: usize = 6;
+
+/// Writes the picture of the first few of `grasps`, best first, on `mesh` in metres; `weights` is
+/// the region, one weight per vertex.
+///
+/// # Errors
+/// Whatever rendering or writing reports.
+pub fn write_grasp_picture(
+    path: &Path,
+    mesh: &Mesh,
+    weights: &[f64],
+    gripper: &Gripper,
+    grasps: &[Grasp],
+    task: &Task,
+) -> Result<()> {
+    let shown = &grasps[..grasps.len().min(SHOWN)];
+    let mut pictures = sides(mesh, weights, gripper, shown, task)?;
+    pictures.extend(sides(mesh, weights, gripper, &shown[..shown.len().min(1)], task)?);
+    write_sheet(path, &pictures, 2)
+}
+
+/// The object with hands, from where the region is seen best and from another side.
+fn sides(
+    mesh: &Mesh,
+    weights: &[f64],
+    gripper: &Gripper,
+    grasps: &[Grasp],
+    task: &Task,
+) -> Result<Vec<View>> {
+    let (mut vertices, mut faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());
+    let mut colors = weight_colors(weights);
+    for (rank, grasp) in grasps.iter().enumerate() {
+        let (points, triangles) = hand(gripper, grasp);
+        let (first, share) = (vertices.len() as u32, rank as f32 / SHOWN as f32);
+        vertices.extend(points);
+        faces.extend(triangles.iter().map(|t| t.map(|v| v + first)));
+        let color = std::array::from_fn(|c| BEST[c] + share * (WORST[c] - BEST[c]));
+        colors.resize(vertices.len(), color);
+    }
+    let scene = Mesh::new(vertices, faces)?;
+    let marked: Vec<f64> =
+        (0..scene.n_vertices()).map(|v| weights.get(v).copied().unwrap_or(0.0)).collect();
+    let cameras = viewpoints(&scene, &marked, task)?;
+    let light = RenderSettings::default();
+    Ok(render(&scene, &Paint::Vertices(&colors), &cameras, &light, task)?)
+}
+
+/// The hand's parts at a grasp, in the object's frame: vertices and triangles.
+fn hand(gripper: &Gripper, grasp: &Grasp) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for (tcp_from_part, part) in gripper.parts_at(grasp.width) {
+        let pose = grasp.object_from_tcp * tcp_from_part;
+        add_shape(&*part.shape, pose, &mut vertices, &mut faces);
+    }
+    (vertices, faces)
+}
+
+/// Adds a shape's surface. Boxes, convex hulls, triangle meshes and compounds of these are all that
+/// a gripper is made of.
+fn add_shape(shape: &dyn Shape, pose: Pose, vertices: &mut Vec<DVec3>, faces: &mut Vec<[u32; 3]>) {
+    let (points, triangles) = match shape.as_typed_shape() {
+        TypedShape::Cuboid(cuboid) => cuboid.to_trimesh(),
+        TypedShape::ConvexPolyhedron(hull) => hull.to_trimesh(),
+        TypedShape::TriMesh(mesh) => (mesh.vertices().to_vec(), mesh.indices().to_vec()),
+        TypedShape::Compound(compound) => {
+            for (part_pose, part) in compound.shapes() {
+                add_shape(&**part, pose * *part_pose, vertices, faces);
+            }
+            return;
+        }
+        _ => return,
+    };
+    let first = vertices.len() as u32;
+    vertices.extend(points.into_iter().map(|p| pose * p));
+    faces.extend(triangles.into_iter().map(|t| t.map(|v| v + first)));
+}
+
+#[cfg(test)]
+mod tests {
+    use semfm_grasp::gripper::{Part, Role};
+    use semfm_views::View;
+
+    use super::*;
+
+    /// Two fingers and a palm around a block, seen as pixels that are neither grey nor red.
+    #[test]
+    fn the_hand_is_in_the_picture() {
+        let boxed = |size: [f64; 3]| SharedShape::cuboid(size[0], size[1], size[2]);
+        let gripper = Gripper {
+            name: "palm".into(),
+            opening: 0.0..=0.08,
+            pad: [0.02, 0.02],
+            flange_from_tcp: Pose::IDENTITY,
+            parts: vec![Part {
+                link: "palm".into(),
+                role: Role::Palm,
+                shape: boxed([0.01, 0.05, 0.01]),
+            }],
+        };
+        let (points, faces) = parry3d_f64::shape::Cuboid::new(DVec3::splat(0.02)).to_trimesh();
+        let block = Mesh::new(points, faces).unwrap();
+        let grasp = Grasp {
+            object_from_tcp: Pose::from_translation(DVec3::new(0.0, 0.0, 0.05)),
+            width: 0.04,
+            contacts: [DVec3::ZERO; 2],
+            score: 1.0,
+            terms: Vec::new(),
+        };
+        let blue = |views: &[View]| {
+            let pixels = views.iter().flat_map(|view| view.rgb.chunks_exact(3));
+            pixels.filter(|rgb| rgb[2] > rgb[0].saturating_add(40)).count()
+        };
+        let weights = vec![1.0; block.n_vertices()];
+        let shown = |grasps: &[Grasp]| {
+            sides(&block, &weights, &gripper, grasps, &Task::default()).unwrap()
+        };
+        assert_eq!(blue(&shown(&[])), 0);
+        assert!(blue(&shown(&[grasp])) > 2000);
+    }
+}
