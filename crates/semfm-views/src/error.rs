@@ -22,6 +22,28 @@ pub enum Error {
         /// What was given.
         found: String,
     },
+    /// There is no graphics driver that could render.
+    #[error("no graphics adapter: expected a Vulkan, Metal, DirectX 12 or GL driver, found none ({reason})")]
+    NoGpu {
+        /// What the search reported.
+        reason: String,
+    },
+    /// The graphics driver failed.
+    #[error("the graphics driver failed: {reason}")]
+    Gpu {
+        /// What it reported.
+        reason: String,
+    },
+    /// Something is too large for the graphics driver.
+    #[error("{what}: expected {expected} for this graphics driver, found {found}")]
+    BeyondGpu {
+        /// What is too large.
+        what: &'static str,
+        /// What the driver can take.
+        expected: String,
+        /// What was asked.
+        found: String,
+    },
     /// A file is not what its format demands.
     #[error("{}: {place}: expected {expected}, found {found}", path.display())]
     Format {
@@ -83,6 +105,9 @@ impl Error {
         match self {
             Self::Geom(cause) => cause.code(),
             Self::Invalid { .. } => "invalid",
+            Self::NoGpu { .. } => "no-gpu",
+            Self::Gpu { .. } => "gpu",
+            Self::BeyondGpu { .. } => "beyond-gpu",
             Self::Format { .. } => "format",
             Self::Container { fault, .. } => fault.code(),
             Self::OtherMesh { .. } => "other-mesh",

@@ -9,17 +9,23 @@ pub mod camera;
 pub mod embeddings;
 mod error;
 pub mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod lift;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 pub mod render;
+pub mod renderer;
 pub mod rig;
 pub mod view;
 
 pub use camera::Camera;
 pub use embeddings::{EmbeddedView, PatchEmbeddings};
 pub use error::{Error, Fault, Result};
+#[cfg(feature = "gpu")]
+pub use gpu::GpuRenderer;
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
 pub use render::{Paint, RenderSettings, render};
+pub use renderer::{Renderer, RendererChoice};
 pub use rig::{RigSettings, rig};
 pub use view::View;

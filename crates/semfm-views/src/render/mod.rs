@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use semfm_geom::{Mesh, Task};
 
+#[cfg(feature = "gpu")]
+pub(crate) use shade::light_direction;
 pub use shade::{CornerNormals, Paint};
 
 use crate::{Camera, Error, Result, View};
@@ -101,22 +103,7 @@ pub fn render(
     settings: &RenderSettings,
     task: &Task,
 ) -> Result<Vec<View>> {
-    settings.check()?;
-    paint.check(mesh)?;
-    for (k, camera) in cameras.iter().enumerate() {
-        camera.check(&format!("view {k}"))?;
-    }
-    let n_pixels: u64 = cameras.iter().map(|c| u64::from(c.width) * u64::from(c.height)).sum();
-    if n_pixels > MAX_PIXELS {
-        return Err(Error::invalid(
-            "pixels of all views",
-            format!("at most {MAX_PIXELS}"),
-            n_pixels.to_string(),
-        ));
-    }
-    if mesh.area() <= 0.0 {
-        return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
-    }
+    Request::check(mesh, paint, cameras, settings)?;
     let normals = CornerNormals::new(mesh, settings.crease);
     let done = AtomicUsize::new(0);
     task.step("render", 0, cameras.len())?;
@@ -129,6 +116,61 @@ pub fn render(
             Ok(view)
         })
         .collect()
+}
+
+/// What is to be drawn, checked.
+#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only the check is used"))]
+pub(crate) struct Request<'a> {
+    pub mesh: &'a Mesh,
+    pub paint: &'a Paint<'a>,
+    pub settings: &'a RenderSettings,
+}
+
+impl<'a> Request<'a> {
+    /// # Errors
+    /// As [`render`].
+    pub fn check(
+        mesh: &'a Mesh,
+        paint: &'a Paint<'a>,
+        cameras: &[Camera],
+        settings: &'a RenderSettings,
+    ) -> Result<Self> {
+        settings.check()?;
+        paint.check(mesh)?;
+        for (k, camera) in cameras.iter().enumerate() {
+            camera.check(&format!("view {k}"))?;
+        }
+        let n_pixels: u64 = cameras.iter().map(|c| u64::from(c.width) * u64::from(c.height)).sum();
+        if n_pixels > MAX_PIXELS {
+            return Err(Error::invalid(
+                "pixels of all views",
+                format!("at most {MAX_PIXELS}"),
+                n_pixels.to_string(),
+            ));
+        }
+        if mesh.area() <= 0.0 {
+            return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
+        }
+        Ok(Self { mesh, paint, settings })
+    }
+}
+
+/// Colours a picture of which somebody else found, for every sample, the triangle and its depth.
+#[cfg(feature = "gpu")]
+pub(crate) fn shade_hits(
+    request: &Request<'_>,
+    normals: &CornerNormals,
+    camera: &Camera,
+    triangles: &[i32],
+    depth: &[f32],
+) -> Vec<u8> {
+    let per_pixel = request.settings.supersampling;
+    let projection = Projection::new(request.mesh, camera);
+    let raster = Raster::of(per_pixel, (camera.width * per_pixel) as usize, triangles, depth);
+    let mut rgb = vec![0; camera.width as usize * camera.height as usize * 3];
+    shade::Shader::new(&projection, normals, request.paint, request.settings)
+        .mix(&raster, &mut rgb);
+    rgb
 }
 
 fn render_one(

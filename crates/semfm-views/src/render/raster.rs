@@ -68,6 +68,18 @@ impl Raster {
         raster
     }
 
+    /// A raster of a whole picture of which somebody else found the triangles (−1: none) and depths.
+    #[cfg(feature = "gpu")]
+    pub fn of(per_pixel: u32, width: usize, triangles: &[i32], depth: &[f32]) -> Self {
+        let hit = |(&triangle, &depth): (&i32, &f32)| match u32::try_from(triangle) {
+            Ok(face) => Hit::new(1.0 / depth, face),
+            Err(_) => Hit::NONE,
+        };
+        let hits: Vec<Hit> = triangles.iter().zip(depth).map(hit).collect();
+        let rows = 0..hits.len() / width;
+        Self { per_pixel, spacing: 1.0 / f64::from(per_pixel), width, rows, hits }
+    }
+
     /// Pixel position of the centre of a grid row or column.
     pub fn position(&self, sample: usize) -> f64 {
         (sample as f64 + 0.5) * self.spacing

@@ -9,7 +9,7 @@ use semfm_geom::math::DVec3;
 use super::RenderSettings;
 use super::raster::{Hit, Raster};
 use super::triangle::Projection;
-use crate::{Error, Result};
+use crate::{Camera, Error, Result};
 
 /// Colour of the surface before lighting, as sRGB values 0 to 1.
 ///
@@ -86,6 +86,19 @@ impl CornerNormals {
         });
         Self(corner_normals.collect())
     }
+
+    /// The normals of each triangle's corners (m × 3), unit length or zero.
+    pub fn corners(&self) -> &[[[f32; 3]; 3]] {
+        &self.0
+    }
+}
+
+/// Unit vector towards the light, in the object's frame.
+pub(crate) fn light_direction(camera: &Camera, settings: &RenderSettings) -> DVec3 {
+    let [right, up, back] = settings.light;
+    // The camera's own axes are x right, y down, z forward.
+    let light = DVec3::new(right, -up, -back).normalize_or_zero();
+    camera.camera_from_object.matrix3.transpose() * light
 }
 
 /// All that colouring a view needs.
@@ -105,10 +118,7 @@ impl<'a> Shader<'a> {
         paint: &'a Paint<'a>,
         settings: &'a RenderSettings,
     ) -> Self {
-        let [right, up, back] = settings.light;
-        // The camera's own axes are x right, y down, z forward.
-        let light = DVec3::new(right, -up, -back).normalize_or_zero();
-        let light = projection.camera.camera_from_object.matrix3.transpose() * light;
+        let light = light_direction(projection.camera, settings);
         Self { projection, normals, paint, settings, light }
     }
 
@@ -116,14 +126,20 @@ impl<'a> Shader<'a> {
     pub fn colour(&self, rows: Range<usize>, rgb: &mut [u8]) {
         let per_pixel = self.settings.supersampling as usize;
         let grid_rows = rows.start * per_pixel..rows.end * per_pixel;
-        let raster = Raster::new(self.projection, self.settings.supersampling, grid_rows.clone());
+        let raster = Raster::new(self.projection, self.settings.supersampling, grid_rows);
+        self.mix(&raster, rgb);
+    }
+
+    /// Paints the pixels under a raster into `rgb` (rows × width × 3): the mean of their samples.
+    pub fn mix(&self, raster: &Raster, rgb: &mut [u8]) {
+        let (per_pixel, grid_rows) = (raster.per_pixel as usize, raster.rows.clone());
         let mut grid = raster.hits.chunks_exact(raster.width).zip(grid_rows);
         let mut sums = vec![[0f32; 3]; raster.width / per_pixel];
         let share = 255.0 / (per_pixel * per_pixel) as f32;
         for pixels in rgb.chunks_exact_mut(sums.len() * 3) {
             sums.fill([0.0; 3]);
             for (hits, row) in grid.by_ref().take(per_pixel) {
-                self.add_row(&raster, hits, raster.position(row), &mut sums);
+                self.add_row(raster, hits, raster.position(row), &mut sums);
             }
             for (byte, sum) in pixels.iter_mut().zip(sums.as_flattened()) {
                 *byte = (sum * share + 0.5) as u8; // saturates

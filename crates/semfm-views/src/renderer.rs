@@ -1,0 +1,169 @@
+//! Who draws: the graphics driver where there is one, else the CPU.
+
+use std::fmt;
+use std::str::FromStr;
+
+use semfm_geom::{Mesh, Task};
+
+#[cfg(feature = "gpu")]
+use crate::GpuRenderer;
+use crate::{Camera, Error, Paint, RenderSettings, Result, View, render};
+
+/// Which renderer is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RendererChoice {
+    /// A graphics processor where one answers, else the CPU.
+    #[default]
+    Auto,
+    /// A graphics driver, be it one that draws on the CPU; or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+impl RendererChoice {
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Auto, "auto"), (Self::Gpu, "gpu"), (Self::Cpu, "cpu")];
+}
+
+impl fmt::Display for RendererChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::ALL.iter().find(|(choice, _)| choice == self).map_or("", |entry| entry.1);
+        f.write_str(name)
+    }
+}
+
+impl FromStr for RendererChoice {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|(_, name)| *name == text);
+        found.map(|entry| entry.0).ok_or_else(|| {
+            Error::invalid("renderer", "auto, gpu or cpu", format!("`{text}`"))
+        })
+    }
+}
+
+/// An open renderer. Opening a driver costs 50 to 500 ms, so it is done when there is something to
+/// draw, and once.
+#[derive(Debug)]
+pub struct Renderer {
+    #[cfg(feature = "gpu")]
+    gpu: Option<GpuRenderer>,
+    /// Whether the CPU takes over what the driver refuses.
+    #[cfg(feature = "gpu")]
+    yielding: bool,
+    note: Option<String>,
+}
+
+impl Renderer {
+    /// The renderer on the CPU, which needs nothing.
+    pub fn cpu() -> Self {
+        Self {
+            #[cfg(feature = "gpu")]
+            gpu: None,
+            #[cfg(feature = "gpu")]
+            yielding: true,
+            note: None,
+        }
+    }
+
+    /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: ours is
+    /// faster.
+    ///
+    /// # Errors
+    /// For [`RendererChoice::Gpu`]: [`Error::NoGpu`] without a driver (or in a build without the
+    /// feature `gpu`), [`Error::Gpu`] where it does not open.
+    #[cfg(feature = "gpu")]
+    pub fn open(choice: RendererChoice) -> Result<Self> {
+        let fall_back = |note: String| Ok(Self { note: Some(note), ..Self::cpu() });
+        match (choice, if choice == RendererChoice::Cpu { None } else { Some(GpuRenderer::new()) })
+        {
+            (_, None) => Ok(Self::cpu()),
+            (RendererChoice::Auto, Some(Err(error))) => {
+                fall_back(format!("views are drawn on the CPU: {error}"))
+            }
+            (RendererChoice::Auto, Some(Ok(gpu))) if gpu.is_software() => fall_back(format!(
+                "views are drawn on the CPU: {} would do it there, too, and slower",
+                gpu.name()
+            )),
+            (_, Some(gpu)) => {
+                let yielding = choice == RendererChoice::Auto;
+                Ok(Self { gpu: Some(gpu?), yielding, note: None })
+            }
+        }
+    }
+
+    /// Opens what is wanted; in this build without the feature `gpu` that is the CPU.
+    ///
+    /// # Errors
+    /// [`Error::NoGpu`] for [`RendererChoice::Gpu`].
+    #[cfg(not(feature = "gpu"))]
+    pub fn open(choice: RendererChoice) -> Result<Self> {
+        match choice {
+            RendererChoice::Gpu => {
+                Err(Error::NoGpu { reason: "built without the feature `gpu`".into() })
+            }
+            RendererChoice::Auto | RendererChoice::Cpu => Ok(Self::cpu()),
+        }
+    }
+
+    /// Why the CPU draws although a driver was asked for; nothing where all is as wanted.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// Who draws, for reports.
+    pub fn name(&self) -> String {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &self.gpu {
+            return gpu.name();
+        }
+        "CPU".to_owned()
+    }
+
+    /// One picture per camera: [`render`](crate::render()) by whoever draws. A driver's pictures
+    /// differ from the CPU's in single pixels at edges.
+    ///
+    /// # Errors
+    /// As [`render`](crate::render()) and, of a driver that was asked for by name, [`Error::Gpu`]
+    /// and [`Error::BeyondGpu`].
+    pub fn render(
+        &self,
+        mesh: &Mesh,
+        paint: &Paint<'_>,
+        cameras: &[Camera],
+        settings: &RenderSettings,
+        task: &Task,
+    ) -> Result<Vec<View>> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &self.gpu {
+            match gpu.render(mesh, paint, cameras, settings, task) {
+                Err(Error::Gpu { .. } | Error::BeyondGpu { .. }) if self.yielding => {}
+                answer => return answer,
+            }
+        }
+        render(mesh, paint, cameras, settings, task)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choices_are_read_back_and_strangers_refused() {
+        for (choice, name) in RendererChoice::ALL {
+            assert_eq!(name.parse::<RendererChoice>().unwrap(), choice);
+            assert_eq!(choice.to_string(), name);
+        }
+        assert!("vulkan".parse::<RendererChoice>().is_err());
+    }
+
+    #[test]
+    fn the_cpu_is_always_there() {
+        let renderer = Renderer::open(RendererChoice::Cpu).unwrap();
+        assert_eq!((renderer.name().as_str(), renderer.note()), ("CPU", None));
+        assert!(Renderer::open(RendererChoice::Auto).is_ok());
+    }
+}

@@ -1,0 +1,175 @@
+//! The graphics driver against the CPU: the same triangles, depths and colours.
+//!
+//! Without a driver these tests say that they were skipped; with `SEMFM_DEMAND_GPU=1`, as in CI,
+//! they fail.
+#![cfg(feature = "gpu")]
+
+mod shapes;
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, Task};
+use semfm_views::{
+    Camera, Error, GpuRenderer, Paint, RenderSettings, RigSettings, View, render, rig,
+};
+use shapes::{lumpy_torus, zoo};
+
+/// Drivers snap corners to a 256th of a pixel: that share of the pixels may see a neighbour.
+const OTHER_TRIANGLE: f64 = 1e-3;
+
+fn gpu() -> Option<&'static GpuRenderer> {
+    static GPU: OnceLock<Option<GpuRenderer>> = OnceLock::new();
+    let gpu = GPU.get_or_init(|| match GpuRenderer::new() {
+        Ok(gpu) => Some(gpu),
+        Err(error) if std::env::var_os("SEMFM_DEMAND_GPU").is_none() => {
+            eprintln!("SKIPPED: {error}");
+            None
+        }
+        Err(error) => panic!("SEMFM_DEMAND_GPU is set, but: {error}"),
+    });
+    if gpu.is_none() {
+        eprintln!("SKIPPED: no graphics adapter");
+    }
+    gpu.as_ref()
+}
+
+fn both(gpu: &GpuRenderer, mesh: &Mesh, paint: &Paint<'_>, cameras: &[Camera]) -> [Vec<View>; 2] {
+    let (settings, task) = (RenderSettings::default(), Task::default());
+    let by_gpu = gpu.render(mesh, paint, cameras, &settings, &task).unwrap();
+    [by_gpu, render(mesh, paint, cameras, &settings, &task).unwrap()]
+}
+
+/// Pixels of other triangles, pixels in all; depth and colour are held against each other here.
+fn compare(name: &str, [by_gpu, by_cpu]: &[Vec<View>; 2]) -> (usize, usize) {
+    assert_eq!(by_gpu.len(), by_cpu.len());
+    let (mut different, mut n, mut off_colour) = (0, 0, 0);
+    for (a, b) in by_gpu.iter().zip(by_cpu) {
+        assert_eq!((a.camera, a.rgb.len()), (b.camera, b.rgb.len()), "{name}");
+        n += a.triangles.len();
+        let pixels = a.triangles.iter().zip(&b.triangles).zip(a.depth.iter().zip(&b.depth));
+        for ((one, other), (depth, exact)) in pixels {
+            if one != other {
+                different += 1;
+            } else if *one >= 0 {
+                let error = (depth / exact - 1.0).abs();
+                // Grazing triangles: the pixel's place on them is known to the snapping only.
+                assert!(error < 2e-2, "{name}: depth {depth}, exactly {exact}");
+            } else {
+                assert_eq!(*depth, f32::INFINITY, "{name}");
+            }
+        }
+        off_colour += a
+            .rgb
+            .chunks_exact(3)
+            .zip(b.rgb.chunks_exact(3))
+            .filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 4))
+            .count();
+    }
+    let share = off_colour as f64 / n as f64;
+    assert!(share < 0.01, "{name}: {off_colour} of {n} pixels are of another colour");
+    (different, n)
+}
+
+fn cameras(mesh: &Mesh, count: usize, size: u32) -> Vec<Camera> {
+    rig(mesh, &RigSettings { count, size, ..Default::default() }).unwrap()
+}
+
+#[test]
+fn the_zoo_looks_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let (mut different, mut n) = (0, 0);
+    for (name, mesh) in zoo() {
+        // 100 is not a multiple of 64: rows come back padded.
+        let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 5, 100));
+        let counts = compare(name, &views);
+        (different, n) = (different + counts.0, n + counts.1);
+    }
+    let share = different as f64 / n as f64;
+    assert!(share <= OTHER_TRIANGLE, "{different} of {n} pixels see another triangle");
+}
+
+#[test]
+fn every_paint_looks_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = lumpy_torus(24);
+    let shots = cameras(&mesh, 3, 129);
+    let places: Vec<[f32; 3]> =
+        mesh.vertices().iter().map(|p| (p.normalize() * 0.5 + 0.5).as_vec3().to_array()).collect();
+    let stripes = |face: usize, w: [f64; 3]| [w[0] as f32, (face % 2) as f32, w[2] as f32];
+    for (name, paint) in
+        [("vertices", Paint::Vertices(&places)), ("function", Paint::Surface(&stripes))]
+    {
+        let (different, n) = compare(name, &both(gpu, &mesh, &paint, &shots));
+        assert!(different as f64 <= OTHER_TRIANGLE * n as f64, "{name}: {different} of {n}");
+    }
+}
+
+#[test]
+fn views_of_several_sizes_come_back_in_order() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = lumpy_torus(12);
+    let mut mixed = cameras(&mesh, 2, 64);
+    mixed.extend(cameras(&mesh, 3, 50));
+    mixed.extend(cameras(&mesh, 1, 64));
+    let views = both(gpu, &mesh, &Paint::GREY, &mixed);
+    let (different, n) = compare("mixed", &views);
+    assert!(different as f64 <= 2.0 * OTHER_TRIANGLE * n as f64);
+}
+
+#[test]
+fn what_is_behind_the_camera_is_not_drawn() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = lumpy_torus(16);
+    let mut inside = cameras(&mesh, 1, 96).remove(0);
+    // Into the middle of the hole, with triangles on all sides.
+    inside.camera_from_object.translation = DVec3::ZERO;
+    let (different, n) = compare("inside", &both(gpu, &mesh, &Paint::GREY, &[inside]));
+    assert!(different as f64 <= 5.0 * OTHER_TRIANGLE * n as f64, "{different} of {n}");
+}
+
+#[test]
+fn what_a_driver_cannot_take_is_an_error() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = lumpy_torus(8);
+    let huge = cameras(&mesh, 1, 8192);
+    let settings = RenderSettings { supersampling: 8, ..Default::default() };
+    let answer = gpu.render(&mesh, &Paint::GREY, &huge, &settings, &Task::default());
+    assert!(matches!(answer, Err(Error::BeyondGpu { .. })), "{answer:?}");
+    let cancelled = Task::default();
+    cancelled.cancel();
+    let shots = cameras(&mesh, 1, 32);
+    assert!(
+        gpu.render(&mesh, &Paint::GREY, &shots, &RenderSettings::default(), &cancelled).is_err()
+    );
+    // And the renderer still draws.
+    assert_eq!(both(gpu, &mesh, &Paint::GREY, &shots)[0].len(), 1);
+}
+
+#[test]
+fn real_objects_look_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let shared = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from);
+    let objects = shared.join("data/objects/4_water_containers");
+    let Ok(entries) = std::fs::read_dir(&objects) else {
+        eprintln!("SKIPPED: no shared data at {} (set SEMFM_SHARED)", objects.display());
+        return;
+    };
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.extension().is_some_and(|kind| kind != "json"))
+        .collect();
+    files.sort();
+    let (mut different, mut n) = (0, 0);
+    for path in files.iter().take(8) {
+        let mesh = semfm_geom::io::read_mesh(path).unwrap().mesh;
+        let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 4, 224));
+        let counts = compare(&path.display().to_string(), &views);
+        println!("{}: {} of {} pixels", path.display(), counts.0, counts.1);
+        (different, n) = (different + counts.0, n + counts.1);
+    }
+    let share = different as f64 / n as f64;
+    assert!(share <= OTHER_TRIANGLE, "{different} of {n} pixels see another triangle");
+}

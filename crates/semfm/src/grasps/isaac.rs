@@ -1,0 +1,67 @@
+//! Grasps as an `isaac_grasp` file (format 1.0), the YAML that NVIDIA's Isaac Sim and Isaac ROS
+//! read: <https://nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html>.
+//!
+//! Poses are those of the gripper's flange in the object's frame, quaternions with w first. Joints
+//! of the hand are named as in its URDF.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use semfm_geom::io::write_atomically;
+
+use super::{GraspAnswer, position_and_rotation};
+use crate::Result;
+
+/// Writes the grasps, whole or not at all.
+///
+/// # Errors
+/// [`semfm_geom::Error::Io`] where the file cannot be written.
+pub fn write_isaac(path: &Path, answer: &GraspAnswer<'_>) -> Result<()> {
+    let text = isaac_yaml(answer);
+    Ok(write_atomically(path, |out| out.write_all(text.as_bytes()))?)
+}
+
+fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
+    let mut text = String::new();
+    // Writing into a String does not fail.
+    let _ = writeln!(
+        text,
+        "format: isaac_grasp\nformat_version: 1.0\n\nobject_frame: object\ngripper_frame: {}\n",
+        quoted(&answer.gripper.name)
+    );
+    let none = if answer.found.grasps.is_empty() { " {}" } else { "" };
+    let _ = writeln!(text, "grasps:{none}");
+    let tcp_from_flange = answer.gripper.flange_from_tcp.inverse();
+    for (i, grasp) in answer.found.grasps.iter().enumerate() {
+        let (p, q) = position_and_rotation(grasp.object_from_tcp * tcp_from_flange);
+        let _ = writeln!(text, "  \"grasp_{i}\":\n    confidence: {}", number(grasp.score));
+        let _ = writeln!(text, "    position: {}", list(p.to_array()));
+        let xyz = list([q.x, q.y, q.z]);
+        let _ = writeln!(text, "    orientation: {{w: {}, xyz: {xyz}}}", number(q.w));
+        for (name, width) in
+            [("cspace_position", grasp.width), ("pregrasp_cspace_position", grasp.open_width)]
+        {
+            let joints = answer.gripper.joints_at(width);
+            let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });
+            for (joint, value) in joints {
+                let _ = writeln!(text, "      {}: {}", quoted(&joint), number(value));
+            }
+        }
+    }
+    text
+}
+
+/// A number to the nanometre, with a point and without an exponent: YAML readers disagree on which
+/// exponents make a number.
+fn number(value: f64) -> String {
+    format!("{value:.9}")
+}
+
+fn list(values: [f64; 3]) -> String {
+    format!("[{}]", values.map(number).join(", "))
+}
+
+/// A YAML string in double quotes, which are JSON's.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}

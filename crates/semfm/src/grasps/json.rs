@@ -1,0 +1,102 @@
+//! `grasps.json`: format `semfm.grasps/1`.
+
+use std::path::Path;
+
+use semfm_grasp::gripper::{Gripper, Part, Role};
+use semfm_grasp::{Grasp, Pose};
+use serde_json::{Map, Value, json};
+
+use super::{GraspAnswer, position_and_rotation};
+use crate::Result;
+use crate::region_file::write_json;
+
+/// The format that is written.
+pub const FORMAT: &str = "semfm.grasps/1";
+
+/// Writes `grasps.json`, whole or not at all. `about` is put into the file as it is.
+///
+/// # Errors
+/// [`semfm_geom::Error::Io`] where the file cannot be written.
+pub fn write_grasps(path: &Path, answer: &GraspAnswer<'_>, about: Map<String, Value>) -> Result<()> {
+    let mut value = grasps_json(answer);
+    for (key, entry) in about {
+        value[key] = entry;
+    }
+    write_json(path, &value)
+}
+
+/// The content of `grasps.json`. Matrices are 4 × 4, row-major, points as columns; lengths are
+/// metres; quaternions are x, y, z, w. `hand` lists the poses of the gripper's parts at a grasp, so
+/// that anybody can check a grasp with nothing but this file and the mesh.
+pub fn grasps_json(answer: &GraspAnswer<'_>) -> Value {
+    let found = answer.found;
+    let grasps: Vec<Value> = found.grasps.iter().map(|grasp| grasp_json(answer, grasp)).collect();
+    let rejected: Map<String, Value> =
+        found.rejected.iter().map(|(reason, n)| ((*reason).to_owned(), json!(n))).collect();
+    json!({
+        "format": FORMAT,
+        "mesh": {
+            "n_vertices": answer.mesh.n_vertices(),
+            "n_triangles": answer.mesh.n_faces(),
+            "hash": answer.mesh.hash().to_string(),
+        },
+        "object_scale": answer.object_scale,
+        "camera_from_object": answer.camera_from_object.map(rows),
+        "gripper": gripper_json(answer.gripper),
+        "grasps": grasps,
+        "rejected": rejected,
+        "nearest_miss": found.nearest_miss,
+        "n_candidates": found.n_candidates,
+    })
+}
+
+fn grasp_json(answer: &GraspAnswer<'_>, grasp: &Grasp) -> Value {
+    let (frame, pose) = answer.framed(grasp.object_from_tcp);
+    let (position, rotation) = position_and_rotation(pose);
+    let terms: Map<String, Value> =
+        grasp.terms.iter().map(|&(name, value)| (name.to_owned(), json!(value))).collect();
+    let hand = |width: f64| -> Vec<Value> {
+        let parts = answer.gripper.parts_at(width).into_iter();
+        parts.map(|(tcp_from_part, _)| json!(rows(tcp_from_part))).collect()
+    };
+    json!({
+        "object_from_tcp": rows(grasp.object_from_tcp),
+        "camera_from_tcp": answer.camera_from_object.map(|_| rows(pose)),
+        "frame": frame,
+        "position": position.to_array(),
+        "quaternion_xyzw": rotation.to_array(),
+        "width": grasp.width,
+        "open_width": grasp.open_width,
+        "contacts": grasp.contacts.map(|point| point.to_array()),
+        "score": grasp.score,
+        "terms": terms,
+        "hand": { "closed": hand(grasp.width), "open": hand(grasp.open_width) },
+    })
+}
+
+fn gripper_json(gripper: &Gripper) -> Value {
+    json!({
+        "name": gripper.name,
+        "opening": [gripper.opening.start(), gripper.opening.end()],
+        "pad": gripper.pad,
+        "flange_from_tcp": rows(gripper.flange_from_tcp),
+        "parts": gripper.parts.iter().map(part_json).collect::<Vec<_>>(),
+    })
+}
+
+/// A part as the convex hulls of point sets, in its own frame.
+fn part_json(part: &Part) -> Value {
+    let role = match part.role {
+        Role::Palm => "palm",
+        Role::Left => "left",
+        Role::Right => "right",
+    };
+    let hulls: Vec<Vec<[f64; 3]>> =
+        part.hulls().iter().map(|hull| hull.iter().map(|p| p.to_array()).collect()).collect();
+    json!({ "link": part.link, "role": role, "hulls": hulls })
+}
+
+/// A pose as rows of a 4 × 4 matrix.
+pub(crate) fn rows(pose: Pose) -> [[f64; 4]; 4] {
+    pose.to_mat4().transpose().to_cols_array_2d()
+}
