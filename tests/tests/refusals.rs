@@ -128,7 +128,7 @@ fn every_command_says_what_it_was_given_and_what_it_wanted() {
     let never = out.to_str().unwrap();
     for (arguments, words) in [
         (vec!["info", "/no/such/file.obj"], vec!["/no/such/file.obj"]),
-        (vec!["views", source, "-o", never, "--renderer", "gpu"], vec!["renderer"]),
+        (vec!["views", source, "-o", never, "--renderer", "paper"], vec!["renderer", "auto"]),
         (vec!["views", source, "-o", never, "--size", "0"], vec!["size"]),
         (vec!["views", source, "-o", never, "--count", "0"], vec!["views"]),
         (vec!["region", source, "-o", never, "--vertices", "99999"], vec!["99999"]),

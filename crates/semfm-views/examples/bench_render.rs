@@ -29,6 +29,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     report("render 14 views at 224 px", || draw(&default).map(drop))?;
     report("render 12 views at 448 px", || draw(&large).map(drop))?;
 
+    bench_driver(&mesh, [("14 views at 224 px", &default), ("12 views at 448 px", &large)])?;
+
     let views = draw(&default)?;
     let embedded: Vec<EmbeddedView> = views.iter().map(noise_tokens).collect();
     for (name, settings) in
@@ -44,6 +46,32 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(sheet) = arguments.next() {
         save_sheet(&views, &sheet)?;
     }
+    Ok(())
+}
+
+/// The same pictures by a graphics driver, where there is one.
+#[cfg(feature = "gpu")]
+fn bench_driver(mesh: &Mesh, shots: [(&str, &Vec<Camera>); 2]) -> semfm_views::Result<()> {
+    let start = Instant::now();
+    let gpu = match semfm_views::GpuRenderer::new() {
+        Ok(gpu) => gpu,
+        Err(error) => {
+            println!("{error}");
+            return Ok(());
+        }
+    };
+    println!("{} opened in {:.0} ms", gpu.name(), start.elapsed().as_secs_f64() * 1e3);
+    let (settings, task) = (RenderSettings::default(), Task::default());
+    for (name, cameras) in shots {
+        report(&format!("driver: {name}"), || {
+            gpu.render(mesh, &Paint::GREY, cameras, &settings, &task).map(drop)
+        })?;
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "gpu"))]
+fn bench_driver(_: &Mesh, _: [(&str, &Vec<Camera>); 2]) -> semfm_views::Result<()> {
     Ok(())
 }
 

@@ -23,7 +23,9 @@ pub enum Error {
         found: String,
     },
     /// There is no graphics driver that could render.
-    #[error("no graphics adapter: expected a Vulkan, Metal, DirectX 12 or GL driver, found none ({reason})")]
+    #[error(
+        "no graphics adapter: expected a Vulkan, Metal, DirectX 12 or GL driver, found none ({reason})"
+    )]
     NoGpu {
         /// What the search reported.
         reason: String,

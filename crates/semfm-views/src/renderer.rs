@@ -38,9 +38,9 @@ impl FromStr for RendererChoice {
 
     fn from_str(text: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|(_, name)| *name == text);
-        found.map(|entry| entry.0).ok_or_else(|| {
-            Error::invalid("renderer", "auto, gpu or cpu", format!("`{text}`"))
-        })
+        found
+            .map(|entry| entry.0)
+            .ok_or_else(|| Error::invalid("renderer", "auto, gpu or cpu", format!("`{text}`")))
     }
 }
 
@@ -68,8 +68,8 @@ impl Renderer {
         }
     }
 
-    /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: ours is
-    /// faster.
+    /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: they
+    /// take as long and are less exact.
     ///
     /// # Errors
     /// For [`RendererChoice::Gpu`]: [`Error::NoGpu`] without a driver (or in a build without the
@@ -84,7 +84,7 @@ impl Renderer {
                 fall_back(format!("views are drawn on the CPU: {error}"))
             }
             (RendererChoice::Auto, Some(Ok(gpu))) if gpu.is_software() => fall_back(format!(
-                "views are drawn on the CPU: {} would do it there, too, and slower",
+                "views are drawn on the CPU, exactly; {} would draw them there, too",
                 gpu.name()
             )),
             (_, Some(gpu)) => {

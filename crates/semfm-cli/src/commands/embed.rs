@@ -7,8 +7,8 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use semfm::geom::ShapeCache;
 use semfm::geom::io::MeshFile;
-use semfm::views::RigSettings;
 use semfm::views::mcap::EmbeddingsFile;
+use semfm::views::{Renderer, RigSettings};
 
 use super::views::make_views;
 use crate::options::Common;
@@ -43,7 +43,8 @@ impl Encoder {
         }
         let scratch = tempfile::tempdir().context("a folder for the views")?;
         let views = scratch.path().join("object.views.mcap");
-        make_views(file, colored, &RigSettings::default(), &views, common)?;
+        // By the CPU on every machine: what is kept must not depend on the driver that was there.
+        make_views(file, colored, &RigSettings::default(), &Renderer::cpu(), &views, common)?;
         self.run(&views, &path, common)?;
         load::embeddings(&path, &file.mesh)
     }

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
-use clap::{Args, ValueEnum};
+use anyhow::{Context, Result};
+use clap::Args;
 use semfm::geom::io::MeshFile;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
-use semfm::views::{RenderSettings, RigSettings, render, rig};
+use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings, rig};
 
 use super::Outcome;
 use crate::options::Common;
@@ -24,9 +24,10 @@ pub struct Views {
     output: PathBuf,
     #[command(flatten)]
     rig: RigOptions,
-    /// Which renderer draws
-    #[arg(long, value_enum, default_value_t = Renderer::Auto, help_heading = "Rendering")]
-    renderer: Renderer,
+    /// Who draws: auto takes a graphics processor where one answers, gpu any graphics driver or
+    /// nothing, cpu needs neither
+    #[arg(long, default_value_t = RendererChoice::Auto, value_name = "auto|gpu|cpu", help_heading = "Rendering")]
+    renderer: RendererChoice,
     /// An image for a mesh with texture coordinates (OBJ, PLY)
     #[arg(long, value_name = "IMAGE", help_heading = "Rendering")]
     texture: Option<PathBuf>,
@@ -52,21 +53,8 @@ impl RigOptions {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Renderer {
-    /// The GPU where this build can use one, else the CPU
-    Auto,
-    /// The GPU or nothing
-    Gpu,
-    /// The CPU
-    Cpu,
-}
-
 impl Views {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        if self.renderer == Renderer::Gpu {
-            bail!("--renderer: expected auto or cpu, found gpu: this build has no GPU renderer");
-        }
         let file = load::mesh(&self.mesh, self.texture.as_deref())?;
         if common.verbose {
             file.appearance
@@ -74,7 +62,11 @@ impl Views {
                 .iter()
                 .for_each(|note| talk::remark(format_args!("note: {note}")));
         }
-        make_views(&file, !self.grey, &self.rig.settings(), &self.output, common)
+        let renderer = Renderer::open(self.renderer).context("--renderer")?;
+        if let Some(note) = renderer.note().filter(|_| !common.quiet) {
+            talk::remark(format_args!("note: {note}"));
+        }
+        make_views(&file, !self.grey, &self.rig.settings(), &renderer, &self.output, common)
             .with_context(|| self.mesh.display().to_string())?;
         talk::say(self.output.display());
         Ok(Outcome::Done)
@@ -86,6 +78,7 @@ pub fn make_views(
     file: &MeshFile,
     colored: bool,
     settings: &RigSettings,
+    renderer: &Renderer,
     output: &Path,
     common: &Common,
 ) -> Result<()> {
@@ -93,7 +86,7 @@ pub fn make_views(
     let cameras = rig(&file.mesh, settings)?;
     let appearance = Some(&file.appearance).filter(|appearance| colored && !appearance.is_plain());
     let views = load::with_paint(&file.mesh, appearance, |paint| {
-        render(&file.mesh, paint, &cameras, &RenderSettings::default(), &task)
+        renderer.render(&file.mesh, paint, &cameras, &RenderSettings::default(), &task)
     })?;
     let metadata = ViewsMetadata {
         mesh: MeshIdentity::of(&file.mesh),
@@ -102,8 +95,11 @@ pub fn make_views(
         rig: format!("fibonacci {}, principal frame", settings.count),
         background: "white".into(),
         seed: 0,
-        more: [("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned())]
-            .into(),
+        more: [
+            ("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned()),
+            ("renderer".to_owned(), renderer.name()),
+        ]
+        .into(),
     };
     let colors: Option<Vec<[u8; 3]>> = appearance
         .and_then(|appearance| appearance.vertex_colors.as_ref())

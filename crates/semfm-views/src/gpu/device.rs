@@ -19,17 +19,13 @@ impl Device {
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
     pub fn open() -> Result<Self> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let wanted = wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            ..Default::default()
-        };
-        let adapter = pollster::block_on(instance.request_adapter(&wanted))
+        // GL is asked last: its loader talks to the terminal where there is no display.
+        let adapter = adapter(wgpu::Backends::PRIMARY)
+            .or_else(|_| adapter(wgpu::Backends::GL))
             .map_err(|error| Error::NoGpu { reason: error.to_string() })?;
         let limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits());
         let limits = wgpu::Limits { max_buffer_size: adapter.limits().max_buffer_size, ..limits };
-        let description =
-            wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let description = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&description))
             .map_err(|error| Error::Gpu { reason: error.to_string() })?;
         let fault = Arc::new(Mutex::new(None));
@@ -60,6 +56,21 @@ impl Device {
         self.check()?;
         waited.map(drop).map_err(|error| Error::Gpu { reason: error.to_string() })
     }
+}
+
+/// The fastest adapter behind some interfaces.
+fn adapter(
+    backends: wgpu::Backends,
+) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
+    let description = wgpu::InstanceDescriptor {
+        backends,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    };
+    let wanted = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..Default::default()
+    };
+    pollster::block_on(wgpu::Instance::new(description).request_adapter(&wanted))
 }
 
 /// Keeps the first fault: those that follow are its echo.

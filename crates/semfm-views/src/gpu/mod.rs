@@ -58,7 +58,7 @@ impl GpuRenderer {
         format!("{} ({:?})", self.device.adapter.name, self.device.adapter.backend)
     }
 
-    /// True for a driver that draws on the CPU (Mesa's lavapipe, say). Ours does that faster.
+    /// True for a driver that draws on the CPU (Mesa's lavapipe, say).
     pub fn is_software(&self) -> bool {
         self.device.adapter.device_type == wgpu::DeviceType::Cpu
     }
@@ -159,8 +159,8 @@ impl GpuRenderer {
         let device = &self.device.device;
         let bound = self.bind(request, scene, targets, cameras);
         let ids = ReadBack::new(&self.device, targets.size, ID_BYTES, cameras.len());
-        let colors = colored
-            .then(|| ReadBack::new(&self.device, targets.size, COLOR_BYTES, cameras.len()));
+        let colors =
+            colored.then(|| ReadBack::new(&self.device, targets.size, COLOR_BYTES, cameras.len()));
         let mut encoder = device.create_command_encoder(&Default::default());
         let [red, green, blue] = request.settings.background.map(f64::from);
         let background = wgpu::Color { r: red, g: green, b: blue, a: 1.0 };
@@ -332,8 +332,7 @@ impl Scene {
             })
             .collect();
         let n_corners = corners.len() as u32;
-        let corners =
-            buffer(device, bytemuck::cast_slice(&corners), wgpu::BufferUsages::VERTEX);
+        let corners = buffer(device, bytemuck::cast_slice(&corners), wgpu::BufferUsages::VERTEX);
         device.check()?;
         Ok(Self { corners, n_corners, centre, radius })
     }

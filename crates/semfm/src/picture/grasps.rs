@@ -133,9 +133,8 @@ mod tests {
             pixels.filter(|rgb| rgb[2] > rgb[0].saturating_add(40)).count()
         };
         let weights = vec![1.0; block.n_vertices()];
-        let shown = |grasps: &[Grasp]| {
-            sides(&block, &weights, &gripper, grasps, &Task::default()).unwrap()
-        };
+        let shown =
+            |grasps: &[Grasp]| sides(&block, &weights, &gripper, grasps, &Task::default()).unwrap();
         assert_eq!(blue(&shown(&[])), 0);
         assert!(blue(&shown(&[grasp])) > 2000);
     }
