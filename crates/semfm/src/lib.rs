@@ -37,6 +37,7 @@ pub mod picture;
 pub mod pipeline;
 pub mod region_file;
 pub mod regions;
+pub mod show;
 
 pub use error::{Error, Result};
 pub use fmap::{Method, Region, Rule, Transfer, TransferSettings, Verdict};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm_geom::Task;
 use semfm_geom::io::{Paint, write_painted_mesh};
+use semfm_geom::{Mesh, Task};
 use serde_json::{Map, Value, json};
 
 use crate::picture::{weight_colors, write_picture};
@@ -11,7 +11,7 @@ use crate::region_file::{region_json, write_json};
 use crate::{PreparedObject, Region, Result, Transfer};
 
 /// Writes a transfer into `folder`, which is made if it is not there: `region.json`,
-/// `report.json`, `point_map.json`, `target.ply`, `target.glb`, `transfer.png` and (feature
+/// `report.json`, `point_map.json`, `source.ply`, `target.ply`, `target.glb`, `transfer.png` and (feature
 /// `mcap`) `transfer.mcap`. Each file is written whole or not at all. `about` is put into the
 /// report as it is.
 ///
@@ -43,16 +43,14 @@ pub fn write_transfer(
             "source_of": transfer.point_map.source_of,
         }),
     )?;
-    let bytes = |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c: f32| (c * 255.0).round() as u8);
-    let colors: Vec<[u8; 4]> = weight_colors(transfer.weights()).into_iter().map(bytes).collect();
-    let paint = Paint { colors: Some(&colors), scalars: &[("weight", transfer.weights())] };
-    write_painted_mesh(at("target.ply"), mesh, &paint)?;
-    write_painted_mesh(at("target.glb"), mesh, &paint)?;
+    write_weighted(&[at("source.ply")], source.shape.original(), region.weights())?;
+    write_weighted(&[at("target.ply"), at("target.glb")], mesh, transfer.weights())?;
     write_picture(&at("transfer.png"), source, target, region, transfer, task)?;
     let mut names = vec![
         "region.json",
         "report.json",
         "point_map.json",
+        "source.ply",
         "target.ply",
         "target.glb",
         "transfer.png",
@@ -63,6 +61,14 @@ pub fn write_transfer(
         names.push("transfer.mcap");
     }
     Ok(names.into_iter().map(at).collect())
+}
+
+/// A mesh as read with a weight per vertex, as property and as colour.
+fn write_weighted(paths: &[PathBuf], mesh: &Mesh, weights: &[f64]) -> Result<()> {
+    let bytes = |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c: f32| (c * 255.0).round() as u8);
+    let colors: Vec<[u8; 4]> = weight_colors(weights).into_iter().map(bytes).collect();
+    let paint = Paint { colors: Some(&colors), scalars: &[("weight", weights)] };
+    Ok(paths.iter().try_for_each(|path| write_painted_mesh(path, mesh, &paint))?)
 }
 
 /// The region as in a region file, with method, confidence, verdict and the other places it may be.

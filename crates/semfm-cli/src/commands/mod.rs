@@ -5,6 +5,7 @@ pub mod demo;
 pub mod embed;
 pub mod info;
 pub mod region;
+pub mod show;
 pub mod transfer;
 pub mod views;
 
