@@ -6,12 +6,13 @@ use semfm_geom::io::{Paint, write_painted_mesh};
 use semfm_geom::{Mesh, Task};
 use serde_json::{Map, Value, json};
 
-use crate::picture::{weight_colors, write_picture};
+use crate::picture::meaning::{AnchorOfPoint, anchors_of_points, by_vertex};
+use crate::picture::{weight_colors, write_meaning_picture, write_picture};
 use crate::region_file::{region_json, write_json};
 use crate::{PreparedObject, Region, Result, Transfer};
 
 /// Writes a transfer into `folder`, which is made if it is not there: `region.json`,
-/// `report.json`, `point_map.json`, `source.ply`, `target.ply`, `target.glb`, `transfer.png` and (feature
+/// `report.json`, `point_map.json`, `source.ply`, `target.ply`, `target.glb`, `transfer.png`, `meaning.png` and (feature
 /// `mcap`) `transfer.mcap`. Each file is written whole or not at all. `about` is put into the
 /// report as it is.
 ///
@@ -34,6 +35,11 @@ pub fn write_transfer(
 
     write_json(&at("region.json"), &carried_json(target, transfer))?;
     write_json(&at("report.json"), &report)?;
+    let [source_anchors, target_anchors] = anchors_of_points(source, target, transfer, task)?;
+    let ranks = |object: &PreparedObject, anchors: &[AnchorOfPoint]| -> Result<Vec<i64>> {
+        let rank = |anchor: &AnchorOfPoint| anchor.1.map_or(-1, |rank| rank as i64);
+        by_vertex(object, &anchors.iter().map(rank).collect::<Vec<_>>())
+    };
     write_json(
         &at("point_map.json"),
         &json!({
@@ -41,11 +47,14 @@ pub fn write_transfer(
             "source": source.shape.original().hash().to_string(),
             "target": mesh.hash().to_string(),
             "source_of": transfer.point_map.source_of,
+            "source_anchor": ranks(source, &source_anchors)?,
+            "target_anchor": ranks(target, &target_anchors)?,
         }),
     )?;
     write_weighted(&[at("source.ply")], source.shape.original(), region.weights())?;
     write_weighted(&[at("target.ply"), at("target.glb")], mesh, transfer.weights())?;
     write_picture(&at("transfer.png"), source, target, region, transfer, task)?;
+    write_meaning_picture(&at("meaning.png"), source, target, region, transfer, task)?;
     let mut names = vec![
         "region.json",
         "report.json",
@@ -54,6 +63,7 @@ pub fn write_transfer(
         "target.ply",
         "target.glb",
         "transfer.png",
+        "meaning.png",
     ];
     #[cfg(feature = "mcap")]
     {
@@ -161,11 +171,10 @@ fn object_json(object: &PreparedObject) -> Value {
 mod scene {
     //! `transfer.mcap`: both objects with their clouds, for Foxglove and its like.
 
-    use semfm_geom::SemanticCloud;
     use semfm_views::mcap::{SceneMesh, ScenePoints, write_scene};
 
     use super::*;
-    use crate::fmap::features::{CentredFeatures, JointFeatures};
+    use crate::picture::meaning::meaning_colors;
 
     pub(super) fn write(
         path: &Path,
@@ -175,12 +184,13 @@ mod scene {
         transfer: &Transfer,
         report: &Value,
     ) -> Result<()> {
-        let [source_meaning, target_meaning] = meaning_colors(&source.cloud, &target.cloud)?;
-        let bytes = |weights: &[f64]| -> Vec<[u8; 3]> {
-            let colors = weight_colors(weights).into_iter();
-            colors.map(|c| c.map(|x| (x * 255.0).round() as u8)).collect()
+        let bytes = |colors: Vec<[f32; 3]>| -> Vec<[u8; 3]> {
+            colors.into_iter().map(|c| c.map(|x| (x * 255.0).round() as u8)).collect()
         };
-        let (marked, carried) = (bytes(region.weights()), bytes(transfer.weights()));
+        let [source_meaning, target_meaning] =
+            meaning_colors(&source.cloud, &target.cloud)?.map(bytes);
+        let [marked, carried] =
+            [region.weights(), transfer.weights()].map(|weights| bytes(weight_colors(weights)));
         let (source_mesh, target_mesh) = (source.shape.original(), target.shape.original());
         let meshes = [
             SceneMesh {
@@ -213,21 +223,5 @@ mod scene {
             },
         ];
         Ok(write_scene(path, "semfm.transfer/1", &meshes, &clouds, report)?)
-    }
-
-    /// The first three principal directions of the pair's features as colours, in one basis.
-    fn meaning_colors(source: &SemanticCloud, target: &SemanticCloud) -> Result<[Vec<[u8; 3]>; 2]> {
-        let (source, target) = (CentredFeatures::new(source)?, CentredFeatures::new(target)?);
-        let joint = JointFeatures::new(&source, &target, 3)?;
-        // Features have unit RMS length: this much on each side of grey shows all but the outliers.
-        let spread = 1.5;
-        let colors = |features: faer::MatRef<'_, f64>| {
-            let channel = |i: usize, c: usize| {
-                if c < features.ncols() { features[(i, c)] / (2.0 * spread) + 0.5 } else { 0.5 }
-            };
-            let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
-            (0..features.nrows()).map(|i| std::array::from_fn(|c| byte(channel(i, c)))).collect()
-        };
-        Ok([colors(joint.source.as_ref()), colors(joint.target.as_ref())])
     }
 }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use semfm::geom::io::MeshFile;
+use semfm::picture::write_sheet;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
-use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings, rig};
+use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings, View, rig};
 
 use super::Outcome;
 use crate::options::Common;
@@ -31,6 +32,9 @@ pub struct Views {
     /// An image for a mesh with texture coordinates (OBJ, PLY)
     #[arg(long, value_name = "IMAGE", help_heading = "Rendering")]
     texture: Option<PathBuf>,
+    /// Also put all pictures on one sheet (PNG)
+    #[arg(long, value_name = "SHEET.png", help_heading = "Rendering")]
+    sheet: Option<PathBuf>,
     /// Ignore the object's colours
     #[arg(long, conflicts_with = "texture", help_heading = "Rendering")]
     grey: bool,
@@ -66,14 +70,20 @@ impl Views {
         if let Some(note) = renderer.note().filter(|_| !common.quiet) {
             talk::remark(format_args!("note: {note}"));
         }
-        make_views(&file, !self.grey, &self.rig.settings(), &renderer, &self.output, common)
+        let settings = self.rig.settings();
+        let views = make_views(&file, !self.grey, &settings, &renderer, &self.output, common)
             .with_context(|| self.mesh.display().to_string())?;
         talk::say(self.output.display());
+        if let Some(sheet) = &self.sheet {
+            let columns = (views.len() as f64).sqrt().ceil() as usize;
+            write_sheet(sheet, &views, columns)?;
+            talk::say(sheet.display());
+        }
         Ok(Outcome::Done)
     }
 }
 
-/// Renders an object and writes its views file.
+/// Renders an object, writes its views file and hands the views back.
 pub fn make_views(
     file: &MeshFile,
     colored: bool,
@@ -81,7 +91,7 @@ pub fn make_views(
     renderer: &Renderer,
     output: &Path,
     common: &Common,
-) -> Result<()> {
+) -> Result<Vec<View>> {
     let task = talk::watched(common.quiet);
     let cameras = rig(&file.mesh, settings)?;
     let appearance = Some(&file.appearance).filter(|appearance| colored && !appearance.is_plain());
@@ -104,5 +114,6 @@ pub fn make_views(
     let colors: Option<Vec<[u8; 3]>> = appearance
         .and_then(|appearance| appearance.vertex_colors.as_ref())
         .map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect());
-    Ok(write_views(output, &views, &file.mesh, colors.as_deref(), &metadata)?)
+    write_views(output, &views, &file.mesh, colors.as_deref(), &metadata)?;
+    Ok(views)
 }

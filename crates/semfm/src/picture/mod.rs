@@ -1,6 +1,7 @@
 //! Pictures of results: what was carried where, and how a hand takes it.
 
 mod grasps;
+pub(crate) mod meaning;
 mod transfer;
 
 use std::path::Path;
@@ -11,9 +12,10 @@ use semfm_geom::{Mesh, Task};
 use semfm_views::{Camera, Paint, RenderSettings, RigSettings, View, render, rig};
 
 pub use grasps::write_grasp_picture;
+pub use meaning::write_meaning_picture;
 pub use transfer::write_picture;
 
-use crate::{Region, Result};
+use crate::{Error, Region, Result};
 
 /// Side of each picture in pixels.
 const SIDE: u32 = 420;
@@ -69,22 +71,33 @@ fn viewpoints(mesh: &Mesh, weights: &[f64], task: &Task) -> Result<[Camera; 2]> 
     Ok([full[best], full[other]])
 }
 
-/// Writes pictures of [`SIDE`] pixels as one PNG, in rows of `columns`, whole or not at all.
-fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()> {
-    let line = 3 * SIDE as usize;
-    let sheet: Vec<u8> = pictures
-        .chunks(columns)
-        .flat_map(|row| {
-            (0..SIDE as usize).flat_map(move |y| {
-                row.iter().flat_map(move |view| &view.rgb[y * line..(y + 1) * line])
-            })
-        })
-        .copied()
-        .collect();
-    let (width, height) = (columns as u32 * SIDE, (pictures.len() / columns) as u32 * SIDE);
+/// Writes pictures of one size as one PNG, in rows of `columns` (at least 1), whole or not at all.
+///
+/// # Errors
+/// [`Error::Invalid`] for no pictures or pictures of several sizes, [`semfm_geom::Error::Io`].
+pub fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()> {
+    let size = |view: &View| (view.camera.width, view.camera.height);
+    let Some((side, height)) = pictures.first().map(size) else {
+        return Err(Error::invalid("pictures of a sheet", "at least one", "none"));
+    };
+    if let Some(other) = pictures.iter().find(|view| size(view) != (side, height)) {
+        let expected = format!("{side} × {height} pixels each");
+        return Err(Error::invalid("pictures of a sheet", expected, format!("{:?}", size(other))));
+    }
+    let columns = columns.clamp(1, pictures.len());
+    let (line, n_rows) = (3 * side as usize, pictures.len().div_ceil(columns));
+    let (width, total) = (columns as u32 * side, n_rows as u32 * height);
+    let mut sheet = vec![u8::MAX; columns * line * total as usize];
+    for (k, view) in pictures.iter().enumerate() {
+        let (row, column) = (k / columns, k % columns);
+        for (y, pixels) in view.rgb.chunks_exact(line).enumerate() {
+            let start = ((row * height as usize + y) * columns + column) * line;
+            sheet[start..start + line].copy_from_slice(pixels);
+        }
+    }
     semfm_geom::io::write_atomically(path, |out| {
         PngEncoder::new(out)
-            .write_image(&sheet, width, height, ExtendedColorType::Rgb8)
+            .write_image(&sheet, width, total, ExtendedColorType::Rgb8)
             .map_err(std::io::Error::other)
     })?;
     Ok(())

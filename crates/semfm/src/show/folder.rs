@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Group, Panel};
+use crate::picture::meaning::anchor_color;
 use crate::picture::position_colors;
 use crate::{Error, Result};
 
@@ -50,14 +51,20 @@ fn transfer_group(folder: &Path) -> Result<Group> {
     let matched = map.source_of.iter();
     let target_places =
         matched.map(|&v| source_places.get(v as usize).copied().unwrap_or_default()).collect();
-    let panel = |name: &str, file: MeshFile, places: Vec<[u8; 3]>| Panel {
+    let panel = |name: &str, file: MeshFile, places: Vec<[u8; 3]>, anchors: &[i64]| Panel {
         name: name.into(),
         note: format!("{} vertices", file.mesh.n_vertices()),
-        layers: vec![("region".into(), own_colors(&file)), ("colour transfer".into(), places)],
+        layers: vec![
+            ("region".into(), own_colors(&file)),
+            ("colour transfer".into(), places),
+            ("anchors".into(), anchors.iter().map(|&rank| bytes(anchor_color(rank))).collect()),
+        ],
         mesh: file.mesh,
     };
-    let panels =
-        vec![panel("source", source, source_places), panel("target", target, target_places)];
+    let panels = vec![
+        panel("source", source, source_places, &map.source_anchor),
+        panel("target", target, target_places, &map.target_anchor),
+    ];
     let fact = |name: &str, value: &Value| match value {
         Value::String(text) => Some((name.to_owned(), text.clone())),
         Value::Number(number) => Some((name.to_owned(), format!("{:.2}", number.as_f64()?))),
@@ -83,6 +90,8 @@ struct PointMapFile {
     source: String,
     target: String,
     source_of: Vec<u32>,
+    source_anchor: Vec<i64>,
+    target_anchor: Vec<i64>,
 }
 
 fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
