@@ -4,16 +4,44 @@ use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
 
 /// One parallel-jaw grasp of an object.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Grasp {
     /// The gripper's TCP frame in the object's frame, metres.
     pub object_from_tcp: Pose,
-    /// Distance between the pads when they touch, metres.
+    /// Distance between the pads when they have closed, metres: each stands a tenth of a millimetre
+    /// off the object's first point, so that rounding never makes a touch a collision.
     pub width: f64,
-    /// One contact point for each pad (the one at -y first), in the object's frame, metres.
+    /// Distance between the pads on the way in, metres: fully open, or less where a fully open hand
+    /// would hit something.
+    pub opening: f64,
+    /// One contact point for each pad (the one at -y first), in the object's frame, metres. Both
+    /// lie on the surface, and the line between them inside both friction cones.
     pub contacts: [DVec3; 2],
-    /// The weighted sum of the named terms, in [0, 1].
+    /// The object's unit normal at each contact, averaged over the patch that the pad covers,
+    /// pointing at the pad.
+    pub normals: [DVec3; 2],
+    /// Ferrari & Canny's ε: the least wrench that the grasp cannot resist, for a unit of grip force,
+    /// torques about the centre of mass divided by the object's radius around it.
+    pub epsilon: f64,
+    /// The weighted mean of the named terms, in [0, 1].
     pub score: f64,
-    /// Name and value of each term of the score.
+    /// Name and value of each term of the score, each in [0, 1].
     pub terms: Vec<(&'static str, f64)>,
+}
+
+impl Grasp {
+    /// The direction in which the hand comes, in the object's frame (unit).
+    pub fn approach(&self) -> DVec3 {
+        self.object_from_tcp.rotation * DVec3::Z
+    }
+
+    /// The direction from the pad at -y to the one at +y, in the object's frame (unit).
+    pub fn closing(&self) -> DVec3 {
+        self.object_from_tcp.rotation * DVec3::Y
+    }
+
+    /// The value of the term called `name`.
+    pub fn term(&self, name: &str) -> Option<f64> {
+        self.terms.iter().find(|term| term.0 == name).map(|term| term.1)
+    }
 }

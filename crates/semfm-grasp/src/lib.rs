@@ -6,11 +6,37 @@
 //! along the closing direction; lengths are metres.
 
 pub mod align;
+mod antipodal;
+mod candidate;
+mod clip;
+mod closure;
+mod collision;
+mod contact;
 mod error;
+pub mod find;
+mod gpg;
 pub mod grasp;
 pub mod gripper;
+pub mod hand;
+pub mod object;
+mod obstacle;
+pub mod rejection;
+pub mod scene;
+mod score;
+pub mod select;
+pub mod settings;
+mod solid;
+#[cfg(test)]
+mod test_shapes;
 pub mod urdf;
+mod wrench_hull;
 
 pub use error::{Error, Result};
+pub use find::{Grasps, find_grasps, find_grasps_with};
 pub use grasp::Grasp;
 pub use gripper::Gripper;
+pub use hand::{BoxHand, Hand};
+pub use object::GraspObject;
+pub use rejection::{Miss, Reason, Rejected};
+pub use scene::Scene;
+pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation};

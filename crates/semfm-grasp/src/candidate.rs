@@ -1,0 +1,18 @@
+//! A hand pose worth examining.
+
+use parry3d_f64::math::{Pose, Rotation};
+use semfm_geom::math::{DMat3, DVec3};
+
+/// Where the hand might go, before anybody has checked it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    /// object_from_tcp; the place along y is settled when the pads close.
+    pub(crate) tcp: Pose,
+    /// An interval along the TCP's y axis that the grasp is to hold, metres.
+    pub(crate) seed: [f64; 2],
+}
+
+/// The rotation whose y and z axes are `closing` and `approach` (unit, orthogonal).
+pub(crate) fn rotation(closing: DVec3, approach: DVec3) -> Rotation {
+    Rotation::from_mat3(&DMat3::from_cols(closing.cross(approach), closing, approach))
+}

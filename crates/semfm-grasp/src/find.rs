@@ -1,0 +1,339 @@
+//! From a region to ranked grasps: grow candidates, examine each in stages, score, select.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use semfm_geom::Task;
+use semfm_geom::math::DVec3;
+
+use crate::Result;
+use crate::antipodal::antipodal;
+use crate::candidate::Candidate;
+use crate::closure::widest_angle;
+use crate::collision::{Collision, Fit};
+use crate::contact::{Closing, TOUCH_GAP, close};
+use crate::gpg::Gpg;
+use crate::grasp::Grasp;
+use crate::gripper::Gripper;
+use crate::hand::Hand;
+use crate::object::{GraspObject, Region, Surface};
+use crate::rejection::{Miss, Reason, Rejected};
+use crate::scene::Scene;
+use crate::score::Scorer;
+use crate::select::{diverse, suppress};
+use crate::settings::GraspSettings;
+
+/// Contacts must lie inside the friction cone by this share of its half-angle: another program
+/// computes other normals.
+const CONE_SHARE: f64 = 0.97;
+
+/// Grasps of one region by one hand in one scene, and what became of the other candidates.
+#[derive(Clone, Debug)]
+pub struct Grasps {
+    /// Best first; empty where nothing survived.
+    pub grasps: Vec<Grasp>,
+    /// Candidates refused, by the first thing that each failed.
+    pub rejected: Rejected,
+    /// Of the refused candidates the one that came farthest, and of those the one that missed by
+    /// least.
+    pub nearest_miss: Option<Miss>,
+    /// Hand poses examined.
+    pub n_candidates: usize,
+    /// Hand poses that passed every check, before near ones were merged and the best chosen.
+    pub n_survivors: usize,
+    /// Wall time of each stage, milliseconds.
+    pub stages_ms: Vec<(&'static str, f64)>,
+}
+
+/// Grasps of `object` whose pads lie in a region.
+///
+/// `region` has one weight (at least 0) for each vertex or point of the object. All lengths are
+/// metres; scene, approach and grasps are in the frame of the object. Finding nothing is an answer:
+/// `grasps` is empty then, and `rejected` and `nearest_miss` say why.
+///
+/// The same seed gives the same grasps at every thread count.
+///
+/// # Errors
+/// [`Error::OutOfRange`](crate::Error::OutOfRange) for settings, weights and grippers that make no
+/// sense; [`Cancelled`](semfm_geom::Error::Cancelled) once the task is.
+pub fn find_grasps(
+    object: &GraspObject,
+    region: &[f64],
+    gripper: &Gripper,
+    scene: &Scene,
+    settings: &GraspSettings,
+    task: &Task,
+) -> Result<Grasps> {
+    find_grasps_with(object, region, &Hand::new(gripper)?, scene, settings, task)
+}
+
+/// [`find_grasps`] with a hand that was prepared before.
+///
+/// ```
+/// use semfm_geom::{Mesh, Task, math::DVec3};
+/// use semfm_grasp::{BoxHand, GraspObject, GraspSettings, Hand, Scene, find_grasps_with};
+/// // A plate of 10 × 10 × 1 cm on a table.
+/// let corner = |i: usize| DVec3::new((i & 1) as f64 * 0.1, (i >> 1 & 1) as f64 * 0.1, (i >> 2) as f64 * 0.01);
+/// let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+/// let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+/// let plate = GraspObject::from_mesh(&Mesh::new((0..8).map(corner).collect(), faces)?, 1.0)?;
+/// let hand = Hand::of_boxes(&BoxHand::default())?;
+/// let settings = GraspSettings { n_samples: 200, ..GraspSettings::default() };
+/// let whole = vec![1.0; plate.n_weights()];
+/// let found = find_grasps_with(&plate, &whole, &hand, &Scene::new(), &settings, &Task::default())?;
+/// assert!((found.grasps[0].width - 0.01).abs() < 1e-3);
+/// # Ok::<(), semfm_grasp::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`find_grasps`].
+pub fn find_grasps_with(
+    object: &GraspObject,
+    region: &[f64],
+    hand: &Hand,
+    scene: &Scene,
+    settings: &GraspSettings,
+    task: &Task,
+) -> Result<Grasps> {
+    let start = Instant::now();
+    settings.check()?;
+    let region = Region::new(object, region)?;
+    let search = Search::new(object, &region, hand, scene, settings);
+    let prepared = start.elapsed();
+    let sampled = search.run(task)?;
+    let examined = start.elapsed();
+    let n_survivors = sampled.grasps.len();
+    let kept = suppress(sampled.grasps, settings.separation);
+    let grasps = diverse(kept, settings.top, settings.diversity, object.radius());
+    let ms = |from: std::time::Duration, to: std::time::Duration| (to - from).as_secs_f64() * 1e3;
+    Ok(Grasps {
+        grasps,
+        rejected: sampled.rejected,
+        nearest_miss: sampled.nearest.map(|near| search.miss(near)),
+        n_candidates: sampled.n_candidates,
+        n_survivors,
+        stages_ms: vec![
+            ("prepare", prepared.as_secs_f64() * 1e3),
+            ("examine", ms(prepared, examined)),
+            ("select", ms(examined, start.elapsed())),
+        ],
+    })
+}
+
+/// What one seed, or all of them, gave.
+#[derive(Default)]
+struct Sampled {
+    grasps: Vec<Grasp>,
+    rejected: Rejected,
+    nearest: Option<Near>,
+    n_candidates: usize,
+}
+
+/// A refused candidate, as far as it came.
+#[derive(Clone)]
+struct Near {
+    reason: Reason,
+    by: f64,
+    candidate: Candidate,
+    closing: Option<Closing>,
+}
+
+struct Search<'a> {
+    object: &'a GraspObject,
+    region: &'a Region,
+    hand: &'a Hand,
+    settings: &'a GraspSettings,
+    collision: Collision<'a>,
+    scorer: Scorer<'a>,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        object: &'a GraspObject,
+        region: &'a Region,
+        hand: &'a Hand,
+        scene: &'a Scene,
+        settings: &'a GraspSettings,
+    ) -> Self {
+        let down = scene.table().map(|table| -table.normal);
+        let scorer = Scorer::new(object, hand, settings, down);
+        let collision = Collision::new(object, scene, hand, settings);
+        Self { object, region, hand, settings, collision, scorer }
+    }
+
+    fn run(&self, task: &Task) -> Result<Sampled> {
+        let n_samples = self.settings.n_samples;
+        let done = AtomicUsize::new(0);
+        let parts: Vec<Sampled> = (0..n_samples)
+            .into_par_iter()
+            .map_init(
+                || (Gpg::new(self.object, self.hand), Vec::new()),
+                |(gpg, candidates), i| {
+                    candidates.clear();
+                    let sampled = self.sample(i as u64, gpg, candidates);
+                    task.step("examine", done.fetch_add(1, Ordering::Relaxed) + 1, n_samples)?;
+                    Ok(sampled)
+                },
+            )
+            .collect::<Result<_>>()?;
+        let mut all = Sampled::default();
+        parts.into_iter().for_each(|part| all.absorb(part));
+        Ok(all)
+    }
+
+    /// One seed of the region: on a mesh, antipodal pairs and GPG take turns.
+    fn sample(&self, i: u64, gpg: &mut Gpg<'_>, candidates: &mut Vec<Candidate>) -> Sampled {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        rng.set_stream(i + 1);
+        let seed = self.region.draw(self.object, &mut rng);
+        let on_mesh = matches!(self.object.surface(), Surface::Mesh { .. });
+        let grown = if on_mesh && i % 2 == 0 {
+            let friction = self.settings.friction;
+            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates)
+        } else {
+            gpg.grow(&seed, candidates)
+        };
+        let mut sampled = Sampled { n_candidates: candidates.len(), ..Sampled::default() };
+        if !grown {
+            sampled.rejected.add(Reason::NoContact);
+            sampled.n_candidates += 1;
+        }
+        for candidate in candidates.iter() {
+            match self.examine(candidate) {
+                Ok(grasp) => sampled.grasps.push(grasp),
+                Err(near) => {
+                    sampled.rejected.add(near.reason);
+                    sampled.consider(near);
+                }
+            }
+        }
+        sampled
+    }
+
+    /// The stages, cheap ones first.
+    fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Near> {
+        let near = |closing: Option<&Closing>| {
+            let closing = closing.cloned();
+            move |(reason, by)| Near { reason, by, candidate: *candidate, closing }
+        };
+        self.approach(candidate).map_err(near(None))?;
+        let compliance = self.settings.compliance;
+        let closing =
+            close(self.object, self.region, self.hand, &candidate.tcp, candidate.seed, compliance)
+                .map_err(near(None))?;
+        let some = || near(Some(&closing));
+        self.width(&closing).map_err(some())?;
+        self.collision.above_table(&closing).map_err(some())?;
+        let angle = self.contacts(&closing).map_err(some())?;
+        let fit = self.collision.fit(&closing).map_err(some())?;
+        Ok(self.grasp(&closing, &fit, angle))
+    }
+
+    fn approach(&self, candidate: &Candidate) -> std::result::Result<(), (Reason, f64)> {
+        let Some(cone) = self.settings.limits.approach else { return Ok(()) };
+        let beyond = (candidate.tcp.rotation * DVec3::Z).angle_between(cone.axis) - cone.half_angle;
+        if beyond > 0.0 { Err((Reason::Approach, beyond)) } else { Ok(()) }
+    }
+
+    fn width(&self, closing: &Closing) -> std::result::Result<(), (Reason, f64)> {
+        let opening = self.hand.opening();
+        let asked = self.settings.limits.width.clone().unwrap_or(0.0..=f64::INFINITY);
+        let least = opening.start().max(*asked.start());
+        let most = (opening.end() - 2.0 * TOUCH_GAP).min(*asked.end());
+        let beyond = (least - closing.width).max(closing.width - most);
+        if beyond > 0.0 { Err((Reason::Width, beyond)) } else { Ok(()) }
+    }
+
+    /// Region, patches and force closure; returns the widest contact angle.
+    fn contacts(&self, closing: &Closing) -> std::result::Result<f64, (Reason, f64)> {
+        let limits = &self.settings.limits;
+        let [left, right] = &closing.patches;
+        let outside = limits.pad_in_region - left.region.min(right.region);
+        if outside > 1e-9 {
+            return Err((Reason::Region, outside));
+        }
+        let bare = limits.pad_in_contact - self.scorer.pad_share(closing);
+        if bare > 0.0 {
+            return Err((Reason::Contact, bare));
+        }
+        let angle = widest_angle(&closing.patches, closing.tcp.rotation * DVec3::Y);
+        let beyond = angle - CONE_SHARE * self.settings.friction.atan();
+        if beyond > 0.0 { Err((Reason::ForceClosure, beyond)) } else { Ok(angle) }
+    }
+
+    fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
+        let score = self.scorer.score(closing, fit, angle);
+        Grasp {
+            object_from_tcp: closing.tcp,
+            width: fit.width,
+            opening: fit.opening,
+            contacts: closing.patches.map(|patch| patch.contact),
+            normals: closing.patches.map(|patch| patch.normal),
+            epsilon: score.epsilon,
+            score: score.score,
+            terms: score.terms,
+        }
+    }
+
+    /// A refused candidate as a grasp, with what is known of it.
+    fn miss(&self, near: Near) -> Miss {
+        let Near { reason, by, candidate, closing } = near;
+        let widest = *self.hand.opening().end();
+        let by = match (&closing, reason) {
+            (Some(closing), reason)
+                if reason >= Reason::Collision && reason != Reason::Clearance =>
+            {
+                self.collision.back_off(closing)
+            }
+            _ => by,
+        };
+        let seed = candidate.seed;
+        let at = |y: f64| candidate.tcp * (DVec3::Y * y);
+        let closing_axis = candidate.tcp.rotation * DVec3::Y;
+        let (tcp, width, contacts, normals) = closing.map_or_else(
+            || {
+                let ends = [at(seed[0]), at(seed[1])];
+                (candidate.tcp, seed[1] - seed[0], ends, [-closing_axis, closing_axis])
+            },
+            |closing| {
+                let patches = closing.patches;
+                (closing.tcp, closing.width, patches.map(|p| p.contact), patches.map(|p| p.normal))
+            },
+        );
+        let grasp = Grasp {
+            object_from_tcp: tcp,
+            width,
+            opening: widest,
+            contacts,
+            normals,
+            epsilon: 0.0,
+            score: 0.0,
+            terms: Vec::new(),
+        };
+        Miss { reason, by, grasp }
+    }
+}
+
+impl Sampled {
+    fn absorb(&mut self, part: Self) {
+        self.grasps.extend(part.grasps);
+        self.rejected.merge(&part.rejected);
+        self.n_candidates += part.n_candidates;
+        if let Some(near) = part.nearest {
+            self.consider(near);
+        }
+    }
+
+    /// Keeps what came farthest, of that what missed by least, of that the first.
+    fn consider(&mut self, near: Near) {
+        let nearer = self.nearest.as_ref().is_none_or(|best| {
+            near.reason > best.reason || (near.reason == best.reason && near.by < best.by)
+        });
+        if nearer {
+            self.nearest = Some(near);
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Candidates as in Grasp Pose Detection: a frame from the normals around a point, turned and
+//! pushed forward until the hand would touch.
+//!
+//! ten Pas & Platt, "Using geometry to detect grasp poses in 3D point clouds", 2015; ten Pas,
+//! Gualtieri, Saenko & Platt, "Grasp Pose Detection in Point Clouds", 2017. Departures: the
+//! neighbourhood of the normals is scaled to the hand instead of fixed at 3 cm, hands also tilt about
+//! the closing axis, both approaches are tried where the sign of a normal is unknown, and a placement
+//! is only a proposal: width, contact and collision are decided on the surface itself.
+
+use std::f64::consts::PI;
+
+use parry3d_f64::glamx::DSymmetricEigen3;
+use parry3d_f64::math::{Pose, Rotation};
+use semfm_geom::math::{DMat3, DQuat, DVec3};
+
+use crate::candidate::{Candidate, rotation};
+use crate::hand::{Hand, HandReach};
+use crate::object::{GraspObject, Seed};
+
+/// Turns about the approach axis, over half a turn: the hand is symmetric.
+const TURNS: usize = 8;
+
+/// Tilts about the closing axis, radians.
+const TILTS: [f64; 3] = [0.0, -0.5, 0.5];
+
+/// The hand must enclose this share of the pad's length before a placement counts (initial bite).
+const INITIAL_BITE: f64 = 0.3;
+
+/// Placements of the hand along its closing axis, over the width of its opening.
+const PLACEMENTS: usize = 9;
+
+/// Width of the bins in which the surface is gathered along the closing axis, metres. Finer ones
+/// stay empty at the samples' spacing of 2.5 mm.
+const BIN: f64 = 1.5e-3;
+
+/// The push stops this far from contact (metres): the samples may miss what stands out between them.
+const PUSH_GAP: f64 = 2e-3;
+
+/// Reusable memory, and what all seeds share.
+pub(crate) struct Gpg<'a> {
+    object: &'a GraspObject,
+    hand: &'a Hand,
+    points: Vec<DVec3>,
+    /// For each bin along the closing axis, the least z of the surface in it.
+    first: Vec<f64>,
+}
+
+impl<'a> Gpg<'a> {
+    pub(crate) fn new(object: &'a GraspObject, hand: &'a Hand) -> Self {
+        Self { object, hand, points: Vec::new(), first: Vec::new() }
+    }
+
+    /// Adds the placements around `seed`; returns whether there were any.
+    pub(crate) fn grow(&mut self, seed: &Seed, out: &mut Vec<Candidate>) -> bool {
+        let before = out.len();
+        let reach = self.hand.reach();
+        let depth = reach.tip - reach.palm;
+        let samples = self.object.samples();
+        let radius = (2.0 * reach.outer).hypot(depth);
+        self.points.clear();
+        self.points.extend(
+            samples
+                .tree
+                .points_within(seed.point, radius)
+                .map(|i| samples.points[i as usize] - seed.point),
+        );
+        let Some((normal, axis)) = self.darboux(seed) else { return false };
+        let sides: &[f64] = if self.object.is_signed() { &[1.0] } else { &[1.0, -1.0] };
+        for side in sides {
+            let approach = -normal * side;
+            for turn in 0..TURNS {
+                let about = DQuat::from_axis_angle(approach, PI * turn as f64 / TURNS as f64);
+                let closing = about * approach.cross(axis).normalize();
+                for tilt in TILTS {
+                    let tilted = DQuat::from_axis_angle(closing, tilt) * approach;
+                    self.place(seed, &rotation(closing, tilted), out);
+                }
+            }
+        }
+        out.len() > before
+    }
+
+    /// The normal at the seed and the direction in which normals around it change least (the axis of
+    /// a cylinder): eigenvectors of Σ n nᵀ over a neighbourhood as wide as a finger.
+    fn darboux(&self, seed: &Seed) -> Option<(DVec3, DVec3)> {
+        let samples = self.object.samples();
+        let mut spread = DMat3::ZERO;
+        let radius = 0.5 * self.hand.reach().finger_width;
+        for i in samples.tree.points_within(seed.point, radius) {
+            let n = samples.normals[i as usize];
+            spread += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+        }
+        let trace = spread.x_axis.x + spread.y_axis.y + spread.z_axis.z;
+        if trace <= 0.0 {
+            let normal = seed.normal.try_normalize()?;
+            return Some((normal, normal.any_orthonormal_vector()));
+        }
+        let frame = DSymmetricEigen3::new(spread * (1.0 / trace)).eigenvectors;
+        let mut normal = frame.z_axis.try_normalize()?;
+        if normal.dot(seed.normal) < 0.0 {
+            normal = -normal;
+        }
+        let axis = frame.x_axis.reject_from_normalized(normal);
+        Some((normal, axis.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())))
+    }
+
+    /// Slides the open hand along its closing axis and pushes it forward at each place.
+    fn place(&mut self, seed: &Seed, turn: &Rotation, out: &mut Vec<Candidate>) {
+        let reach = self.hand.reach();
+        let opening = *self.hand.opening().end();
+        let span = opening / 2.0 + reach.outer; // the farthest a finger gets
+        self.gather(turn, span, reach);
+        let bin = |y: f64| (((y + span) / BIN).max(0.0) as usize).min(self.first.len() - 1);
+        let least = |from: f64, to: f64| {
+            self.first[bin(from)..=bin(to)].iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let bite = INITIAL_BITE * self.hand.pad()[1];
+        let mut last = None;
+        for k in 0..PLACEMENTS {
+            let offset = opening * ((k as f64 + 0.5) / PLACEMENTS as f64 - 0.5);
+            let (left, right) = (offset - opening / 2.0, offset + opening / 2.0);
+            let fingers = least(left - reach.finger_thickness, left - BIN)
+                .min(least(right + BIN, right + reach.finger_thickness));
+            let front = least(left, right);
+            // Pushed until a fingertip touches beside, or the palm in front.
+            let tip = (fingers - PUSH_GAP).min(front + reach.tip - reach.palm - PUSH_GAP);
+            if !(front.is_finite() && tip - front >= bite) {
+                continue;
+            }
+            let inside: Vec<usize> =
+                (bin(left)..=bin(right)).filter(|&i| self.first[i] < tip).collect();
+            let (Some(&low), Some(&high)) = (inside.first(), inside.last()) else { continue };
+            if last.replace((low, high)) == Some((low, high)) {
+                continue;
+            }
+            let held = [low as f64 * BIN - span, (high + 1) as f64 * BIN - span];
+            // Deepest, and with the pads just filled.
+            let shallow = (front + (reach.tip + self.hand.pad()[1] / 2.0)).min(tip);
+            for tip in [Some(tip), (tip - shallow > bite).then_some(shallow)].into_iter().flatten()
+            {
+                let place = seed.point + *turn * (DVec3::Z * (tip - reach.tip));
+                out.push(Candidate { tcp: Pose::from_parts(place, *turn), seed: shrunk(held) });
+            }
+        }
+    }
+
+    fn gather(&mut self, turn: &Rotation, span: f64, reach: HandReach) {
+        self.first.clear();
+        self.first.resize((2.0 * span / BIN) as usize + 2, f64::INFINITY);
+        let back = DMat3::from_quat(turn.inverse());
+        let half_width = reach.finger_width / 2.0;
+        let (across, along, ahead) = (back.row(0), back.row(1), back.row(2));
+        for p in &self.points {
+            let y = along.dot(*p);
+            if across.dot(*p).abs() <= half_width && y.abs() < span {
+                let i = ((y + span) / BIN) as usize;
+                self.first[i] = self.first[i].min(ahead.dot(*p));
+            }
+        }
+    }
+}
+
+/// An interval of bins says more than it knows: the seed is the part that is surely held.
+fn shrunk([low, high]: [f64; 2]) -> [f64; 2] {
+    let middle = (low + high) / 2.0;
+    [(low + BIN).min(middle), (high - BIN).max(middle)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand::BoxHand;
+    use crate::object::Region;
+    use crate::test_shapes::cylinder;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_frame_on_a_cylinder_knows_normal_and_axis() {
+        let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
+        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let gpg = Gpg::new(&object, &hand);
+        let seed = Seed { point: DVec3::X * 0.02, normal: DVec3::X, item: 0 };
+        let (normal, axis) = gpg.darboux(&seed).unwrap();
+        assert!(normal.x > 0.99 && axis.z.abs() > 0.99, "{normal} {axis}");
+    }
+
+    #[test]
+    fn hands_are_pushed_until_they_hold_the_cylinder() {
+        let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
+        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut candidates = Vec::new();
+        let mut gpg = Gpg::new(&object, &hand);
+        let grown =
+            (0..20).filter(|_| gpg.grow(&region.draw(&object, &mut rng), &mut candidates)).count();
+        assert!(grown > 15, "{grown} of 20 seeds grew");
+        let across = candidates.iter().filter(|c| {
+            let axis = c.tcp.rotation * DVec3::Y;
+            axis.z.abs() < 0.2 && (c.seed[1] - c.seed[0] - 0.04).abs() < 0.008
+        });
+        assert!(across.count() > 20);
+    }
+}

@@ -1,0 +1,416 @@
+//! What is to be grasped: a mesh or a point cloud in metres, made ready for many questions.
+
+use std::fmt;
+
+use parry3d_f64::glamx::DSymmetricEigen3;
+use rand::{Rng, RngExt};
+use semfm_geom::connectivity::{MeshReport, components};
+use semfm_geom::math::{DMat3, DVec3};
+use semfm_geom::sampling::sample_uniform;
+use semfm_geom::{Mesh, PointIndex};
+
+use crate::obstacle::Obstacle;
+use crate::settings::direction;
+use crate::{Error, Result};
+
+/// Distance between the samples that stand for a mesh where candidates are grown, metres: a tenth
+/// of a finger's width, so that no finger slips through; 1.25 mm costs four times as much and finds
+/// no more grasps.
+const SAMPLE_SPACING: f64 = 2.5e-3;
+
+/// Bounds on the number of those samples: enough for a pin, not too many for a car.
+const SAMPLE_COUNTS: (f64, f64) = (1000.0, 40_000.0);
+
+/// Neighbours of a point that its normal is fitted to.
+const NORMAL_NEIGHBOURS: usize = 16;
+
+/// An object in metres, prepared once for any number of regions, grippers and scenes.
+///
+/// Nothing is asked of a mesh: components, holes, non-manifold edges and faces wound any way are
+/// allowed. Where it is watertight and wound consistently, its inside is known and used.
+pub struct GraspObject {
+    surface: Surface,
+    obstacle: Obstacle,
+    samples: Samples,
+    /// Whether normals are known to point outwards.
+    signed: bool,
+    centre_of_mass: DVec3,
+    radius: f64,
+}
+
+/// The surface itself.
+pub(crate) enum Surface {
+    /// Triangles with their outward unit normals (zero for a degenerate one).
+    Mesh { mesh: Mesh, normals: Vec<DVec3> },
+    /// Points with unit normals, and the area that each stands for.
+    Cloud { points: Vec<DVec3>, normals: Vec<DVec3>, area: f64, spacing: f64 },
+}
+
+/// Points spread over the surface, with normals, for the growth of candidates.
+pub(crate) struct Samples {
+    pub(crate) points: Vec<DVec3>,
+    pub(crate) normals: Vec<DVec3>,
+    pub(crate) tree: Obstacle,
+}
+
+impl GraspObject {
+    /// An object from a mesh in any unit; `scale` makes metres of it.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a scale that is not positive; an error of the ground floor for a
+    /// mesh without area.
+    pub fn from_mesh(mesh: &Mesh, scale: f64) -> Result<Self> {
+        if !(scale > 0.0 && scale.is_finite()) {
+            let expected = "a positive number of metres for a unit of the mesh".into();
+            return Err(Error::OutOfRange { what: "scale", expected, found: scale.to_string() });
+        }
+        let vertices = mesh.vertices().iter().map(|&p| p * scale).collect();
+        let mesh = Mesh::new(vertices, mesh.faces().to_vec())?;
+        let report = MeshReport::new(&mesh);
+        let signed = report.watertight && report.oriented;
+        let outward = if signed { outward_signs(&mesh) } else { vec![1.0; mesh.n_faces()] };
+        let normals: Vec<DVec3> = (0..mesh.n_faces())
+            .map(|face| mesh.face_normal_scaled(face).normalize_or_zero() * outward[face])
+            .collect();
+        let wanted = mesh.area() / (SAMPLE_SPACING * SAMPLE_SPACING);
+        let n_samples = wanted.clamp(SAMPLE_COUNTS.0, SAMPLE_COUNTS.1) as usize;
+        let (points, sample_normals) = sample_uniform(&mesh, n_samples, 0)?
+            .iter()
+            .map(|sample| (sample.point, normals[sample.face as usize]))
+            .unzip();
+        let samples = Samples::new(points, sample_normals);
+        let centre_of_mass = centre_of_mass(&mesh, signed.then_some(&outward));
+        Ok(Self {
+            radius: radius(mesh.vertices(), centre_of_mass),
+            obstacle: Obstacle::of_mesh(&mesh),
+            surface: Surface::Mesh { mesh, normals },
+            samples,
+            signed,
+            centre_of_mass,
+        })
+    }
+
+    /// An object from surface points in metres. Normals (one per point, any length) are estimated
+    /// where absent, and turned towards `viewpoint` where one is given; otherwise their sign is
+    /// taken for unknown.
+    ///
+    /// A cloud that shows one side of an object only says nothing of the other: a hand may run into
+    /// what was not seen. Complete it first, or put the unseen into the scene.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for fewer than 3 points, for a wrong number of normals and for numbers
+    /// that are not finite.
+    pub fn from_cloud(
+        points: &[DVec3],
+        normals: Option<&[DVec3]>,
+        viewpoint: Option<DVec3>,
+    ) -> Result<Self> {
+        let bad = |what, expected: &str, found: String| {
+            Err(Error::OutOfRange { what, expected: expected.into(), found })
+        };
+        if points.len() < 3 {
+            return bad("points of the cloud", "at least 3", points.len().to_string());
+        }
+        if normals.is_some_and(|normals| normals.len() != points.len()) {
+            let found = normals.map_or(0, <[DVec3]>::len).to_string();
+            return bad("normals of the cloud", "one for each point", found);
+        }
+        if let Some(eye) = viewpoint.filter(|eye| !eye.is_finite()) {
+            return bad("viewpoint", "finite coordinates", eye.to_string());
+        }
+        for &normal in normals.unwrap_or_default() {
+            direction("normal of the cloud", normal)?;
+        }
+        let index = PointIndex::new(points)?;
+        let spacing = median_spacing(points, &index);
+        let mut normals: Vec<DVec3> = match normals {
+            Some(given) => given.iter().map(|n| n.normalize_or_zero()).collect(),
+            None => points.iter().map(|&p| fitted_normal(points, &index, p)).collect(),
+        };
+        if let Some(eye) = viewpoint {
+            for (normal, &p) in normals.iter_mut().zip(points) {
+                *normal *= if normal.dot(eye - p) < 0.0 { -1.0 } else { 1.0 };
+            }
+        }
+        let centre_of_mass = points.iter().sum::<DVec3>() / points.len() as f64;
+        Ok(Self {
+            radius: radius(points, centre_of_mass),
+            obstacle: Obstacle::of_points(points.to_vec(), 0.0),
+            samples: Samples::new(points.to_vec(), normals.clone()),
+            surface: Surface::Cloud {
+                points: points.to_vec(),
+                normals,
+                // Points at distance s on a hexagonal lattice stand for √3/2 s² each.
+                area: 0.866 * spacing * spacing,
+                spacing,
+            },
+            signed: viewpoint.is_some(),
+            centre_of_mass,
+        })
+    }
+
+    /// Number of vertices or points: a region has one weight for each.
+    pub fn n_weights(&self) -> usize {
+        match &self.surface {
+            Surface::Mesh { mesh, .. } => mesh.n_vertices(),
+            Surface::Cloud { points, .. } => points.len(),
+        }
+    }
+
+    /// Centre of the volume where the mesh is watertight, otherwise of the area, or of the points.
+    pub fn centre_of_mass(&self) -> DVec3 {
+        self.centre_of_mass
+    }
+
+    /// Distance from the centre of mass to the farthest vertex or point, metres.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    pub(crate) fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    pub(crate) fn obstacle(&self) -> &Obstacle {
+        &self.obstacle
+    }
+
+    pub(crate) fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    pub(crate) fn is_signed(&self) -> bool {
+        self.signed
+    }
+}
+
+impl fmt::Debug for GraspObject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GraspObject")
+            .field("n_weights", &self.n_weights())
+            .field("n_samples", &self.samples.points.len())
+            .field("signed", &self.signed)
+            .field("centre_of_mass", &self.centre_of_mass)
+            .field("radius", &self.radius)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Samples {
+    fn new(points: Vec<DVec3>, normals: Vec<DVec3>) -> Self {
+        let tree = Obstacle::of_points(points.clone(), 0.0);
+        Self { points, normals, tree }
+    }
+}
+
+/// A region on an object: a weight in [0, 1] for each vertex or point, and where to draw seeds.
+pub(crate) struct Region {
+    weights: Vec<f64>,
+    /// Running sums of area times weight over faces or points.
+    cumulative: Vec<f64>,
+}
+
+/// A point of the region: where, the outward normal, and the triangle or point it lies on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seed {
+    pub(crate) point: DVec3,
+    pub(crate) normal: DVec3,
+    pub(crate) item: u32,
+}
+
+impl Region {
+    /// Checks the weights and divides them by the largest.
+    pub(crate) fn new(object: &GraspObject, weights: &[f64]) -> Result<Self> {
+        let bad = |expected: String, found: String| {
+            Err(Error::OutOfRange { what: "weights of the region", expected, found })
+        };
+        if weights.len() != object.n_weights() {
+            let expected = format!("one for each of {} vertices or points", object.n_weights());
+            return bad(expected, weights.len().to_string());
+        }
+        if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
+            return bad("finite numbers of at least 0".into(), format!("{} at {i}", weights[i]));
+        }
+        let most = weights.iter().fold(0.0f64, |most, &w| most.max(w));
+        if most <= 0.0 {
+            return bad("at least one above 0".into(), "only zeros".into());
+        }
+        let weights: Vec<f64> = weights.iter().map(|w| w / most).collect();
+        let mut total = 0.0;
+        let mut add = |mass: f64| {
+            total += mass;
+            total
+        };
+        let cumulative: Vec<f64> = match &object.surface {
+            Surface::Mesh { mesh, .. } => (0..mesh.n_faces())
+                .map(|face| {
+                    let mean = mesh.faces()[face].iter().map(|&v| weights[v as usize]).sum::<f64>();
+                    add(mesh.face_area(face) * mean / 3.0)
+                })
+                .collect(),
+            Surface::Cloud { .. } => weights.iter().map(|&w| add(w)).collect(),
+        };
+        if !(total > 0.0 && total.is_finite()) {
+            return bad("a region with an area".into(), format!("area times weight {total}"));
+        }
+        Ok(Self { weights, cumulative })
+    }
+
+    /// Weight (0 to 1) of a vertex or point.
+    pub(crate) fn weight(&self, id: usize) -> f64 {
+        self.weights[id]
+    }
+
+    /// A point of the region: triangles or points by area times weight, uniform within.
+    pub(crate) fn draw(&self, object: &GraspObject, rng: &mut impl Rng) -> Seed {
+        let total = self.cumulative[self.cumulative.len() - 1];
+        let pick = rng.random::<f64>() * total;
+        let item = self.cumulative.partition_point(|&sum| sum <= pick);
+        let item = item.min(self.cumulative.len() - 1);
+        match &object.surface {
+            Surface::Mesh { mesh, normals } => {
+                let [a, b, c] = mesh.corners(item);
+                let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
+                let point = (1.0 - u) * a + u * (1.0 - v) * b + u * v * c;
+                Seed { point, normal: normals[item], item: item as u32 }
+            }
+            Surface::Cloud { points, normals, .. } => {
+                Seed { point: points[item], normal: normals[item], item: item as u32 }
+            }
+        }
+    }
+}
+
+/// +1 or -1 for each face: the sign of the volume that its component bounds, so that a component
+/// wound inside out is turned.
+fn outward_signs(mesh: &Mesh) -> Vec<f64> {
+    let parts = components(mesh);
+    let mut volumes = vec![0.0; parts.count];
+    let part_of = |face: usize| parts.of_vertex[mesh.faces()[face][0] as usize] as usize;
+    let (origin, _) = mesh.bounds();
+    for face in 0..mesh.n_faces() {
+        volumes[part_of(face)] += cone_volume(mesh, face, origin);
+    }
+    (0..mesh.n_faces()).map(|face| if volumes[part_of(face)] < 0.0 { -1.0 } else { 1.0 }).collect()
+}
+
+/// Signed volume of the cone from `apex` over a face.
+fn cone_volume(mesh: &Mesh, face: usize, apex: DVec3) -> f64 {
+    let [a, b, c] = mesh.corners(face).map(|p| p - apex);
+    a.dot(b.cross(c)) / 6.0
+}
+
+/// Centroid of the volume where the outward signs are known, otherwise of the area.
+fn centre_of_mass(mesh: &Mesh, outward: Option<&Vec<f64>>) -> DVec3 {
+    let (origin, _) = mesh.bounds();
+    if let Some(signs) = outward {
+        let (mut sum, mut volume) = (DVec3::ZERO, 0.0);
+        for (face, sign) in signs.iter().enumerate() {
+            let cone = sign * cone_volume(mesh, face, origin);
+            let [a, b, c] = mesh.corners(face);
+            sum += cone * (a + b + c + origin) / 4.0;
+            volume += cone;
+        }
+        if volume > 1e-12 * mesh.diagonal().powi(3) {
+            return sum / volume;
+        }
+    }
+    let weighted = (0..mesh.n_faces()).map(|face| {
+        let [a, b, c] = mesh.corners(face);
+        mesh.face_area(face) * (a + b + c) / 3.0
+    });
+    weighted.sum::<DVec3>() / mesh.area()
+}
+
+fn radius(points: &[DVec3], centre: DVec3) -> f64 {
+    points.iter().map(|p| p.distance(centre)).fold(1e-6, f64::max)
+}
+
+/// Median distance from a point to its nearest neighbour, over at most 2000 of the points.
+fn median_spacing(points: &[DVec3], index: &PointIndex) -> f64 {
+    let step = points.len().div_ceil(2000);
+    let nearest = |p: &DVec3| index.k_nearest(*p, 2).get(1).map_or(0.0, |hit| hit.1);
+    let mut distances: Vec<f64> = points.iter().step_by(step).map(nearest).collect();
+    distances.sort_by(f64::total_cmp);
+    distances[distances.len() / 2].max(1e-6)
+}
+
+/// Direction of least spread among a point's neighbours; its sign means nothing.
+fn fitted_normal(points: &[DVec3], index: &PointIndex, p: DVec3) -> DVec3 {
+    let near = index.k_nearest(p, NORMAL_NEIGHBOURS);
+    let mean = near.iter().map(|hit| points[hit.0]).sum::<DVec3>() / near.len() as f64;
+    let mut spread = DMat3::ZERO;
+    for &(i, _) in &near {
+        let d = points[i] - mean;
+        spread += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    }
+    // Scaled to unit trace: the solver's own tolerances are absolute.
+    let trace = spread.x_axis.x + spread.y_axis.y + spread.z_axis.z;
+    if trace <= 0.0 {
+        return DVec3::Z;
+    }
+    DSymmetricEigen3::new(spread * (1.0 / trace))
+        .eigenvectors
+        .x_axis
+        .try_normalize()
+        .unwrap_or(DVec3::Z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::zoo;
+
+    #[test]
+    fn normals_of_a_closed_mesh_point_outwards_whatever_its_winding() {
+        let sphere = zoo::icosphere(2);
+        let flipped: Vec<[u32; 3]> = sphere.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
+        for mesh in [sphere.clone(), Mesh::new(sphere.vertices().to_vec(), flipped).unwrap()] {
+            let object = GraspObject::from_mesh(&mesh, 0.1).unwrap();
+            assert!(object.is_signed());
+            let samples = object.samples();
+            for (p, n) in samples.points.iter().zip(&samples.normals) {
+                assert!(p.dot(*n) > 0.0);
+            }
+            assert!(object.centre_of_mass().length() < 1e-12);
+            assert!((object.radius() - 0.1).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_cloud_gets_normals_that_face_the_eye() {
+        let sphere = zoo::icosphere(3);
+        let eye = DVec3::new(0.0, 0.0, 4.0);
+        let seen: Vec<DVec3> =
+            sphere.vertices().iter().copied().filter(|p| p.z > 0.3).map(|p| p * 0.1).collect();
+        let object = GraspObject::from_cloud(&seen, None, Some(eye)).unwrap();
+        for (p, n) in object.samples().points.iter().zip(&object.samples().normals) {
+            assert!(n.dot(p.normalize()) > 0.9, "{p}: {n}");
+        }
+    }
+
+    #[test]
+    fn seeds_fall_where_the_weights_are() {
+        let mesh = zoo::icosphere(3);
+        let object = GraspObject::from_mesh(&mesh, 0.05).unwrap();
+        let top: Vec<f64> =
+            mesh.vertices().iter().map(|p| f64::from(u8::from(p.z > 0.5)) * 7.0).collect();
+        let region = Region::new(&object, &top).unwrap();
+        let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
+        for _ in 0..200 {
+            assert!(region.draw(&object, &mut rng).point.z > 0.05 * 0.35);
+        }
+        for bad in [vec![0.0; mesh.n_vertices()], vec![1.0; 3], vec![f64::NAN; mesh.n_vertices()]] {
+            assert!(Region::new(&object, &bad).is_err());
+        }
+    }
+
+    #[test]
+    fn what_is_no_object_is_refused() {
+        assert!(GraspObject::from_mesh(&zoo::icosphere(1), 0.0).is_err());
+        assert!(GraspObject::from_cloud(&[DVec3::ZERO], None, None).is_err());
+        let points = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert!(GraspObject::from_cloud(&points, Some(&[DVec3::Z]), None).is_err());
+        assert!(GraspObject::from_cloud(&[DVec3::NAN, DVec3::X, DVec3::Y], None, None).is_err());
+    }
+}

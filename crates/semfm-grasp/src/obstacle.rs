@@ -1,0 +1,224 @@
+//! What a hand must not run into: triangles or points under a tree of boxes.
+
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use semfm_geom::Mesh;
+use semfm_geom::connectivity::MeshReport;
+use semfm_geom::math::DVec3;
+
+use crate::solid::Solid;
+
+/// Directions of the rays that decide between inside and outside: none lies along an axis or a
+/// diagonal, where objects made by people have their edges.
+const INSIDE_RAYS: [DVec3; 3] = [
+    DVec3::new(0.5377, 0.2713, 0.7983),
+    DVec3::new(-0.7071, 0.6123, -0.3536),
+    DVec3::new(0.1736, -0.9397, 0.2949),
+];
+
+/// A surface of triangles or a set of points with a radius.
+pub(crate) struct Obstacle {
+    items: Items,
+    tree: Bvh,
+    /// Whether the triangles bound a volume, so that a body can be inside without touching.
+    closed: bool,
+}
+
+enum Items {
+    Triangles(Vec<[DVec3; 3]>),
+    Points { points: Vec<DVec3>, radius: f64 },
+}
+
+impl Obstacle {
+    /// All triangles of a mesh, degenerate ones too: a collision is with the mesh as it stands.
+    pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
+        let triangles: Vec<[DVec3; 3]> =
+            (0..mesh.n_faces()).map(|face| mesh.corners(face)).collect();
+        let boxes: Vec<Aabb> = triangles
+            .iter()
+            .map(|&[a, b, c]| Aabb::new(a.min(b).min(c), a.max(b).max(c)))
+            .collect();
+        let closed = MeshReport::new(mesh).watertight;
+        Self { items: Items::Triangles(triangles), tree: tree(&boxes), closed }
+    }
+
+    /// Balls of one radius around points (at least one).
+    pub(crate) fn of_points(points: Vec<DVec3>, radius: f64) -> Self {
+        let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb::new(p, p)).collect();
+        Self { tree: tree(&boxes), items: Items::Points { points, radius }, closed: false }
+    }
+
+    /// Whether `solid`, grown by `margin`, touches anything.
+    pub(crate) fn meets(&self, solid: &Solid, margin: f64) -> bool {
+        match &self.items {
+            Items::Triangles(triangles) => self
+                .near(solid, margin)
+                .any(|i| solid.meets_triangle(&triangles[i as usize], margin)),
+            Items::Points { points, radius } => self
+                .near(solid, margin + radius)
+                .any(|i| solid.meets_point(points[i as usize], margin + radius)),
+        }
+    }
+
+    /// Distance between `solid` and the nearest item, at most `cap`.
+    pub(crate) fn distance(&self, solid: &Solid, cap: f64) -> f64 {
+        let mut least = cap;
+        match &self.items {
+            Items::Triangles(triangles) => {
+                for i in self.near(solid, cap) {
+                    let corners = &triangles[i as usize];
+                    if solid.meets_triangle_box(corners, least) {
+                        least = solid.distance(corners, least).min(least);
+                    }
+                }
+            }
+            Items::Points { points, radius } => {
+                for i in self.near(solid, cap + radius) {
+                    let p = points[i as usize];
+                    least = least.min((solid.distance(&[p; 3], least + radius) - radius).max(0.0));
+                }
+            }
+        }
+        least
+    }
+
+    /// Ids of the items whose boxes come near the box of `solid` grown by `margin`.
+    pub(crate) fn near<'a>(
+        &'a self,
+        solid: &'a Solid,
+        margin: f64,
+    ) -> impl Iterator<Item = u32> + 'a {
+        self.tree.leaves(move |node: &BvhNode| solid.near_box(node.mins(), node.maxs(), margin))
+    }
+
+    /// Ids of the points within `radius` of `centre`, in the order of the tree.
+    pub(crate) fn points_within(
+        &self,
+        centre: DVec3,
+        radius: f64,
+    ) -> impl Iterator<Item = u32> + '_ {
+        let reach = radius * radius;
+        let inside = move |node: &BvhNode| {
+            let outside = (node.mins() - centre).max(centre - node.maxs()).max(DVec3::ZERO);
+            outside.length_squared() <= reach
+        };
+        self.tree.leaves(inside)
+    }
+
+    /// Where the line `origin + t · direction`, t in (`near`, `far`), crosses triangles: t and the
+    /// triangle's id, by t. Points have no crossings.
+    pub(crate) fn crossings(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        near: f64,
+        far: f64,
+    ) -> Vec<(f64, u32)> {
+        let Items::Triangles(triangles) = &self.items else { return Vec::new() };
+        let slab = |node: &BvhNode| {
+            let (low, high) =
+                ((node.mins() - origin) / direction, (node.maxs() - origin) / direction);
+            // A direction with a zero makes infinities (right) or, on a face of the box, NaN, which
+            // min and max of f64 leave out.
+            let (enter, leave) = (0..3).fold((near, far), |(enter, leave), axis| {
+                let (a, b) = (low[axis], high[axis]);
+                (enter.max(a.min(b)), leave.min(a.max(b)))
+            });
+            enter <= leave + 1e-12
+        };
+        let mut hits: Vec<(f64, u32)> = self
+            .tree
+            .leaves(slab)
+            .filter_map(|i| Some((crossing(&triangles[i as usize], origin, direction)?, i)))
+            .filter(|&(t, _)| t > near && t < far)
+            .collect();
+        hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        hits
+    }
+
+    /// Whether a closed surface encloses the point, by a majority of three rays; an open surface
+    /// encloses nothing.
+    pub(crate) fn encloses(&self, point: DVec3) -> bool {
+        let bounds = self.tree.root_aabb();
+        if !self.closed || point.cmplt(bounds.mins).any() || point.cmpgt(bounds.maxs).any() {
+            return false;
+        }
+        let odd = |ray: &&DVec3| self.crossings(point, **ray, 0.0, f64::MAX).len() % 2 == 1;
+        INSIDE_RAYS.iter().filter(odd).count() >= 2
+    }
+}
+
+impl Solid {
+    fn meets_triangle_box(&self, corners: &[DVec3; 3], margin: f64) -> bool {
+        let [a, b, c] = *corners;
+        self.near_box(a.min(b).min(c), a.max(b).max(c), margin)
+    }
+}
+
+fn tree(boxes: &[Aabb]) -> Bvh {
+    Bvh::from_leaves(BvhBuildStrategy::Binned, boxes)
+}
+
+/// Möller & Trumbore (Fast, Minimum Storage Ray/Triangle Intersection, 1997), both sides.
+fn crossing(&[a, b, c]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let s = origin - a;
+    let u = s.dot(p) / determinant;
+    let q = s.cross(ab);
+    let v = direction.dot(q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| ac.dot(q) / determinant)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parry3d_f64::math::Pose;
+    use semfm_geom::zoo;
+
+    fn cube(centre: DVec3, half: f64) -> Solid {
+        Solid::oriented_box(Pose::new(centre, DVec3::new(0.3, 0.2, 0.9)), DVec3::splat(half))
+    }
+
+    #[test]
+    fn the_tree_answers_as_a_full_search_does() {
+        for (name, mesh) in zoo::all() {
+            let obstacle = Obstacle::of_mesh(&mesh);
+            let (centre, radius) = mesh.bounding_sphere();
+            for i in 0..60 {
+                let t = f64::from(i);
+                let at = centre + radius * DVec3::new(t.sin(), (1.7 * t).cos(), (2.9 * t).sin());
+                let solid = cube(at, 0.15 * radius);
+                let hit = (0..mesh.n_faces()).any(|f| solid.meets_triangle(&mesh.corners(f), 0.0));
+                assert_eq!(obstacle.meets(&solid, 0.0), hit, "{name} {i}");
+                let cap = 0.5 * radius;
+                let least = (0..mesh.n_faces())
+                    .map(|f| solid.distance(&mesh.corners(f), cap))
+                    .fold(cap, f64::min);
+                let found = obstacle.distance(&solid, cap);
+                assert!((found - least).abs() < 1e-9, "{name} {i}: {found} instead of {least}");
+            }
+        }
+    }
+
+    #[test]
+    fn inside_and_outside_of_closed_and_open_surfaces() {
+        let sphere = Obstacle::of_mesh(&zoo::icosphere(2));
+        assert!(sphere.encloses(DVec3::new(0.1, -0.3, 0.2)) && !sphere.encloses(DVec3::ONE));
+        assert_eq!(sphere.crossings(DVec3::new(-3.0, 0.01, 0.02), DVec3::X, 0.0, 9.0).len(), 2);
+        let open = Obstacle::of_mesh(&zoo::open_grid(5, 5));
+        assert!(!open.encloses(DVec3::new(0.5, 0.5, 0.1)));
+    }
+
+    #[test]
+    fn points_keep_their_distance() {
+        let cloud = Obstacle::of_points(vec![DVec3::ZERO, DVec3::X], 0.1);
+        let solid = Solid::oriented_box(Pose::from_translation(0.5 * DVec3::Z), DVec3::splat(0.3));
+        assert!(!cloud.meets(&solid, 0.0) && cloud.meets(&solid, 0.11));
+        assert!((cloud.distance(&solid, 1.0) - 0.1).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,162 @@
+//! Why candidates were refused, and the one that came nearest.
+
+use crate::grasp::Grasp;
+
+/// Why a candidate is no grasp, in the order in which candidates are examined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Reason {
+    /// No opposite surface, or nothing between the pads.
+    NoContact,
+    /// The approach lies outside the asked cone (radians beyond it).
+    Approach,
+    /// Wider or narrower than the hand or the limit allows (metres beyond it).
+    Width,
+    /// The hand would be in the table, or nearer to it than asked (metres too near).
+    Table,
+    /// Too little of a pad touches the region (share missing).
+    Region,
+    /// Too little of a pad touches at all (share missing).
+    Contact,
+    /// The line between the contacts leaves a friction cone (radians beyond it).
+    ForceClosure,
+    /// The hand runs into the object where it grasps (metres to back off until it is free).
+    Collision,
+    /// The open hand hits the object or the scene on its way in (metres to back off).
+    ApproachPath,
+    /// A finger hits something before its pad touches (metres to back off).
+    Closing,
+    /// The hand runs into the scene where it grasps (metres to back off).
+    Scene,
+    /// The hand would be inside of something solid (metres to back off).
+    Inside,
+    /// The open hand is nearer to something than asked (metres too near).
+    Clearance,
+}
+
+impl Reason {
+    /// Every reason, in the order of examination.
+    pub const ALL: [Self; 13] = [
+        Self::NoContact,
+        Self::Approach,
+        Self::Width,
+        Self::Table,
+        Self::Region,
+        Self::Contact,
+        Self::ForceClosure,
+        Self::Collision,
+        Self::ApproachPath,
+        Self::Closing,
+        Self::Scene,
+        Self::Inside,
+        Self::Clearance,
+    ];
+
+    /// Its name in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoContact => "no_contact",
+            Self::Approach => "approach",
+            Self::Width => "width",
+            Self::Table => "table",
+            Self::Region => "region",
+            Self::Contact => "contact",
+            Self::ForceClosure => "force_closure",
+            Self::Collision => "collision",
+            Self::ApproachPath => "approach_path",
+            Self::Closing => "closing",
+            Self::Scene => "scene",
+            Self::Inside => "inside",
+            Self::Clearance => "clearance",
+        }
+    }
+
+    /// Unit of the amount by which a candidate failed: `m`, `rad` or `share`.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Approach | Self::ForceClosure => "rad",
+            Self::Region | Self::Contact => "share",
+            _ => "m",
+        }
+    }
+
+    /// One line for a person.
+    pub fn explanation(self) -> &'static str {
+        match self {
+            Self::NoContact => "no opposite surface, or nothing between the pads",
+            Self::Approach => "the approach lies outside the asked cone",
+            Self::Width => "wider or narrower than the hand or the limit allows",
+            Self::Table => "the hand would be in the table or too near to it",
+            Self::Region => "too little of a pad lies in the region",
+            Self::Contact => "too little of a pad touches",
+            Self::ForceClosure => "the contacts would slip at this friction",
+            Self::Collision => "the hand runs into the object where it grasps",
+            Self::ApproachPath => "the open hand hits something on its way in",
+            Self::Closing => "a finger hits something before its pad touches",
+            Self::Scene => "the hand runs into the scene where it grasps",
+            Self::Inside => "the hand would be inside of something solid",
+            Self::Clearance => "the open hand is nearer to something than asked",
+        }
+    }
+}
+
+/// A refused candidate: what it failed, and by how much.
+#[derive(Clone, Debug)]
+pub struct Miss {
+    /// The first thing that it failed.
+    pub reason: Reason,
+    /// By how much, in the unit of the reason.
+    pub by: f64,
+    /// The candidate; what comes after the failed stage is zero, its score included.
+    pub grasp: Grasp,
+}
+
+/// How many candidates failed at each stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rejected {
+    counts: [usize; Reason::ALL.len()],
+}
+
+impl Rejected {
+    /// Candidates refused for `reason`.
+    pub fn count(&self, reason: Reason) -> usize {
+        self.counts[reason as usize]
+    }
+
+    /// Candidates refused in all.
+    pub fn total(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// Reasons that occurred, with their counts, in the order of examination.
+    pub fn iter(&self) -> impl Iterator<Item = (Reason, usize)> + '_ {
+        Reason::ALL.into_iter().map(|reason| (reason, self.count(reason))).filter(|row| row.1 > 0)
+    }
+
+    pub(crate) fn add(&mut self, reason: Reason) {
+        self.counts[reason as usize] += 1;
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, count)| *sum += count);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_are_numbered_and_named_once() {
+        let mut names = std::collections::BTreeSet::new();
+        for (i, reason) in Reason::ALL.into_iter().enumerate() {
+            assert_eq!(reason as usize, i);
+            assert!(names.insert(reason.name()));
+        }
+        let mut counts = Rejected::default();
+        counts.add(Reason::Width);
+        counts.merge(&counts.clone());
+        assert_eq!(counts.iter().collect::<Vec<_>>(), [(Reason::Width, 2)]);
+        assert_eq!(counts.total(), 2);
+    }
+}

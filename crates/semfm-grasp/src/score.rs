@@ -1,0 +1,178 @@
+//! How good a grasp is, in named terms.
+
+use semfm_geom::math::DVec3;
+
+use crate::closure::{SoftContact, ferrari_canny};
+use crate::collision::{FAR, Fit};
+use crate::contact::Closing;
+use crate::hand::Hand;
+use crate::object::GraspObject;
+use crate::settings::GraspSettings;
+
+/// A patch of this share of the pad counts as full contact: a cylinder of 2 cm radius gives .8 of a
+/// pad of 18 mm, a ball of 2 cm .6.
+const FULL_CONTACT: f64 = 0.6;
+
+/// Turns measurements of a grasp into terms in [0, 1] and their weighted mean.
+///
+/// | term | 1 | 0 |
+/// | --- | --- | --- |
+/// | `contact` | the smaller patch covers 60 % of its pad or more | nothing touches |
+/// | `friction` | the contacts oppose each other exactly | at the edge of a friction cone |
+/// | `epsilon` | ε of two full pads around the centre of mass | no force closure |
+/// | `gravity` | the weight does not turn the object about the closing axis | its arm is long against the pads (1 / (1 + arm / pad)) |
+/// | `lever` | contacts around the centre of mass | as far from it as the object reaches |
+/// | `clearance` | the open hand is 1 cm from everything | it touches |
+/// | `bite` | the pads are filled along their length | only a tip holds |
+/// | `approach` | as demonstrated | at a right angle to it, or against |
+/// | `region` | all contact is at full weight | none is in the region |
+pub(crate) struct Scorer<'a> {
+    object: &'a GraspObject,
+    settings: &'a GraspSettings,
+    /// Direction of gravity, where known.
+    down: Option<DVec3>,
+    pad: [f64; 2],
+    /// ε of two full pads around the centre of mass.
+    best_epsilon: f64,
+}
+
+/// The score with its reasons.
+pub(crate) struct Score {
+    pub(crate) score: f64,
+    pub(crate) epsilon: f64,
+    pub(crate) terms: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Scorer<'a> {
+    pub(crate) fn new(
+        object: &'a GraspObject,
+        hand: &Hand,
+        settings: &'a GraspSettings,
+        down: Option<DVec3>,
+    ) -> Self {
+        let pad = hand.pad();
+        let half = (*hand.opening().end() / 2.0).min(object.radius());
+        let ideal = [-1.0, 1.0].map(|side| {
+            let y = side * DVec3::Y;
+            SoftContact::new(half * y, -y, pad[0] * pad[1], settings.friction)
+        });
+        let best_epsilon = ferrari_canny(&ideal, settings.friction, object.radius());
+        let down = settings.gravity.or(down).map(DVec3::normalize);
+        Self { object, settings, down, pad, best_epsilon }
+    }
+
+    /// Scores a grasp whose widest contact angle (radians, see `closure`) is `angle`.
+    pub(crate) fn score(&self, closing: &Closing, fit: &Fit, angle: f64) -> Score {
+        let [left, right] = &closing.patches;
+        let com = self.object.centre_of_mass();
+        let friction = self.settings.friction;
+        let contacts = [left, right].map(|patch| {
+            let area = patch.area.min(self.pad[0] * self.pad[1]);
+            SoftContact::new(patch.contact - com, -patch.normal, area, friction)
+        });
+        let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
+        let arm = com - left.contact.midpoint(right.contact);
+        let bite = |depth: [f64; 2]| (depth[1] - depth[0]) / self.pad[1];
+        let weights = &self.settings.weights;
+        let mut weighted = vec![
+            ("contact", weights.contact, self.pad_share(closing) / FULL_CONTACT),
+            ("friction", weights.friction, 1.0 - angle / friction.atan()),
+            ("epsilon", weights.epsilon, epsilon / self.best_epsilon.max(1e-12)),
+            (
+                "gravity",
+                weights.gravity,
+                1.0 / (1.0 + self.turning_arm(closing, arm) / self.pad[1]),
+            ),
+            ("lever", weights.lever, 1.0 - arm.length() / self.object.radius()),
+            ("clearance", weights.clearance, fit.clearance / FAR),
+            ("bite", weights.bite, bite(left.depth).min(bite(right.depth))),
+            ("region", weights.region, left.region.midpoint(right.region)),
+        ];
+        if let Some(demonstrated) = self.settings.demonstrated_approach {
+            let cosine = (closing.tcp.rotation * DVec3::Z).dot(demonstrated.normalize());
+            weighted.push(("approach", weights.approach, cosine));
+        }
+        weighted.iter_mut().for_each(|term| term.2 = term.2.clamp(0.0, 1.0));
+        let total: f64 = weighted.iter().map(|term| term.1).sum();
+        let sum: f64 = weighted.iter().map(|term| term.1 * term.2).sum();
+        let score = if total > 0.0 { sum / total } else { 0.0 };
+        Score {
+            score,
+            epsilon,
+            terms: weighted.into_iter().map(|(n, _, value)| (n, value)).collect(),
+        }
+    }
+
+    /// Share of its pad that the smaller patch covers.
+    pub(crate) fn pad_share(&self, closing: &Closing) -> f64 {
+        let least = closing.patches.iter().map(|patch| patch.area).fold(f64::INFINITY, f64::min);
+        (least / (self.pad[0] * self.pad[1])).min(1.0)
+    }
+
+    /// Arm of the weight about the closing axis: the object hangs in two pads as on a hinge. Without
+    /// a direction of gravity the worst one counts.
+    fn turning_arm(&self, closing: &Closing, arm: DVec3) -> f64 {
+        let axis = closing.tcp.rotation * DVec3::Y;
+        match self.down {
+            Some(down) => arm.cross(down).dot(axis).abs(),
+            None => arm.reject_from_normalized(axis).length(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    use crate::contact::close;
+    use crate::hand::BoxHand;
+    use crate::object::Region;
+    use crate::test_shapes::cuboid;
+    use parry3d_f64::math::Pose;
+
+    #[test]
+    fn the_middle_of_a_bar_is_best_and_each_term_tells_why() {
+        let object = GraspObject::from_mesh(&cuboid(DVec3::new(0.2, 0.03, 0.03)), 1.0).unwrap();
+        let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
+        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let settings = GraspSettings::default();
+        let scorer = Scorer::new(&object, &hand, &settings, Some(DVec3::NEG_Z));
+        let fit = Fit { width: 0.03, opening: 0.08, clearance: 0.02 };
+        let at = |x: f64, z: f64| {
+            let tcp = Pose::new(DVec3::new(x, 0.0, z), DVec3::X * PI);
+            let closing = close(&object, &region, &hand, &tcp, [-0.001, 0.001], 1.5e-3).unwrap();
+            scorer.score(&closing, &fit, 0.0)
+        };
+        let value = |score: &Score, name: &str| {
+            score.terms.iter().find(|term| term.0 == name).map(|term| term.1).unwrap()
+        };
+        let middle = at(0.0, 0.0);
+        for (name, value) in &middle.terms {
+            assert!(*value > 0.8 || *name == "epsilon" && *value > 0.5, "{name} is {value}");
+        }
+        let end = at(0.08, 0.0);
+        assert!(end.score < middle.score && end.epsilon < middle.epsilon);
+        assert!((value(&end, "gravity") - 1.0 / (1.0 + 0.08 / 0.018)).abs() < 1e-9);
+        assert!((value(&end, "lever") - (1.0 - 0.08 / object.radius())).abs() < 1e-9);
+        let shallow = at(0.0, 0.02);
+        assert!((value(&shallow, "bite") - 0.004 / 0.018).abs() < 1e-9);
+        assert!(shallow.score < middle.score);
+    }
+
+    #[test]
+    fn the_demonstrated_approach_counts_where_it_is_given() {
+        let object = GraspObject::from_mesh(&cuboid(DVec3::splat(0.03)), 1.0).unwrap();
+        let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
+        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let closing =
+            close(&object, &region, &hand, &Pose::IDENTITY, [-0.001, 0.001], 1.5e-3).unwrap();
+        let fit = Fit { width: 0.03, opening: 0.08, clearance: 1.0 };
+        let scores = [DVec3::Z, DVec3::X].map(|approach| {
+            let demonstrated_approach = Some(approach);
+            let settings = GraspSettings { demonstrated_approach, ..GraspSettings::default() };
+            Scorer::new(&object, &hand, &settings, None).score(&closing, &fit, 0.0).score
+        });
+        assert!(scores[0] > scores[1] + 0.1);
+    }
+}

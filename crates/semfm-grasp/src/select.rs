@@ -1,0 +1,118 @@
+//! From many grasps to a few: the best of each neighbourhood, then a set that differs.
+
+use parry3d_f64::math::Pose;
+use semfm_geom::math::DQuat;
+
+use crate::grasp::Grasp;
+use crate::settings::Separation;
+
+/// Half a turn about the approach: a gripper with two equal fingers is the same hand.
+const HALF_TURN: DQuat = DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0);
+
+/// Distance between the TCPs (metres) and the angle between the hands (radians), a hand and the same
+/// hand with its fingers exchanged being one.
+pub fn hand_distance(a: &Pose, b: &Pose) -> (f64, f64) {
+    let turn = a.rotation.inverse() * b.rotation;
+    let angle = |q: DQuat| 2.0 * q.xyz().length().atan2(q.w.abs());
+    (a.translation.distance(b.translation), angle(turn).min(angle(HALF_TURN * turn)))
+}
+
+/// Keeps a grasp where no better one is within the separation in both translation and rotation;
+/// best first, ties in the given order.
+pub(crate) fn suppress(mut grasps: Vec<Grasp>, separation: Separation) -> Vec<Grasp> {
+    grasps.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Grasp> = Vec::new();
+    for grasp in grasps {
+        let same = |other: &Grasp| {
+            let (a, b) = (&other.object_from_tcp, &grasp.object_from_tcp);
+            // Most are elsewhere: the angle is only for those nearby.
+            a.translation.distance_squared(b.translation) < separation.translation.powi(2)
+                && hand_distance(a, b).1 < separation.rotation
+        };
+        if !kept.iter().any(same) {
+            kept.push(grasp);
+        }
+    }
+    kept
+}
+
+/// `top` of the grasps (best first): the best, then each time the one whose score and distance to
+/// those chosen add up to most (maximal marginal relevance, Carbonell & Goldstein 1998). `radius` is
+/// the length that counts as far, metres. Best first again.
+pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f64) -> Vec<Grasp> {
+    if grasps.len() <= top {
+        return grasps;
+    }
+    let apart = |a: &Grasp, b: &Grasp| {
+        let (translation, rotation) = hand_distance(&a.object_from_tcp, &b.object_from_tcp);
+        ((translation / radius).min(1.0) + rotation / std::f64::consts::PI) / 2.0
+    };
+    let mut distance = vec![1.0; grasps.len()];
+    let mut chosen = vec![false; grasps.len()];
+    for _ in 0..top {
+        let gain = |i: usize| (1.0 - diversity) * grasps[i].score + diversity * distance[i];
+        let left = (0..grasps.len()).filter(|&i| !chosen[i]);
+        let Some(next) = left.max_by(|&a, &b| gain(a).total_cmp(&gain(b)).then(b.cmp(&a))) else {
+            break;
+        };
+        chosen[next] = true;
+        for (d, grasp) in distance.iter_mut().zip(&grasps) {
+            *d = d.min(apart(grasp, &grasps[next]));
+        }
+    }
+    grasps.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(grasp, _)| grasp).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::math::DVec3;
+
+    fn grasp(x: f64, about_z: f64, score: f64) -> Grasp {
+        Grasp {
+            object_from_tcp: Pose::new(DVec3::X * x, DVec3::Z * about_z),
+            width: 0.01,
+            opening: 0.08,
+            contacts: [DVec3::ZERO; 2],
+            normals: [DVec3::NEG_Y, DVec3::Y],
+            epsilon: 0.0,
+            score,
+            terms: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn exchanged_fingers_are_the_same_hand() {
+        let (a, b) = (grasp(0.0, 0.1, 1.0), grasp(0.003, 0.1 + std::f64::consts::PI, 1.0));
+        let (translation, rotation) = hand_distance(&a.object_from_tcp, &b.object_from_tcp);
+        assert!((translation - 0.003).abs() < 1e-12 && rotation < 1e-7, "{rotation}");
+        let c = grasp(0.0, 0.6, 1.0);
+        assert!((hand_distance(&a.object_from_tcp, &c.object_from_tcp).1 - 0.5).abs() < 1e-12);
+        let upside_down = Pose::new(DVec3::ZERO, DVec3::X * std::f64::consts::PI);
+        let (_, turned) = hand_distance(&Pose::IDENTITY, &upside_down);
+        assert!((turned - std::f64::consts::PI).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_best_of_each_neighbourhood_stays() {
+        let all = vec![
+            grasp(0.0, 0.0, 0.5),
+            grasp(0.004, 0.1, 0.9),
+            grasp(0.05, 0.0, 0.2),
+            grasp(0.0, 1.0, 0.3),
+        ];
+        let kept = suppress(all, Separation { translation: 0.01, rotation: 0.26 });
+        assert_eq!(kept.iter().map(|g| g.score).collect::<Vec<_>>(), [0.9, 0.3, 0.2]);
+    }
+
+    #[test]
+    fn diversity_trades_score_for_distance() {
+        let all = || vec![grasp(0.0, 0.0, 0.9), grasp(0.011, 0.0, 0.8), grasp(0.1, 1.5, 0.6)];
+        let scores = |diversity| -> Vec<f64> {
+            diverse(all(), 2, diversity, 0.1).iter().map(|g| g.score).collect()
+        };
+        assert_eq!(scores(0.0), [0.9, 0.8]);
+        assert_eq!(scores(0.5), [0.9, 0.6]);
+        assert_eq!(diverse(all(), 9, 0.5, 0.1).len(), 3);
+    }
+}

@@ -1,0 +1,300 @@
+//! Convex bodies at rest or swept along a line, as collision tests want them.
+
+use parry3d_f64::math::{Pose, Vector};
+use parry3d_f64::query::details::intersection_test_cuboid_triangle;
+use parry3d_f64::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
+use parry3d_f64::shape::{Cuboid, SupportMap, Triangle, TypedShape};
+use semfm_geom::math::{DMat3, DVec3, bounds};
+
+/// A sweep that leaves a box's axis by less than this (metres) still counts as along the axis.
+const ALONG_AXIS: f64 = 1e-9;
+
+/// A convex shape in its own frame: an axis-aligned box, and where that is not exact, the corners
+/// of the hull inside it.
+#[derive(Clone, Debug)]
+pub(crate) struct Convex {
+    centre: DVec3,
+    half: DVec3,
+    corners: Option<Vec<DVec3>>,
+}
+
+impl Convex {
+    /// The convex pieces of a shape, each with its pose in the shape's frame, or `None` for a shape
+    /// without bounds. Boxes and convex polyhedra are kept exactly, compounds piece by piece, a
+    /// triangle mesh becomes its convex hull and anything round its box: never less than the shape.
+    pub(crate) fn pieces(shape: TypedShape<'_>) -> Option<Vec<(Pose, Self)>> {
+        let hull = |points: &[DVec3]| {
+            let (low, high) = bounds(points)?;
+            let (centre, half) = (low.midpoint(high), (high - low) / 2.0);
+            let piece = Self { centre, half, corners: Some(points.to_vec()) };
+            Some(vec![(Pose::IDENTITY, piece)])
+        };
+        let aligned = |centre: DVec3, half: DVec3| {
+            (centre.is_finite() && half.is_finite() && half.max_element() < 1e6)
+                .then(|| vec![(Pose::IDENTITY, Self { centre, half, corners: None })])
+        };
+        match shape {
+            TypedShape::Cuboid(cuboid) => aligned(DVec3::ZERO, cuboid.half_extents),
+            TypedShape::ConvexPolyhedron(polyhedron) => hull(polyhedron.points()),
+            TypedShape::TriMesh(mesh) => hull(mesh.vertices()),
+            TypedShape::Compound(compound) => {
+                let mut pieces = Vec::new();
+                for (pose, shape) in compound.shapes() {
+                    let inner = Self::pieces(shape.as_typed_shape())?;
+                    pieces.extend(inner.into_iter().map(|(p, piece)| (*pose * p, piece)));
+                }
+                Some(pieces)
+            }
+            TypedShape::HalfSpace(_) => None,
+            TypedShape::Ball(shape) => aligned(DVec3::ZERO, DVec3::splat(shape.radius)),
+            TypedShape::Capsule(shape) => {
+                let bounds = shape.local_aabb();
+                aligned(bounds.center(), bounds.half_extents())
+            }
+            TypedShape::Cylinder(shape) => {
+                aligned(DVec3::ZERO, DVec3::new(shape.radius, shape.half_height, shape.radius))
+            }
+            TypedShape::Cone(shape) => {
+                aligned(DVec3::ZERO, DVec3::new(shape.radius, shape.half_height, shape.radius))
+            }
+            TypedShape::RoundCuboid(shape) => {
+                aligned(DVec3::ZERO, shape.inner_shape.half_extents + shape.border_radius)
+            }
+            _ => None,
+        }
+    }
+
+    /// The box with this centre and these half extents.
+    pub(crate) fn cuboid(centre: DVec3, half: DVec3) -> Self {
+        Self { centre, half, corners: None }
+    }
+
+    /// Corners of the shape in its own frame.
+    fn corners(&self) -> Vec<DVec3> {
+        self.corners.clone().unwrap_or_else(|| {
+            let corner = |i: usize| {
+                let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+                self.centre + self.half * DVec3::new(sign(0), sign(1), sign(2))
+            };
+            (0..8).map(corner).collect()
+        })
+    }
+
+    /// Bounds of the shape at `pose`, in the frame that `pose` leads to.
+    pub(crate) fn bounds_at(&self, pose: &Pose) -> (DVec3, DVec3) {
+        let corners: Vec<DVec3> = self.corners().into_iter().map(|p| *pose * p).collect();
+        bounds(&corners).unwrap_or((pose.translation, pose.translation))
+    }
+
+    /// Lowest value of `direction · point` over the shape at `pose`.
+    pub(crate) fn lowest(&self, pose: &Pose, direction: DVec3) -> f64 {
+        let local = pose.rotation.inverse() * direction;
+        let least = match &self.corners {
+            None => self.centre.dot(local) - self.half.dot(local.abs()),
+            Some(points) => points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min),
+        };
+        least + pose.translation.dot(direction)
+    }
+
+    /// The shape at `pose`, at rest.
+    pub(crate) fn at(&self, pose: &Pose) -> Solid {
+        let frame = *pose * Pose::from_translation(self.centre);
+        let corners = self.corners.as_ref();
+        let local = corners.map(|points| points.iter().map(|&p| p - self.centre).collect());
+        Solid::new(frame, self.half, local)
+    }
+
+    /// Everything that the shape covers on its way from one pose to the other, if it moves on a
+    /// line between them; where it also turns, the convex hull of both ends.
+    pub(crate) fn swept(&self, from: &Pose, to: &Pose) -> Solid {
+        let motion = from.inv_mul(to);
+        let still = motion.rotation.is_near_identity();
+        let path = motion.translation;
+        let off_axis = path.abs().element_sum() - path.abs().max_element();
+        if self.corners.is_none() && still && off_axis < ALONG_AXIS {
+            let frame = *from * Pose::from_translation(self.centre + path / 2.0);
+            return Solid::new(frame, self.half + path.abs() / 2.0, None);
+        }
+        let start = self.corners();
+        let all: Vec<DVec3> =
+            start.iter().copied().chain(start.iter().map(|&p| motion * p)).collect();
+        let (low, high) = bounds(&all).unwrap_or_default();
+        let centre = low.midpoint(high);
+        let frame = *from * Pose::from_translation(centre);
+        Solid::new(frame, (high - low) / 2.0, Some(all.into_iter().map(|p| p - centre).collect()))
+    }
+}
+
+/// A convex body in the object's frame: an oriented box, and where that is not exact, the corners
+/// of the hull inside it.
+#[derive(Clone, Debug)]
+pub(crate) struct Solid {
+    /// object_from_box.
+    frame: Pose,
+    /// box_from_object as a matrix, which turns a triangle faster than a quaternion does.
+    turn: DMat3,
+    half: DVec3,
+    corners: Option<Vec<DVec3>>,
+}
+
+impl Solid {
+    fn new(frame: Pose, half: DVec3, corners: Option<Vec<DVec3>>) -> Self {
+        Self { frame, turn: DMat3::from_quat(frame.rotation).transpose(), half, corners }
+    }
+
+    /// An oriented box: its frame in the object's, and its half extents.
+    pub(crate) fn oriented_box(frame: Pose, half: DVec3) -> Self {
+        Self::new(frame, half, None)
+    }
+
+    /// The centre of its box.
+    pub(crate) fn centre(&self) -> DVec3 {
+        self.frame.translation
+    }
+
+    /// A point in the box's frame.
+    pub(crate) fn local(&self, p: DVec3) -> DVec3 {
+        self.turn * (p - self.frame.translation)
+    }
+
+    /// Whether the box, grown by `margin`, overlaps an axis-aligned one (six of the fifteen
+    /// separating axes: it may say yes for a near miss, never no for a hit).
+    pub(crate) fn near_box(&self, low: DVec3, high: DVec3, margin: f64) -> bool {
+        let (centre, extent) = (low.midpoint(high), (high - low) / 2.0);
+        let offset = self.frame.translation - centre;
+        let half = self.half + margin;
+        let spread = DMat3::from_cols(
+            self.turn.x_axis.abs(),
+            self.turn.y_axis.abs(),
+            self.turn.z_axis.abs(),
+        );
+        let reach =
+            DVec3::new(spread.x_axis.dot(half), spread.y_axis.dot(half), spread.z_axis.dot(half));
+        offset.abs().cmple(extent + reach).all()
+            && (self.turn * offset).abs().cmple(half + spread * extent).all()
+    }
+
+    /// Whether the body, grown by `margin`, meets the triangle (touching counts).
+    pub(crate) fn meets_triangle(&self, corners: &[DVec3; 3], margin: f64) -> bool {
+        let [a, b, c] = corners.map(|p| self.local(p));
+        let half = self.half + margin;
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        if low.cmpgt(half).any() || high.cmplt(-half).any() {
+            return false;
+        }
+        let triangle = Triangle::new(a, b, c);
+        match &self.corners {
+            None => {
+                intersection_test_cuboid_triangle(&Pose::IDENTITY, &Cuboid::new(half), &triangle)
+            }
+            Some(points) => !separated(&Hull(points), &triangle, margin),
+        }
+    }
+
+    /// Whether the body, grown by `margin`, holds the point.
+    pub(crate) fn meets_point(&self, point: DVec3, margin: f64) -> bool {
+        let p = self.local(point);
+        let outside = (p.abs() - self.half).max(DVec3::ZERO);
+        if outside.length_squared() > margin * margin {
+            return false;
+        }
+        match &self.corners {
+            None => true,
+            Some(points) => !separated(&Hull(points), &Triangle::new(p, p, p), margin),
+        }
+    }
+
+    /// Distance to the triangle where it is below `cap`, otherwise `cap`; 0 where they meet.
+    pub(crate) fn distance(&self, corners: &[DVec3; 3], cap: f64) -> f64 {
+        let [a, b, c] = corners.map(|p| self.local(p));
+        let triangle = Triangle::new(a, b, c);
+        match &self.corners {
+            None => gap(&Cuboid::new(self.half), &triangle, cap),
+            Some(points) => gap(&Hull(points), &triangle, cap),
+        }
+    }
+}
+
+/// The convex hull of some points.
+struct Hull<'a>(&'a [DVec3]);
+
+impl SupportMap for Hull<'_> {
+    fn local_support_point(&self, direction: Vector) -> Vector {
+        let mut best = (f64::NEG_INFINITY, DVec3::ZERO);
+        for &p in self.0 {
+            let along = p.dot(direction);
+            if along > best.0 {
+                best = (along, p);
+            }
+        }
+        best.1
+    }
+}
+
+fn separated(body: &impl SupportMap, triangle: &Triangle, margin: f64) -> bool {
+    matches!(closest(body, triangle, margin, false), GJKResult::NoIntersection(_))
+}
+
+fn gap(body: &impl SupportMap, triangle: &Triangle, cap: f64) -> f64 {
+    match closest(body, triangle, cap, true) {
+        GJKResult::ClosestPoints(a, b, _) => a.distance(b).min(cap),
+        GJKResult::NoIntersection(_) => cap,
+        GJKResult::Intersection | GJKResult::Proximity(_) => 0.0,
+    }
+}
+
+fn closest(body: &impl SupportMap, triangle: &Triangle, max: f64, exact: bool) -> GJKResult {
+    let towards = -(triangle.a + triangle.b + triangle.c);
+    let direction = towards.try_normalize().unwrap_or(Vector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(&Pose::IDENTITY, body, triangle, direction));
+    gjk::closest_points(&Pose::IDENTITY, body, triangle, max, exact, &mut simplex)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parry3d_f64::math::Rotation;
+
+    fn tile(centre: DVec3) -> [DVec3; 3] {
+        [centre, centre + 0.01 * DVec3::X, centre + 0.01 * DVec3::Y]
+    }
+
+    #[test]
+    fn a_sweep_covers_the_way_and_nothing_beyond() {
+        let cube = Convex::cuboid(DVec3::ZERO, DVec3::splat(0.5));
+        let turned = Rotation::from_axis_angle(DVec3::Z, 0.3);
+        let from = Pose::from_parts(DVec3::ZERO, turned);
+        for slanted in [false, true] {
+            let way = turned * DVec3::new(0.0, 4.0, if slanted { 3.0 } else { 0.0 });
+            let to = Pose::from_parts(way, turned);
+            let solid = cube.swept(&from, &to);
+            assert_eq!(solid.corners.is_some(), slanted);
+            assert!(solid.meets_triangle(&tile(way / 2.0), 0.0));
+            assert!(solid.meets_triangle(&tile(way), 0.0));
+            assert!(!solid.meets_triangle(&tile(1.5 * way), 0.0));
+            assert!(solid.meets_point(way / 2.0, 0.0) && !solid.meets_point(-0.3 * way, 0.0));
+        }
+    }
+
+    #[test]
+    fn a_hull_and_a_box_of_the_same_corners_agree() {
+        let plain = Convex::cuboid(DVec3::X, DVec3::new(0.5, 0.2, 0.3));
+        let hull = Convex { corners: Some(plain.corners()), ..plain.clone() };
+        let pose = Pose::new(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.5, -0.4, 0.2));
+        let (a, b) = (plain.at(&pose), hull.at(&pose));
+        let mut hits = 0;
+        for i in 0..500 {
+            let t = f64::from(i);
+            let p = pose * (DVec3::X + 0.9 * DVec3::new((7.1 * t).sin(), (3.3 * t).cos(), t.sin()));
+            let corners = [p, p + 0.1 * DVec3::X, p + 0.15 * DVec3::Z];
+            let hit = a.meets_triangle(&corners, 1e-4);
+            assert_eq!(hit, b.meets_triangle(&corners, 1e-4));
+            assert!((a.distance(&corners, 1.0) - b.distance(&corners, 1.0)).abs() < 1e-9);
+            hits += u32::from(hit);
+        }
+        assert!((50..450).contains(&hits), "{hits} of 500 hit");
+        let lowest = plain.lowest(&pose, DVec3::Z);
+        assert!((lowest - hull.lowest(&pose, DVec3::Z)).abs() < 1e-12);
+    }
+}
