@@ -1,4 +1,4 @@
-//! Every mesh and MCAP file of the shared corpus through `info --json`, each in a process of its own
+//! Every mesh, MCAP and URDF file of the shared corpus through `info --json`, each in a process of its own
 //! under a limit of memory: an abort or a hang cannot be caught from inside.
 
 use std::collections::HashSet;
@@ -58,9 +58,8 @@ fn every_file_of_the_corpus_gets_its_verdict_and_none_a_crash() {
     let manifest = std::fs::read_to_string(corpus.join("MANIFEST.tsv")).unwrap();
     let disputed = disputed();
     let (mut faults, mut n_files) = (Vec::new(), 0);
-    for line in
-        manifest.lines().filter(|line| line.starts_with("mesh/") || line.starts_with("mcap/"))
-    {
+    let kinds = ["mesh/", "mcap/", "urdf/"];
+    for line in manifest.lines().filter(|line| kinds.iter().any(|kind| line.starts_with(kind))) {
         let columns: Vec<&str> = line.split('\t').collect();
         let (path, expected) = (columns[0], columns[4]);
         let told = info(&corpus.join(path));
@@ -96,10 +95,18 @@ fn fault(expected: &str, disputed: bool, told: &Answer) -> Option<String> {
     }
     // Where one plain count is expected, it is this one.
     let plain = accepted && !expected.contains('[') && !expected.contains(" or ");
-    let counts = [("v=", "n_vertices"), ("f=", "n_faces"), ("tri=", "n_triangles")];
+    let counts = [("v=", "n_vertices"), ("f=", "n_faces"), ("tri=", "n_triangles"),
+        ("links=", "links"), ("joints=", "joints")];
+    let list = |field: &str| report[field].as_array().map_or(0, Vec::len);
+    if expected.contains("tree check reports") && list("tree") == 0 {
+        return Some(format!("the tree check reports nothing: {report}"));
+    }
+    if expected.contains("missing meshes reported") && list("missing_meshes") == 0 {
+        return Some(format!("no missing mesh is named: {report}"));
+    }
     counts.into_iter().filter(|_| plain).find_map(|(key, field)| {
         let word = expected.split_whitespace().find_map(|word| word.strip_prefix(key))?;
-        let count: u64 = word.trim_end_matches(',').parse().ok()?;
+        let count: u64 = word.trim_end_matches([',', ';']).parse().ok()?;
         (report[field] != count).then(|| format!("{field}: found {}", report[field]))
     })
 }

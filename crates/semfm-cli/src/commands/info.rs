@@ -1,11 +1,14 @@
 //! `semfm-cli info`: what is in a file, or why it is refused.
 
+use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::grasp::urdf::{Description, MeshPaths, MeshPlace};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
 
@@ -13,21 +16,25 @@ use super::Outcome;
 use crate::options::Common;
 use crate::talk;
 
-/// Say what is in a mesh or MCAP file, or why it is refused
+/// Say what is in a mesh, MCAP or URDF file, or why it is refused
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  semfm-cli info mug.obj mug.emb.mcap --json\n\n\
     With --json, one object a line: `kind` and counts, or `error` with code, message and place.")]
 pub struct Info {
-    /// Mesh files (OBJ, PLY, STL, OFF, glTF, GLB) and MCAP files
+    /// Mesh files (OBJ, PLY, STL, OFF, glTF, GLB), MCAP files and robots (URDF)
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// Folder of a package that a URDF names as package://NAME/…; may be given again
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
+    packages: Vec<(String, PathBuf)>,
 }
 
 impl Info {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let mut outcome = Outcome::Done;
+        let packages = self.packages.into_iter().collect();
         for path in &self.files {
-            let report = match look(path) {
+            let report = match look(path, &packages) {
                 Ok(report) => report,
                 Err(error) => {
                     outcome = Outcome::Refused;
@@ -55,10 +62,13 @@ impl Info {
 }
 
 /// The report on one file.
-fn look(path: &Path) -> semfm::Result<Value> {
+fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Value> {
     if is_mcap(path) {
         let report = serde_json::to_value(inspect(path)?);
         return Ok(with_kind("mcap", report.unwrap_or_default()));
+    }
+    if is_urdf(path) {
+        return look_at_urdf(path, packages);
     }
     let file = read_mesh(path)?;
     let report = serde_json::to_value(MeshReport::new(&file.mesh));
@@ -76,6 +86,60 @@ fn look(path: &Path) -> semfm::Result<Value> {
     Ok(value)
 }
 
+/// The report on a robot: counts, what keeps it from being one tree, and meshes that are missing.
+fn look_at_urdf(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Value> {
+    let description = Description::read(path)?;
+    let meshes = description.meshes(&MeshPaths::new(path, packages))?;
+    let missing: Vec<Value> = meshes
+        .iter()
+        .filter_map(|mesh| match &mesh.place {
+            MeshPlace::Found(_) => None,
+            MeshPlace::Missing(why) => {
+                Some(json!({ "link": mesh.link, "filename": mesh.filename, "reason": why }))
+            }
+        })
+        .collect();
+    Ok(json!({
+        "kind": "urdf",
+        "name": description.name(),
+        "links": description.n_links(),
+        "joints": description.n_joints(),
+        "movable_joints": description.n_movable(),
+        "roots": description.roots(),
+        "meshes": meshes.len(),
+        "missing_meshes": missing,
+        "tree": description.tree_findings(),
+        "notes": description.notes(),
+    }))
+}
+
+/// URDF by its extension, or by a first element where no other extension speaks against it.
+fn is_urdf(path: &Path) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    if extension.eq_ignore_ascii_case("urdf") || extension.eq_ignore_ascii_case("xacro") {
+        return true;
+    }
+    MeshFormat::from_path(path).is_none() && {
+        let mut start = Vec::new();
+        std::fs::File::open(path)
+            .and_then(|file| file.take(64).read_to_end(&mut start))
+            .is_ok_and(|_| {
+                let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
+                text.starts_with(b"<?xml") || text.starts_with(b"<robot")
+            })
+    }
+}
+
+/// A flag's NAME=DIR.
+fn package(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => {
+            Ok((name.to_owned(), folder.into()))
+        }
+        _ => Err("expected NAME=DIR".into()),
+    }
+}
+
 /// MCAP by its extension or by its first bytes; a mesh's extension wins over the bytes.
 fn is_mcap(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
@@ -85,7 +149,7 @@ fn is_mcap(path: &Path) -> bool {
     let mut start = [0; 8];
     MeshFormat::from_path(path).is_none()
         && std::fs::File::open(path)
-            .and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start))
+            .and_then(|mut file| file.read_exact(&mut start))
             .is_ok()
         && start == *b"\x89MCAP0\r\n"
 }
