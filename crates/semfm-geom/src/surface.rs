@@ -86,11 +86,26 @@ impl SurfaceIndex {
     /// The point of the surface nearest to `query`; `None` only where a coordinate of `query` is
     /// not finite or so large that its square is not.
     pub fn closest(&self, query: DVec3) -> Option<SurfacePoint> {
+        self.closest_among(query, f64::MAX, |_| true)
+    }
+
+    /// The nearest point closer than `within` among the triangles that `counts` lets pass (by id in
+    /// the mesh): those that face a sensor, say, so that a thin wall's far side does not answer for
+    /// its near one. The shorter `within`, the sooner the answer; `None` where no triangle counts.
+    pub fn closest_among(
+        &self,
+        query: DVec3,
+        within: f64,
+        counts: impl Fn(u32) -> bool,
+    ) -> Option<SurfacePoint> {
         let (leaf, (distance, (point, barycentric))) = self.tree.find_best(
-            f64::MAX,
+            within,
             |node: &BvhNode, _| node.aabb().distance_to_local_point(query, true),
             |leaf, _| {
-                let ([a, b, c], _) = self.triangles[leaf as usize];
+                let ([a, b, c], face) = self.triangles[leaf as usize];
+                if !counts(face) {
+                    return None;
+                }
                 let (hit, place) =
                     Triangle::new(a, b, c).project_local_point_and_get_location(query, true);
                 Some((hit.point.distance(query), (hit.point, place.barycentric_coordinates()?)))
@@ -230,6 +245,18 @@ mod tests {
             let hit = surface.first_hit(origin, ray).expect("the surface is closed");
             assert!((hit.t - 1.0).abs() < 1e-9, "hit at t = {}", hit.t);
         }
+    }
+
+    #[test]
+    fn only_triangles_that_count_answer_and_only_within_reach() {
+        let mesh = sphere(2);
+        let surface = SurfaceIndex::new(&mesh).unwrap();
+        let upper = |face: u32| mesh.face_normal_scaled(face as usize).z > 0.0;
+        let below = DVec3::new(0.1, 0.2, -0.9);
+        let hit = surface.closest_among(below, f64::MAX, upper).unwrap();
+        assert!(upper(hit.face) && hit.distance > 0.8, "{hit:?}");
+        assert!(surface.closest_among(below, 0.5, upper).is_none());
+        assert!(surface.closest_among(below, 0.5, |_| true).is_some());
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod image;
 mod input;
 mod obj;
 mod off;
+mod pcd;
 mod ply;
 mod polygon;
 mod stl;
@@ -135,7 +136,8 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<MeshFile> {
 }
 
 /// Reads the vertices of a file as points: a file without faces is fine here. PLY, OBJ and OFF give
-/// all their vertices; of STL and glTF the mesh is read.
+/// all their vertices; of STL and glTF the mesh is read. PCD files (ascii, binary, compressed) hold
+/// nothing but points; those marked as no return (NaN) are left out.
 ///
 /// # Errors
 /// As [`read_mesh`]; [`Error::InFile`] for a file without a point or with one that is not finite.
@@ -143,16 +145,7 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloud> {
     let path = path.as_ref();
     let bytes = read_file(path)?;
     let input = Input { path, bytes: &bytes };
-    let cloud = match format_of(input)? {
-        MeshFormat::Obj => obj::read_points(input)?,
-        MeshFormat::Off => off::read_points(input)?,
-        MeshFormat::Ply => ply::read_points(input)?,
-        MeshFormat::Stl | MeshFormat::Gltf | MeshFormat::Glb => {
-            let file = read_mesh(path)?;
-            let points = file.mesh.vertices().to_vec();
-            PointCloud { points, colors: file.appearance.vertex_colors }
-        }
-    };
+    let cloud = if pcd::is_pcd(input) { pcd::read_points(input)? } else { vertices_of(input)? };
     if cloud.points.is_empty() {
         return Err(input.error("whole file", "at least one point", "none"));
     }
@@ -161,6 +154,19 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloud> {
         return Err(input.wrap(Error::NotFinite { vertex, x: p.x, y: p.y, z: p.z }));
     }
     Ok(cloud)
+}
+
+fn vertices_of(input: Input<'_>) -> Result<PointCloud> {
+    match format_of(input)? {
+        MeshFormat::Obj => obj::read_points(input),
+        MeshFormat::Off => off::read_points(input),
+        MeshFormat::Ply => ply::read_points(input),
+        MeshFormat::Stl | MeshFormat::Gltf | MeshFormat::Glb => {
+            let file = read_mesh(input.path)?;
+            let points = file.mesh.vertices().to_vec();
+            Ok(PointCloud { points, colors: file.appearance.vertex_colors })
+        }
+    }
 }
 
 fn format_of(input: Input<'_>) -> Result<MeshFormat> {

@@ -44,6 +44,11 @@ impl<'a> Lines<'a> {
     pub fn offset(&self) -> usize {
         self.offset
     }
+
+    /// Number of the line that comes next.
+    pub fn next_number(&self) -> usize {
+        self.number + 1
+    }
 }
 
 impl<'a> Iterator for Lines<'a> {

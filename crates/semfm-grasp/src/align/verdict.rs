@@ -1,0 +1,79 @@
+//! What to do with a pose.
+
+use serde::{Deserialize, Serialize};
+
+use super::Alignment;
+
+/// Visibility from which on a pose is accepted, and below which it is refused. True poses of
+/// single views lie above .85 even with a fifth of clutter; poses hidden inside or behind the
+/// observation, or far too large, below .5.
+const VISIBILITY: [f64; 2] = [0.75, 0.5];
+
+/// The same for the share of the observed points that lie on the model. A cloud with a piece of
+/// table has about .5; a small model that hides in a flat patch explains less than a quarter.
+const INLIERS: [f64; 2] = [0.6, 0.3];
+
+/// Relative standard deviation of the scale up to which a grasp's opening can rely on it.
+const SCALE_STD: f64 = 0.015;
+
+/// Standard deviation of the rotation, in radians, beyond which an axis counts as not determined.
+const ROTATION_STD: f64 = 0.05;
+
+/// Another pose that explains this share of what the best one does is a rival.
+pub(super) const RIVAL: f64 = 0.97;
+
+/// What to do with the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Use it.
+    Accept,
+    /// Let somebody look at it.
+    Check,
+    /// It explains too little of what was seen, or shows what was not there.
+    Refuse,
+}
+
+/// The verdict on an alignment, and the reasons against accepting it.
+pub(super) fn judge(a: &Alignment, at_bound: bool) -> (Verdict, Vec<String>) {
+    let (mut refuse, mut check) = (Vec::new(), Vec::new());
+    for (name, value, [accepted, refused]) in [
+        ("of the model's visible side was seen", a.visibility, VISIBILITY),
+        ("of the observed points lie on the model", a.inlier_share, INLIERS),
+    ] {
+        let text = |least: f64| {
+            format!("{:.0} % {name}, expected at least {:.0} %", 100.0 * value, 100.0 * least)
+        };
+        // NaN is no share.
+        if value.is_nan() || value < refused {
+            refuse.push(text(refused));
+        } else if value < accepted {
+            check.push(text(accepted));
+        }
+    }
+    let relative = a.scale_std / a.camera_from_object.scale;
+    if relative.is_nan() || relative > SCALE_STD {
+        check.push(format!("the scale is known to ±{:.1} % only", 100.0 * relative));
+    }
+    if a.rotation_std.is_nan() || a.rotation_std > ROTATION_STD {
+        let degrees = a.rotation_std.to_degrees();
+        check.push(if degrees > 50.0 {
+            "the rotation about some axis is not determined by what was seen".into()
+        } else {
+            format!("the rotation about some axis is known to ±{degrees:.0}° only")
+        });
+    }
+    if a.rival > RIVAL {
+        check.push("another pose explains as much".into());
+    }
+    if at_bound {
+        check.push("the scale stands at the border of its allowed range".into());
+    }
+    let verdict = match (refuse.is_empty(), check.is_empty()) {
+        (false, _) => Verdict::Refuse,
+        (true, false) => Verdict::Check,
+        (true, true) => Verdict::Accept,
+    };
+    refuse.extend(check);
+    (verdict, refuse)
+}
