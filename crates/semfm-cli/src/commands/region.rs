@@ -89,12 +89,6 @@ impl MakeRegion {
     }
 }
 
-fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N]> {
-    let found = || anyhow::anyhow!("found `{text}`");
-    let values: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
-    values.and_then(|values| values.try_into().ok()).ok_or_else(found)
-}
-
 fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     let Some((path, number)) = view.rsplit_once('#') else {
         bail!("--view: expected V.views.mcap#NNN, found `{view}`");

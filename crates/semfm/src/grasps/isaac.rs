@@ -31,15 +31,14 @@ fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
     );
     let none = if answer.found.grasps.is_empty() { " {}" } else { "" };
     let _ = writeln!(text, "grasps:{none}");
-    let tcp_from_flange = answer.gripper.flange_from_tcp.inverse();
     for (i, grasp) in answer.found.grasps.iter().enumerate() {
-        let (p, q) = position_and_rotation(grasp.object_from_tcp * tcp_from_flange);
+        let (p, q) = position_and_rotation(grasp.object_from_tcp * answer.gripper.flange_from_tcp_at(grasp.width).inverse());
         let _ = writeln!(text, "  \"grasp_{i}\":\n    confidence: {}", number(grasp.score));
         let _ = writeln!(text, "    position: {}", list(p.to_array()));
         let xyz = list([q.x, q.y, q.z]);
         let _ = writeln!(text, "    orientation: {{w: {}, xyz: {xyz}}}", number(q.w));
         for (name, width) in
-            [("cspace_position", grasp.width), ("pregrasp_cspace_position", grasp.open_width)]
+            [("cspace_position", grasp.width), ("pregrasp_cspace_position", grasp.opening)]
         {
             let joints = answer.gripper.joints_at(width);
             let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });

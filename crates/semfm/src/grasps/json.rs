@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use semfm_grasp::gripper::{Gripper, Part, Role};
-use semfm_grasp::{Grasp, Pose};
+use parry3d_f64::math::Pose;
+use parry3d_f64::shape::{Shape, TypedShape};
+use semfm_grasp::gripper::{Part, Role};
+use semfm_grasp::{Grasp, Gripper};
 use serde_json::{Map, Value, json};
 
 use super::{GraspAnswer, position_and_rotation};
@@ -31,8 +33,11 @@ pub fn write_grasps(path: &Path, answer: &GraspAnswer<'_>, about: Map<String, Va
 pub fn grasps_json(answer: &GraspAnswer<'_>) -> Value {
     let found = answer.found;
     let grasps: Vec<Value> = found.grasps.iter().map(|grasp| grasp_json(answer, grasp)).collect();
-    let rejected: Map<String, Value> =
-        found.rejected.iter().map(|(reason, n)| ((*reason).to_owned(), json!(n))).collect();
+    let rejected: Map<String, Value> = found
+        .rejected
+        .iter()
+        .map(|(reason, count)| (reason.name().to_owned(), json!(count)))
+        .collect();
     json!({
         "format": FORMAT,
         "mesh": {
@@ -45,8 +50,17 @@ pub fn grasps_json(answer: &GraspAnswer<'_>) -> Value {
         "gripper": gripper_json(answer.gripper),
         "grasps": grasps,
         "rejected": rejected,
-        "nearest_miss": found.nearest_miss,
+        "nearest_miss": found.nearest_miss.as_ref().map(|miss| {
+            json!({
+                "reason": miss.reason.name(),
+                "explanation": miss.reason.explanation(),
+                "by": miss.by,
+                "unit": miss.reason.unit(),
+                "object_from_tcp": rows(miss.grasp.object_from_tcp),
+            })
+        }),
         "n_candidates": found.n_candidates,
+        "n_survivors": found.n_survivors,
     })
 }
 
@@ -61,16 +75,19 @@ fn grasp_json(answer: &GraspAnswer<'_>, grasp: &Grasp) -> Value {
     };
     json!({
         "object_from_tcp": rows(grasp.object_from_tcp),
+        "flange_from_tcp": rows(answer.gripper.flange_from_tcp_at(grasp.width)),
         "camera_from_tcp": answer.camera_from_object.map(|_| rows(pose)),
         "frame": frame,
         "position": position.to_array(),
         "quaternion_xyzw": rotation.to_array(),
         "width": grasp.width,
-        "open_width": grasp.open_width,
+        "opening": grasp.opening,
         "contacts": grasp.contacts.map(|point| point.to_array()),
+        "normals": grasp.normals.map(|normal| normal.to_array()),
+        "epsilon": grasp.epsilon,
         "score": grasp.score,
         "terms": terms,
-        "hand": { "closed": hand(grasp.width), "open": hand(grasp.open_width) },
+        "hand": { "closed": hand(grasp.width), "open": hand(grasp.opening) },
     })
 }
 
@@ -91,9 +108,25 @@ fn part_json(part: &Part) -> Value {
         Role::Left => "left",
         Role::Right => "right",
     };
-    let hulls: Vec<Vec<[f64; 3]>> =
-        part.hulls().iter().map(|hull| hull.iter().map(|p| p.to_array()).collect()).collect();
+    let mut hulls = Vec::new();
+    add_hulls(&*part.shape, Pose::IDENTITY, &mut hulls);
     json!({ "link": part.link, "role": role, "hulls": hulls })
+}
+
+/// The corners of each convex piece of a shape.
+fn add_hulls(shape: &dyn Shape, pose: Pose, hulls: &mut Vec<Vec<[f64; 3]>>) {
+    let corners = match shape.as_typed_shape() {
+        TypedShape::Cuboid(cuboid) => cuboid.to_trimesh().0,
+        TypedShape::ConvexPolyhedron(hull) => hull.points().to_vec(),
+        TypedShape::Compound(compound) => {
+            for (part_pose, part) in compound.shapes() {
+                add_hulls(&**part, pose * *part_pose, hulls);
+            }
+            return;
+        }
+        _ => return,
+    };
+    hulls.push(corners.into_iter().map(|p| (pose * p).to_array()).collect());
 }
 
 /// A pose as rows of a 4 × 4 matrix.

@@ -9,9 +9,10 @@ mod json;
 #[cfg(feature = "mcap")]
 mod ros2;
 
+use parry3d_f64::math::Pose;
 use semfm_geom::Mesh;
 use semfm_geom::math::{DQuat, DVec3};
-use semfm_grasp::{Grasps, Gripper, Pose};
+use semfm_grasp::{Grasps, Gripper};
 
 pub use isaac::write_isaac;
 pub use json::{FORMAT, grasps_json, write_grasps};
