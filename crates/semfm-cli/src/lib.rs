@@ -12,7 +12,7 @@ use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, completions, demo, info, region, show, transfer, views};
+use commands::{Outcome, completions, demo, grasp, info, region, show, transfer, views};
 use options::Common;
 
 /// Carry a demonstrated region from one object to another.
@@ -34,6 +34,7 @@ enum Command {
     Views(views::Views),
     Region(region::MakeRegion),
     Transfer(Box<transfer::Carry>),
+    Grasp(Box<grasp::FindGrasps>),
     Show(show::Show),
     Info(info::Info),
     Completions(completions::Completions),
@@ -55,6 +56,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Views(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),
+        Command::Grasp(command) => command.run(&common),
         Command::Show(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),

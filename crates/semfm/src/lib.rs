@@ -32,6 +32,7 @@ pub use semfm_grasp as grasp;
 pub use semfm_views as views;
 
 mod error;
+pub mod grasps;
 pub mod output;
 pub mod picture;
 pub mod pipeline;

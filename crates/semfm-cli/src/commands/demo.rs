@@ -11,9 +11,15 @@ use semfm_synth::{Category, Level, ObjectFiles, ObjectSettings, make_object, wri
 use serde_json::{Map, json};
 
 use super::Outcome;
-use super::transfer::Job;
+use super::grasp::GraspOptions;
+use super::transfer::{Job, Reach};
 use crate::options::Common;
 use crate::{load, talk};
+
+/// The hand that grasps at the end, and how large the object is made for it: from corner to corner
+/// of its box, in metres.
+const HAND: &str = "franka";
+const LONGEST: f64 = 0.25;
 
 /// Carry a grip between two built-in objects, offline: meshes, embeddings, transfer, pictures
 ///
@@ -51,6 +57,10 @@ impl Demo {
             Ok(write_object(&self.output, &object, self.level, &task)?)
         };
         let (source, target) = (make(0)?, make(1)?);
+        let target_mesh = load::mesh(&target.mesh, None)?.mesh;
+        // Rounded, so that the command below says exactly what was done.
+        let scale = (1e4 * LONGEST / target_mesh.diagonal()).round() / 1e4;
+        let hand = GraspOptions::at_scale(scale).prepare(HAND, target_mesh)?;
 
         let prepare = |files: &ObjectFiles| -> Result<PreparedObject> {
             let mesh = load::mesh(&files.mesh, None)?.mesh;
@@ -76,12 +86,15 @@ impl Demo {
         let folder = self.output.join("transfer");
         // A demonstration shows where the time goes.
         let talkative = Common { verbose: !common.quiet, ..*common };
-        let outcome = job.finish(&folder, about, &task, &talkative)?;
+        let hand = Reach { job: hand, seed: self.seed };
+        let outcome = job.finish(&folder, about, Some(&hand), &task, &talkative)?;
         if !common.json {
             talk::say(format_args!("IoU         {overlap:.2} with the true grip"));
-            talk::say(format_args!("picture     {}", folder.join("transfer.png").display()));
+            for picture in ["transfer.png", "grasps.png"].map(|name| folder.join(name)) {
+                talk::say(format_args!("picture     {}", picture.display()));
+            }
             if !common.quiet {
-                repeat_by_hand(&source, &target, &folder);
+                repeat_by_hand(&source, &target, scale, &folder);
             }
         }
         Ok(outcome)
@@ -89,7 +102,7 @@ impl Demo {
 }
 
 /// The same transfer as a command.
-fn repeat_by_hand(source: &ObjectFiles, target: &ObjectFiles, folder: &Path) {
+fn repeat_by_hand(source: &ObjectFiles, target: &ObjectFiles, scale: f64, folder: &Path) {
     let quoted = |path: &Path| {
         let text = path.display().to_string();
         let plain = text.bytes().all(|b| b.is_ascii_alphanumeric() || b"/._-".contains(&b));
@@ -97,7 +110,8 @@ fn repeat_by_hand(source: &ObjectFiles, target: &ObjectFiles, folder: &Path) {
     };
     talk::say("by hand");
     talk::say(format_args!(
-        "  semfm-cli transfer {} {} --region {} \\\n    --source-embeddings {} --target-embeddings {} -o {}",
+        "  semfm-cli transfer {} {} --region {} \\\n    --source-embeddings {} --target-embeddings {} \\\n    \
+         --gripper {HAND} --scale {scale} -o {}",
         quoted(&source.mesh),
         quoted(&target.mesh),
         quoted(&source.truth),

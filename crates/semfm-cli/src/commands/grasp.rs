@@ -15,12 +15,16 @@ use semfm::grasps::{GraspAnswer, write_grasps, write_isaac, write_ros2};
 use semfm::picture::write_grasp_picture;
 use semfm::region_file::read_region;
 use semfm::{Task, aligned::read_aligned};
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 
 use super::Outcome;
-use super::region::parse_vector;
-use crate::options::Common;
+use crate::options::{Common, numbers};
 use crate::talk;
+
+/// Metres: the noise of a depth camera at arm's length.
+const SCENE_MARGIN: f64 = 0.005;
+/// Degrees.
+const APPROACH_CONE: f64 = 45.0;
 
 /// Find parallel-jaw grasps inside a region of a mesh
 #[derive(Debug, Args)]
@@ -76,7 +80,7 @@ pub struct GraspOptions {
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     scene: Vec<PathBuf>,
     /// Distance that the hand keeps from the points of a scene, metres
-    #[arg(long, default_value_t = 0.005, value_name = "METRES", help_heading = "Scene")]
+    #[arg(long, default_value_t = SCENE_MARGIN, value_name = "METRES", help_heading = "Scene")]
     scene_margin: f64,
     /// A table: a point of it and its normal, away from the table
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse_table, allow_hyphen_values = true, help_heading = "Scene")]
@@ -97,7 +101,7 @@ pub struct GraspOptions {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, help_heading = "Grasps")]
     approach: Option<DVec3>,
     /// Half-angle of the allowed directions around --approach, degrees
-    #[arg(long, default_value_t = 45.0, value_name = "DEGREES", requires = "approach", help_heading = "Grasps")]
+    #[arg(long, default_value_t = APPROACH_CONE, value_name = "DEGREES", requires = "approach", help_heading = "Grasps")]
     approach_cone: f64,
     /// The direction in which the demonstrator's hand came: agreement raises the score
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, help_heading = "Grasps")]
@@ -130,22 +134,20 @@ impl FindGrasps {
         let task = talk::watched(common.quiet);
         let mesh = read_mesh(&self.mesh)?.mesh;
         let region = read_region(&self.region, &mesh)?;
-        let job = self.options.prepare(&self.gripper, &mesh)?;
+        let job = self.options.prepare(&self.gripper, mesh)?;
         let found = job.find(region.weights(), self.seed, &task)?;
-        let answer = job.answer(&found);
-        let mut about = Map::new();
-        about.insert("files".into(), json!({ "mesh": self.mesh, "region": self.region }));
-        about.insert("seed".into(), json!(self.seed));
         match self.format {
-            Format::Json => write_grasps(&self.output, &answer, about)?,
-            Format::Ros2 => write_ros2(&self.output, &answer)?,
-            Format::Isaac => write_isaac(&self.output, &answer)?,
+            Format::Json => job.write(&self.output, &found, self.seed)?,
+            Format::Ros2 => write_ros2(&self.output, &job.answer(&found))?,
+            Format::Isaac => write_isaac(&self.output, &job.answer(&found))?,
         }
         if let Some(picture) = &self.picture {
             job.draw(picture, region.weights(), &found, &task)?;
         }
-        tell(&found, common);
-        if !common.json {
+        if common.json {
+            talk::say(grasps_summary(&found));
+        } else {
+            tell(&found, common);
             talk::say(self.output.display());
             self.picture.iter().for_each(|picture| talk::say(picture.display()));
         }
@@ -154,16 +156,37 @@ impl FindGrasps {
 }
 
 impl GraspOptions {
+    /// The defaults, for an object of `scale` metres per unit.
+    pub fn at_scale(scale: f64) -> Self {
+        let GraspSettings { top, n_samples, friction, limits, .. } = GraspSettings::default();
+        Self {
+            metric: MetricOptions { aligned: None, scale: Some(scale), metres: false },
+            package: Vec::new(),
+            scene: Vec::new(),
+            scene_margin: SCENE_MARGIN,
+            table: None,
+            top,
+            samples: n_samples,
+            friction,
+            width_range: None,
+            approach: None,
+            approach_cone: APPROACH_CONE,
+            demonstrated: None,
+            clearance: limits.clearance,
+            pad_in_region: limits.pad_in_region,
+        }
+    }
+
     /// Reads everything that grasps of `mesh` need.
-    pub fn prepare<'a>(&self, gripper: &str, mesh: &'a Mesh) -> Result<GraspJob<'a>> {
-        let (scale, camera_from_object) = self.metric.read(mesh)?;
+    pub fn prepare(&self, gripper: &str, mesh: Mesh) -> Result<GraspJob> {
+        let (scale, camera_from_object) = self.metric.read(&mesh)?;
         let packages = self.package.iter().cloned().collect();
         let gripper = Gripper::open(gripper, &GripperSettings { packages, ..Default::default() })
             .context("--gripper")?;
         let object_from_answer = camera_from_object.map_or(Pose::IDENTITY, |pose| pose.inverse());
         let settings = self.settings(object_from_answer);
         let scene = self.scene(object_from_answer)?;
-        let object = GraspObject::from_mesh(mesh, scale)?;
+        let object = GraspObject::from_mesh(&mesh, scale)?;
         Ok(GraspJob { mesh, scale, camera_from_object, gripper, object, scene, settings })
     }
 
@@ -233,8 +256,8 @@ impl MetricOptions {
 }
 
 /// Grasps of one object, asked for.
-pub struct GraspJob<'a> {
-    mesh: &'a Mesh,
+pub struct GraspJob {
+    mesh: Mesh,
     scale: f64,
     camera_from_object: Option<Pose>,
     gripper: Gripper,
@@ -243,7 +266,7 @@ pub struct GraspJob<'a> {
     settings: GraspSettings,
 }
 
-impl GraspJob<'_> {
+impl GraspJob {
     /// Grasps in a region, one weight per vertex.
     pub fn find(&self, weights: &[f64], seed: u64, task: &Task) -> Result<Grasps> {
         let settings = GraspSettings { seed, ..self.settings.clone() };
@@ -251,14 +274,26 @@ impl GraspJob<'_> {
     }
 
     /// The grasps with all that gives them meaning.
-    pub fn answer<'b>(&'b self, found: &'b Grasps) -> GraspAnswer<'b> {
+    pub fn answer<'a>(&'a self, found: &'a Grasps) -> GraspAnswer<'a> {
         GraspAnswer {
-            mesh: self.mesh,
+            mesh: &self.mesh,
             object_scale: self.scale,
             camera_from_object: self.camera_from_object,
             gripper: &self.gripper,
             found,
         }
+    }
+
+    /// Writes `grasps.json`.
+    pub fn write(&self, path: &Path, found: &Grasps, seed: u64) -> Result<()> {
+        let settings = json!({
+            "seed": seed,
+            "friction": self.settings.friction,
+            "n_samples": self.settings.n_samples,
+            "version": env!("CARGO_PKG_VERSION"),
+        });
+        let about = Map::from_iter([("settings".to_owned(), settings)]);
+        Ok(write_grasps(path, &self.answer(found), about)?)
     }
 
     /// Draws the best grasps.
@@ -269,18 +304,20 @@ impl GraspJob<'_> {
     }
 }
 
+/// The answer in short, for `--json`.
+pub fn grasps_summary(found: &Grasps) -> Value {
+    let rejected: Map<String, Value> =
+        found.rejected.iter().map(|(reason, n)| (reason.name().to_owned(), json!(n))).collect();
+    json!({
+        "n_grasps": found.grasps.len(),
+        "best_score": found.grasps.first().map(|grasp| grasp.score),
+        "n_candidates": found.n_candidates,
+        "rejected": rejected,
+    })
+}
+
 /// The best grasps as a table on stdout, the reasons of the others on stderr where none is left.
 pub fn tell(found: &Grasps, common: &Common) {
-    if common.json {
-        let best = found.grasps.first().map(|grasp| grasp.score);
-        talk::say(json!({
-            "n_grasps": found.grasps.len(),
-            "best_score": best,
-            "n_candidates": found.n_candidates,
-            "rejected": found.rejected.iter().map(|(reason, n)| (reason.name(), n)).collect::<Vec<_>>(),
-        }));
-        return;
-    }
     let (n, candidates) = (found.grasps.len(), found.n_candidates);
     talk::say(format_args!("grasps      {n} of {candidates} candidates"));
     for (rank, grasp) in found.grasps.iter().take(5).enumerate() {
@@ -323,21 +360,15 @@ fn parse_package(text: &str) -> Result<(String, PathBuf)> {
     }
 }
 
+fn parse_vector(text: &str) -> Result<DVec3> {
+    Ok(DVec3::from_array(numbers(text).context("expected X,Y,Z")?))
+}
+
 fn parse_table(text: &str) -> Result<[DVec3; 2]> {
-    let [x, y, z, nx, ny, nz] = parse_numbers(text)?;
+    let [x, y, z, nx, ny, nz] = numbers(text).context("expected X,Y,Z,NX,NY,NZ")?;
     Ok([DVec3::new(x, y, z), DVec3::new(nx, ny, nz)])
 }
 
 fn parse_range(text: &str) -> Result<[f64; 2]> {
-    parse_numbers(text)
-}
-
-/// `N` numbers with commas between them.
-fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N]> {
-    let numbers: Vec<f64> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
-    let count = text.split(',').count();
-    match <[f64; N]>::try_from(numbers) {
-        Ok(numbers) if count == N => Ok(numbers),
-        _ => bail!("expected {N} numbers with commas between them, found `{text}`"),
-    }
+    numbers(text).context("expected LEAST,MOST")
 }

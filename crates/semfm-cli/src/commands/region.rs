@@ -11,7 +11,7 @@ use semfm::views::mcap::read_view;
 use semfm::{Mesh, Region};
 
 use super::Outcome;
-use crate::options::Common;
+use crate::options::{Common, numbers};
 use crate::{load, talk};
 
 /// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids

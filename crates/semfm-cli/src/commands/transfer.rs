@@ -16,6 +16,7 @@ use semfm::{
 use serde_json::{Map, Value, json};
 
 use super::Outcome;
+use super::grasp::{GraspJob, GraspOptions, grasps_summary, tell as tell_grasps};
 use super::embed::{Encoder, announce};
 use crate::options::Common;
 use crate::{load, talk};
@@ -47,6 +48,11 @@ pub struct Carry {
     meaning: MeaningOptions,
     #[command(flatten)]
     matching: MatchingOptions,
+    /// Go on to grasps with this hand: franka, robotiq-2f85, robotiq-2f140, or a URDF
+    #[arg(long, value_name = "NAME|URDF", help_heading = "Gripper")]
+    gripper: Option<String>,
+    #[command(flatten)]
+    grasps: GraspOptions,
 }
 
 #[derive(Debug, Args)]
@@ -123,10 +129,14 @@ impl Carry {
         let [source, target] = [&self.source, &self.target].map(|path| load::mesh(path, None));
         let (source, target) = (source?, target?);
         let region = read_region(&self.region, &source.mesh)?;
+        let hand = self.gripper.as_ref();
+        let hand = hand.map(|hand| self.grasps.prepare(hand, target.mesh.clone())).transpose()?;
         let (source, target) = self.prepare(source, target, &settings, &task, common)?;
         let carried = transfer(&source, &target, &region, &settings.transfer, &task)?;
         let job = Job { source: &source, target: &target, region: &region, carried: &carried };
-        job.finish(&self.output, self.about(&settings.lift), &task, common)
+        let about = self.about(&settings.lift);
+        let hand = hand.map(|hand| Reach { job: hand, seed: self.matching.seed });
+        job.finish(&self.output, about, hand.as_ref(), &task, common)
     }
 
     /// Both objects, with their meaning from wherever the caller said.
@@ -203,37 +213,72 @@ pub struct Job<'a> {
     pub carried: &'a Transfer,
 }
 
+/// The hand that shall grasp in the carried region.
+pub struct Reach {
+    pub job: GraspJob,
+    pub seed: u64,
+}
+
 impl Job<'_> {
-    /// Writes every file, tells the answer, and says how the run ended.
+    /// Writes every file, tells the answer, and says how the run ended. A refused region is not
+    /// grasped.
     pub fn finish(
         &self,
         output: &Path,
         about: Map<String, Value>,
+        hand: Option<&Reach>,
         task: &Task,
         common: &Common,
     ) -> Result<Outcome> {
         let Self { source, target, region, carried } = *self;
-        let files = write_transfer(output, source, target, region, carried, about, task)?;
+        let mut files = write_transfer(output, source, target, region, carried, about, task)?;
+        let refused = carried.verdict == Verdict::Refuse;
+        let mut grasps = None;
+        if let Some(Reach { job, seed }) = hand.filter(|_| !refused) {
+            let found = job.find(carried.weights(), *seed, task)?;
+            let (answer, picture) = (output.join("grasps.json"), output.join("grasps.png"));
+            job.write(&answer, &found, *seed)?;
+            job.draw(&picture, carried.weights(), &found, task)?;
+            files.extend([answer, picture]);
+            grasps = Some(found);
+        }
         let stages = stages_ms(source, target, carried);
         if common.json {
-            let stages: Map<String, Value> =
-                stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect();
-            talk::say(json!({
-                "verdict": carried.verdict,
-                "confidence": carried.confidence,
-                "method": carried.report.settings.method,
-                "n_vertices": carried.region.vertices().len(),
-                "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
-                "stages_ms": stages,
-            }));
+            talk::say(self.summary(&stages, &files, grasps.as_ref()));
         } else {
-            tell(self, &stages, &files, common);
+            tell(self, &stages, common);
+            grasps.iter().for_each(|found| tell_grasps(found, common));
+            talk::say("wrote");
+            files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
         }
-        Ok(if carried.verdict == Verdict::Refuse { Outcome::NoAnswer } else { Outcome::Done })
+        let without = grasps.is_some_and(|found| found.grasps.is_empty());
+        Ok(if refused || without { Outcome::NoAnswer } else { Outcome::Done })
+    }
+
+    fn summary(
+        &self,
+        stages: &[(String, f64)],
+        files: &[PathBuf],
+        grasps: Option<&Grasps>,
+    ) -> Value {
+        let stages: Map<String, Value> =
+            stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect();
+        let mut summary = json!({
+            "verdict": self.carried.verdict,
+            "confidence": self.carried.confidence,
+            "method": self.carried.report.settings.method,
+            "n_vertices": self.carried.region.vertices().len(),
+            "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+            "stages_ms": stages,
+        });
+        if let Some(found) = grasps {
+            summary["grasps"] = grasps_summary(found);
+        }
+        summary
     }
 }
 
-fn tell(job: &Job<'_>, stages: &[(String, f64)], files: &[PathBuf], common: &Common) {
+fn tell(job: &Job<'_>, stages: &[(String, f64)], common: &Common) {
     let carried = job.carried;
     let n = carried.region.vertices().len();
     let verdict = json!(carried.verdict);
@@ -256,6 +301,4 @@ fn tell(job: &Job<'_>, stages: &[(String, f64)], files: &[PathBuf], common: &Com
             talk::say(format_args!("{name:11} {}", object.shape.report().cleaning));
         }
     }
-    talk::say("wrote");
-    files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
 }
