@@ -56,7 +56,8 @@ fn fault(path: &Path, expected: &str) -> Option<String> {
         word.trim_end_matches(';').parse().ok()
     };
     let found = (description.n_links(), description.n_joints());
-    if count("links=").is_some_and(|n| n != found.0) || count("joints=").is_some_and(|n| n != found.1)
+    if count("links=").is_some_and(|n| n != found.0)
+        || count("joints=").is_some_and(|n| n != found.1)
     {
         return Some(format!("found {found:?}"));
     }

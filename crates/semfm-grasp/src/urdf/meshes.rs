@@ -68,7 +68,10 @@ impl MeshPaths {
                 return fault("path-outside", "a file inside its package");
             }
             let Some(folder) = self.packages.get(package) else {
-                return Ok(MeshPlace::Missing(format!("package `{}` is not mapped", short(package))));
+                return Ok(MeshPlace::Missing(format!(
+                    "package `{}` is not mapped",
+                    short(package)
+                )));
             };
             return match resolve(folder, folder, inside) {
                 Some(place) => Ok(place),

@@ -4,8 +4,8 @@
 //! forgets where things stood. So the text is first read here, by a streaming reader and without
 //! recursion: no document type, no entities beyond the five of XML, bounded depth and counts.
 
-use quick_xml::{Decoder, Reader};
 use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Decoder, Reader};
 
 use super::Fault;
 
@@ -131,9 +131,8 @@ impl Outline {
             }
             let attribute = attribute.map_err(|error| bad(&error))?;
             let key = String::from_utf8_lossy(attribute.key.as_ref()).into_owned();
-            let value = attribute
-                .decode_and_unescape_value(decoder)
-                .map_err(|error| bad(&error))?;
+            let value =
+                attribute.decode_and_unescape_value(decoder).map_err(|error| bad(&error))?;
             attributes.push((key, value.into_owned()));
         }
         let here = self.elements.len();
@@ -226,7 +225,8 @@ mod tests {
 
     #[test]
     fn elements_keep_order_line_and_attributes() {
-        let text = "<?xml version=\"1.0\"?>\n<robot name=\"a&amp;b\">\n  <link name='l'/>\n</robot>";
+        let text =
+            "<?xml version=\"1.0\"?>\n<robot name=\"a&amp;b\">\n  <link name='l'/>\n</robot>";
         let outline = Outline::read(text.as_bytes()).unwrap();
         let root = outline.root().unwrap();
         assert_eq!((root.line, root.attribute("name")), (2, Some("a&b")));
@@ -237,7 +237,8 @@ mod tests {
 
     #[test]
     fn laughs_depth_and_foreign_entities_are_refused() {
-        let laughs = "<!DOCTYPE r [<!ENTITY a \"lol\"><!ENTITY b \"&a;&a;\">]><robot name=\"&b;\"/>";
+        let laughs =
+            "<!DOCTYPE r [<!ENTITY a \"lol\"><!ENTITY b \"&a;&a;\">]><robot name=\"&b;\"/>";
         assert_eq!(code(laughs), "dtd");
         assert_eq!(code("<robot name=\"&b;\"/>"), "xml");
         assert_eq!(code("<robot>&b;</robot>"), "xml");

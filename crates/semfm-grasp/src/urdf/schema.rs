@@ -38,7 +38,11 @@ const OPTIONAL: Option<&str> = Some("");
 /// `velocity` and `effort` of a limit are demanded by the specification and left out by many; no
 /// grasp depends on them.
 const RULES: &[Rule] = &[
-    Rule { name: "link", attributes: &[("name", Value::Name, None)], children: &["inertial", "visual", "collision"] },
+    Rule {
+        name: "link",
+        attributes: &[("name", Value::Name, None)],
+        children: &["inertial", "visual", "collision"],
+    },
     Rule { name: "inertial", attributes: &[], children: &["origin", "mass", "inertia"] },
     Rule { name: "visual", attributes: &[], children: &["origin", "geometry"] },
     Rule { name: "collision", attributes: &[], children: &["origin", "geometry"] },
@@ -64,7 +68,11 @@ const RULES: &[Rule] = &[
         ],
         children: &[],
     },
-    Rule { name: "geometry", attributes: &[], children: &["box", "cylinder", "capsule", "sphere", "mesh"] },
+    Rule {
+        name: "geometry",
+        attributes: &[],
+        children: &["box", "cylinder", "capsule", "sphere", "mesh"],
+    },
     Rule { name: "box", attributes: &[("size", Value::Size(3), None)], children: &[] },
     Rule {
         name: "cylinder",
@@ -174,12 +182,7 @@ fn write_attribute(
 }
 
 /// The value as it is handed on.
-fn check_value(
-    element: &Element,
-    name: &str,
-    value: Value,
-    text: &str,
-) -> Result<String, Fault> {
+fn check_value(element: &Element, name: &str, value: Value, text: &str) -> Result<String, Fault> {
     let place = || format!("{}: {name}", element.place());
     let (count, code) = match value {
         Value::Text => return Ok(text.to_owned()),

@@ -1,0 +1,81 @@
+//! The flat face of a finger that looks at the other finger.
+
+use semfm_geom::math::DVec3;
+
+/// Faces within this angle of the closing direction belong to a pad.
+const COS_TILT: f64 = 0.966; // 15°
+/// How deep a pad may be ribbed or rounded, metres.
+const DEPTH: f64 = 1e-3;
+/// A face that stands in front is the pad where it has this share of the largest face: less lets
+/// screws through, more misses a fingertip before the flat of its carriage.
+const MIN_SHARE: f64 = 0.25;
+
+/// A pad: how far its face stands towards the other finger, and which points belong to it.
+pub(super) struct Face {
+    /// Along the inward direction, metres.
+    pub height: f64,
+    /// Corners of its triangles.
+    pub points: Vec<DVec3>,
+}
+
+/// The innermost flat face of a finger's surface that is large enough; `inward` is a unit vector
+/// towards the other finger. The winding of triangles is not trusted.
+pub(super) fn innermost(triangles: &[[DVec3; 3]], inward: DVec3) -> Option<Face> {
+    let mut flat: Vec<(f64, f64, &[DVec3; 3])> = triangles
+        .iter()
+        .filter_map(|triangle| {
+            let [a, b, c] = *triangle;
+            let normal = (b - a).cross(c - a) / 2.0;
+            let area = normal.length();
+            let height = triangle.map(|p| p.dot(inward)).into_iter().fold(f64::MIN, f64::max);
+            (area > 0.0 && normal.dot(inward).abs() >= COS_TILT * area)
+                .then_some((height, area, triangle))
+        })
+        .collect();
+    flat.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Area of each slice of depth DEPTH that begins at a triangle, by two running ends.
+    let (mut end, mut area) = (0, 0.0);
+    let mut slices = Vec::with_capacity(flat.len());
+    for start in 0..flat.len() {
+        while end < flat.len() && flat[end].0 >= flat[start].0 - DEPTH {
+            area += flat[end].1;
+            end += 1;
+        }
+        slices.push((area, end));
+        area -= flat[start].1;
+    }
+    let largest = slices.iter().map(|slice| slice.0).fold(0.0, f64::max);
+    let start = slices.iter().position(|slice| slice.0 >= MIN_SHARE * largest)?;
+    let points = flat[start..slices[start].1].iter().flat_map(|(_, _, corners)| **corners);
+    Some(Face { height: flat[start].0, points: points.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d_f64::shape::Cuboid;
+
+    use super::*;
+
+    fn block(middle: DVec3, size: DVec3) -> Vec<[DVec3; 3]> {
+        let (points, faces) = Cuboid::new(size / 2.0).to_trimesh();
+        faces.iter().map(|face| face.map(|i| points[i as usize] + middle)).collect()
+    }
+
+    #[test]
+    fn the_pad_is_found_before_the_finger_and_behind_a_screw() {
+        let mut finger = block(DVec3::ZERO, DVec3::new(0.02, 0.02, 0.06));
+        finger.extend(block(DVec3::new(0.0, 0.012, 0.02), DVec3::new(0.018, 0.004, 0.018)));
+        finger.extend(block(DVec3::new(0.0, 0.015, -0.02), DVec3::splat(0.002)));
+        let face = innermost(&finger, DVec3::Y).unwrap();
+        assert!((face.height - 0.014).abs() < 1e-12, "{}", face.height);
+        let (low, high) = semfm_geom::math::bounds(&face.points).unwrap();
+        assert!((high.z - low.z - 0.018).abs() < 1e-12 && (high.x - low.x - 0.018).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_finger_without_a_flat_side_has_no_pad() {
+        let edge = [[DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::Z]];
+        assert!(innermost(&edge, DVec3::Y).is_none());
+        assert!(innermost(&[], DVec3::Y).is_none());
+    }
+}
