@@ -18,6 +18,9 @@ pub enum Error {
     /// Maps and regions.
     #[error(transparent)]
     Fmap(#[from] semfm_fmap::Error),
+    /// Grippers, grasps and alignment.
+    #[error(transparent)]
+    Grasp(#[from] semfm_grasp::Error),
     /// An argument outside what it may be.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
@@ -57,7 +60,8 @@ impl Error {
             Self::Geom(cause) => cause.code(),
             Self::Views(cause) => cause.code(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.code(),
-            Self::Fmap(_) | Self::Invalid { .. } => "invalid",
+            Self::Grasp(semfm_grasp::Error::Geom(cause)) => cause.code(),
+            Self::Fmap(_) | Self::Grasp(_) | Self::Invalid { .. } => "invalid",
             Self::Format { .. } => "format",
         }
     }
@@ -68,7 +72,8 @@ impl Error {
             Self::Geom(cause) => cause.place(),
             Self::Views(cause) => cause.place(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.place(),
-            Self::Fmap(_) => None,
+            Self::Grasp(semfm_grasp::Error::Geom(cause)) => cause.place(),
+            Self::Fmap(_) | Self::Grasp(_) => None,
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format { place, .. } => Some(place.clone()),
         }

@@ -89,7 +89,7 @@ impl MakeRegion {
     }
 }
 
-fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N]> {
+pub(super) fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N]> {
     let found = || anyhow::anyhow!("found `{text}`");
     let values: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     values.and_then(|values| values.try_into().ok()).ok_or_else(found)

