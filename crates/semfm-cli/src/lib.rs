@@ -12,7 +12,7 @@ use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, completions, demo, grasp, info, region, show, transfer, views};
+use commands::{Outcome, align, completions, demo, grasp, info, region, show, transfer, views};
 use options::Common;
 
 /// Carry a demonstrated region from one object to another.
@@ -36,6 +36,7 @@ enum Command {
     Transfer(Box<transfer::Carry>),
     Grasp(Box<grasp::FindGrasps>),
     Show(show::Show),
+    Align(Box<align::FindPose>),
     Info(info::Info),
     Completions(completions::Completions),
 }
@@ -58,6 +59,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Transfer(command) => command.run(&common),
         Command::Grasp(command) => command.run(&common),
         Command::Show(command) => command.run(&common),
+        Command::Align(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     });

@@ -37,6 +37,8 @@ pub use grasp::Grasp;
 pub use gripper::Gripper;
 pub use hand::{BoxHand, Hand};
 pub use object::GraspObject;
+/// A rotation and a translation, metres: the pose type of the whole crate.
+pub use parry3d_f64::math::Pose;
 pub use rejection::{Miss, Reason, Rejected};
 pub use scene::Scene;
 pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation};

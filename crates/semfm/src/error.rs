@@ -18,7 +18,7 @@ pub enum Error {
     /// Maps and regions.
     #[error(transparent)]
     Fmap(#[from] semfm_fmap::Error),
-    /// Grippers, robot descriptions and grasps.
+    /// Grippers, robot descriptions, grasps and alignment.
     #[error(transparent)]
     Grasp(#[from] semfm_grasp::Error),
     /// An argument outside what it may be.

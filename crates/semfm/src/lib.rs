@@ -31,8 +31,10 @@ pub use semfm_geom as geom;
 pub use semfm_grasp as grasp;
 pub use semfm_views as views;
 
+pub mod aligned;
 mod error;
 pub mod grasps;
+pub mod observed;
 pub mod output;
 pub mod picture;
 pub mod pipeline;

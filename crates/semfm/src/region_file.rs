@@ -107,7 +107,7 @@ struct RegionFile {
 
 /// Which mesh a region belongs to; whatever is given must agree.
 #[derive(Deserialize, Serialize)]
-struct MeshName {
+pub(crate) struct MeshName {
     #[serde(skip_serializing_if = "Option::is_none")]
     n_vertices: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -117,13 +117,16 @@ struct MeshName {
 }
 
 impl MeshName {
-    fn of(mesh: &Mesh) -> Self {
+    pub(crate) fn of(mesh: &Mesh) -> Self {
         let hash = Some(mesh.hash().to_string());
         Self { n_vertices: Some(mesh.n_vertices()), n_triangles: Some(mesh.n_faces()), hash }
     }
 
     /// Place, expected and found of the first disagreement.
-    fn check(&self, mesh: &Mesh) -> std::result::Result<(), (&'static str, String, String)> {
+    pub(crate) fn check(
+        &self,
+        mesh: &Mesh,
+    ) -> std::result::Result<(), (&'static str, String, String)> {
         let counts = [
             ("mesh.n_vertices", self.n_vertices, mesh.n_vertices(), "vertices"),
             ("mesh.n_triangles", self.n_triangles, mesh.n_faces(), "triangles"),

@@ -241,7 +241,7 @@ impl MetricOptions {
     /// Metres per unit, and the pose of the object in metres before the camera.
     fn read(&self, mesh: &Mesh) -> Result<(f64, Option<Pose>)> {
         if let Some(path) = &self.aligned {
-            let aligned = read_aligned(path, mesh)?;
+            let aligned = read_aligned(path, Some(mesh))?;
             let pose = aligned.camera_from_object;
             return Ok((pose.scale, Some(pose.rigid())));
         }
@@ -335,11 +335,7 @@ pub fn tell(found: &Grasps, common: &Common) {
         return;
     }
     for (reason, count) in found.rejected.iter() {
-        talk::remark(format_args!(
-            "{count:8}  {:14} {}",
-            reason.name(),
-            reason.explanation()
-        ));
+        talk::remark(format_args!("{count:8}  {:14} {}", reason.name(), reason.explanation()));
     }
     if let Some(miss) = &found.nearest_miss {
         let unit = miss.reason.unit();

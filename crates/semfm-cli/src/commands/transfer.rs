@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
 use semfm::geom::ShapeCache;
+use semfm::grasp::Grasps;
 use semfm::geom::io::MeshFile;
 use semfm::output::{stages_ms, write_transfer};
 use semfm::region_file::read_region;
@@ -16,8 +17,8 @@ use semfm::{
 use serde_json::{Map, Value, json};
 
 use super::Outcome;
-use super::grasp::{GraspJob, GraspOptions, grasps_summary, tell as tell_grasps};
 use super::embed::{Encoder, announce};
+use super::grasp::{GraspJob, GraspOptions, grasps_summary, tell as tell_grasps};
 use crate::options::Common;
 use crate::{load, talk};
 

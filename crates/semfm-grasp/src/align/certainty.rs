@@ -3,7 +3,7 @@
 use nalgebra::SymmetricEigen;
 
 use super::sim3::Sim3;
-use super::solve::{Matching, Matrix7, Problem, geman_mcclure};
+use super::solve::{Matching, Matrix7, Problem, Pull, geman_mcclure};
 
 /// What is left over at a pose, and what that means for it.
 #[derive(Clone, Copy, Debug)]
@@ -75,15 +75,11 @@ fn sandwich(a: Matrix7, b: Matrix7) -> Matrix7 {
     covariance + inverse * b * inverse
 }
 
-/// Noise of the points that lie on the model: 1.4826 times the median distance to their planes.
-/// `None` where none does.
-pub(super) fn noise(problem: &Problem<'_>, pose: &Sim3, ids: &[u32], width: f64) -> Option<f64> {
-    let mut residuals = Vec::with_capacity(ids.len());
-    problem.pulls(pose, ids, width, Matching::Exact, |_, pull| {
-        if pull.squared < width * width {
-            residuals.push(pull.residual.abs());
-        }
-    });
+/// Noise of the points that lie on the model: 1.4826 times the median distance to their planes,
+/// among those matched within `width`. `None` where none is.
+pub(super) fn noise(pulls: &[Pull], width: f64) -> Option<f64> {
+    let near = pulls.iter().filter(|pull| pull.squared < width * width);
+    let mut residuals: Vec<f64> = near.map(|pull| pull.residual.abs()).collect();
     let middle = residuals.len() / 2;
     (residuals.len() >= 7)
         .then(|| 1.4826 * *residuals.select_nth_unstable_by(middle, f64::total_cmp).1)

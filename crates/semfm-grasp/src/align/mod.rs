@@ -199,34 +199,43 @@ const NOISE_WIDTH: f64 = 4.0;
 /// Least width of the kernel, as a share of the observed diameter, on clouds without noise.
 const LEAST_WIDTH: f64 = 1e-4;
 
-/// Steps of the last round at most; five to eight are usual.
-const LAST_STEPS: usize = 25;
+/// Steps of the last round at most; four to six are usual.
+const LAST_STEPS: usize = 12;
 
-/// A step this short (radians, radii, logarithms) is the last one.
-const SHORT_STEP: f64 = 1e-9;
+/// Points of the first steps of the last round, in which the kernel finds its width.
+const SETTLE_POINTS: usize = 250;
+/// Those first steps.
+const SETTLE_STEPS: usize = 2;
+
+/// Steps in which the kernel still follows the noise; later it would make the pose tremble.
+const WIDTH_STEPS: usize = 6;
+
+/// A step is the last one where it is this share of what the noise leaves uncertain.
+const SHORT_STEP: f64 = 0.25;
 
 impl Problem<'_> {
     /// All points, exact matches, a kernel as wide as the noise. Returns the pose, the kernel's
     /// width and the steps taken.
     fn polish(&self, start: Sim3, ids: &[u32], task: &Task) -> Result<(Sim3, f64, usize)> {
         let size = self.observed.diameter();
-        let mut width = 0.03 * size;
-        let mut pose = start;
-        let mut shortest = f64::INFINITY;
+        let some = self.observed.some(SETTLE_POINTS);
+        let (mut pose, mut width) = (start, 0.03 * size);
+        let mut pulls = Vec::with_capacity(ids.len());
         for step in 1..=LAST_STEPS {
             task.check()?;
-            if step <= 6 {
-                let noise = noise(self, &pose, ids, width).unwrap_or(width);
+            pulls.clear();
+            let asked = if step <= SETTLE_STEPS { &some } else { ids };
+            self.pulls(&pose, asked, width, Matching::Exact, |_, pull| pulls.push(pull));
+            if step <= WIDTH_STEPS {
+                let noise = noise(&pulls, width).unwrap_or(width);
                 width = (NOISE_WIDTH * noise).clamp(LEAST_WIDTH * size, width);
             }
-            let Some((moved, length)) = self.step(&pose, ids, width, Matching::Exact) else {
+            let Some((moved, length)) = self.follow(&pose, &pulls, width) else {
                 return Ok((pose, width, step));
             };
             pose = moved;
-            // Noisy points change their triangle back and forth: stop where steps no longer shrink.
-            let still = step > 6 && length > 0.7 * shortest && length < 1e-3;
-            shortest = shortest.min(length);
-            if length < SHORT_STEP || still {
+            let uncertain = width / (NOISE_WIDTH * pose.scale * (ids.len() as f64).sqrt());
+            if step > SETTLE_STEPS && length < SHORT_STEP * uncertain {
                 return Ok((pose, width, step));
             }
         }
@@ -279,7 +288,11 @@ impl AlignSettings {
                 && init.translation.is_finite()
                 && init.rotation.is_normalized())
         {
-            return refuse("initial pose", "a positive scale and finite numbers", format!("{init:?}"));
+            return refuse(
+                "initial pose",
+                "a positive scale and finite numbers",
+                format!("{init:?}"),
+            );
         }
         if !(1..=100_000).contains(&self.n_starts) {
             return refuse("starts", "1 to 100000", self.n_starts.to_string());

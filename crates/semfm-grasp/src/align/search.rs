@@ -36,7 +36,7 @@ const WIDTHS: [f64; 3] = [0.25, 0.05, 0.02];
 const SCORE_WIDTH: f64 = 0.025;
 
 /// An initial pose that scores this much is believed without trying others.
-const GOOD_ENOUGH: f64 = 0.8;
+const GOOD_ENOUGH: f64 = 0.7;
 
 /// Poses that place the surface closer than this, in shares of its radius, are the same pose.
 const SAME: f64 = 0.06;
@@ -155,9 +155,7 @@ impl Problem<'_> {
         match &self.observed.evidence {
             Evidence::Sight(sight) => sight.compare(self.model, pose, tolerance, every, exact),
             Evidence::AllAround { index, spacing } => {
-                let near = |point: DVec3| {
-                    index.nearest(pose.apply(point)).1 <= tolerance + spacing
-                };
+                let near = |point: DVec3| index.nearest(pose.apply(point)).1 <= tolerance + spacing;
                 let samples = self.model.samples.iter().step_by(3 * every);
                 let mut seen = Seen::default();
                 samples.for_each(|s| match near(s.point) {
@@ -187,7 +185,8 @@ impl Problem<'_> {
     /// about its axis is no rival.
     fn best_and_rival(&self, found: Vec<Candidate>) -> Option<(Candidate, Option<Candidate>)> {
         let best = *found.first()?;
-        let elsewhere = |other: &&Candidate| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0;
+        let elsewhere =
+            |other: &&Candidate| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0;
         Some((best, found.iter().skip(1).find(elsewhere).copied()))
     }
 

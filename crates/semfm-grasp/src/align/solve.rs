@@ -107,8 +107,15 @@ impl Problem<'_> {
         width: f64,
         matching: Matching,
     ) -> Option<(Sim3, f64)> {
+        let mut pulls = Vec::with_capacity(ids.len());
+        self.pulls(pose, ids, width, matching, |_, pull| pulls.push(pull));
+        self.follow(pose, &pulls, width)
+    }
+
+    /// The step that given matches ask for.
+    pub fn follow(&self, pose: &Sim3, pulls: &[Pull], width: f64) -> Option<(Sim3, f64)> {
         let (mut a, mut g, mut total) = ([0.0f64; 28], [0.0f64; 7], 0.0);
-        self.pulls(pose, ids, width, matching, |_, pull| {
+        for pull in pulls {
             let weight = geman_mcclure(pull.squared, width) * pull.agreement;
             total += weight;
             let mut slot = 0;
@@ -120,7 +127,7 @@ impl Problem<'_> {
                     slot += 1;
                 }
             }
-        });
+        }
         if total <= 0.0 {
             return None;
         }

@@ -12,7 +12,7 @@ use parry3d_f64::math::Pose;
 use parry3d_f64::shape::SharedShape;
 use semfm_geom::math::{DQuat, DVec2, DVec3};
 
-use super::{Gripper, Motion, Part, Role};
+use super::{DriveJoint, Gripper, Motion, Part, Role};
 use crate::Result;
 
 /// Steps of a crank between open and closed: see [`Motion`].
@@ -58,7 +58,13 @@ fn franka() -> Result<Gripper> {
     }
     let flange_from_tcp =
         Pose::from_parts(DVec3::Z * TCP_ABOVE_FLANGE, DQuat::from_rotation_z(-FRAC_PI_4));
-    Gripper::new("franka", 0.0..=STROKE, [0.0175, 0.0185], flange_from_tcp.into(), parts)
+    let mut hand =
+        Gripper::new("franka", 0.0..=STROKE, [0.0175, 0.0185], flange_from_tcp.into(), parts)?;
+    // Each finger slides by half of the width.
+    let slides = ["panda_finger_joint1", "panda_finger_joint2"]
+        .map(|name| DriveJoint::new(name, [(0.0, 0.0), (STROKE, STROKE / 2.0)]));
+    hand.joints = slides.into_iter().flatten().collect();
+    Ok(hand)
 }
 
 /// A hand whose fingers are carried by parallelograms, described by its right finger in the plane

@@ -23,7 +23,7 @@ const MIN_PAD: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(super) struct Drive {
     /// Joint, position at share 0, position at share 1.
-    leaders: Vec<(usize, f64, f64)>,
+    pub leaders: Vec<(usize, f64, f64)>,
 }
 
 impl Drive {

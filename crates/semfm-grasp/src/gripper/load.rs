@@ -8,7 +8,7 @@ use semfm_geom::math::{DMat3, DQuat, DVec3};
 
 use super::jaws::{Jaws, body_of};
 use super::solids::{LinkShape, inertia_box};
-use super::{Gripper, Motion, Part, Role};
+use super::{DriveJoint, Gripper, Motion, Part, Role};
 use crate::urdf::{Description, JointKind, MeshPaths, Robot};
 use crate::{Error, Result};
 
@@ -204,7 +204,13 @@ impl Loader<'_> {
         let flange = by_width(&|frame| flange_from_palm * frame.palm_from_tcp);
         let pad = self.settings.pad.unwrap_or(jaws.pad);
         let gripper = Gripper::new(&self.robot.name, opening, pad, flange, parts)?;
-        Ok(Gripper { notes, ..gripper })
+        let joint = |&(joint, from, to): &(usize, f64, f64)| {
+            let positions =
+                frames.iter().map(|frame| (frame.width, from + (to - from) * frame.share));
+            DriveJoint::new(&self.robot.joints[joint].name, positions)
+        };
+        let joints = jaws.drive.leaders.iter().filter_map(joint).collect();
+        Ok(Gripper { notes, joints, ..gripper })
     }
 
     /// The drive sampled from closed to open, with the TCP between the pads.
@@ -243,7 +249,7 @@ impl Loader<'_> {
                 }
                 None => found,
             };
-            frames.push(Frame { width, palm_from_tcp, palm_from_link });
+            frames.push(Frame { width, share, palm_from_tcp, palm_from_link });
         }
         Ok(frames)
     }
@@ -382,6 +388,8 @@ impl Loader<'_> {
 /// The hand at one width.
 struct Frame {
     width: f64,
+    /// Of the drive's way.
+    share: f64,
     palm_from_tcp: Pose,
     palm_from_link: Vec<Pose>,
 }

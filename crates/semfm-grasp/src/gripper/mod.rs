@@ -6,6 +6,7 @@
 //! the pads (TCP).
 
 mod builtin;
+mod drive;
 mod jaws;
 mod load;
 mod motion;
@@ -17,6 +18,7 @@ use std::ops::RangeInclusive;
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::SharedShape;
 
+pub use self::drive::DriveJoint;
 pub use self::load::GripperSettings;
 pub use self::motion::Motion;
 use crate::{Error, Result};
@@ -38,6 +40,8 @@ pub struct Gripper {
     pub flange_from_tcp: Pose,
     /// Rigid parts of palm and fingers.
     pub parts: Vec<Part>,
+    /// The joints that open and close it, where they are known by name; mimicking ones follow.
+    pub joints: Vec<DriveJoint>,
     /// What was replaced or left out when it was loaded, in words.
     pub notes: Vec<String>,
     /// The TCP in the flange's frame, by width.
@@ -96,8 +100,9 @@ impl Gripper {
             return out("parts", "at least one", "none".into());
         }
         let flange_from_tcp = flange.at(closed);
-        let (name, notes) = (name.into(), Vec::new());
-        Ok(Self { name, opening, pad, flange_from_tcp, parts, notes, flange_motion: flange })
+        let (name, joints, notes) = (name.into(), Vec::new(), Vec::new());
+        let flange_motion = flange;
+        Ok(Self { name, opening, pad, flange_from_tcp, parts, joints, notes, flange_motion })
     }
 
     /// A built-in hand by its name, see [`Gripper::BUILTIN`].
@@ -120,6 +125,13 @@ impl Gripper {
     pub fn parts_at(&self, width: f64) -> Vec<(Pose, &Part)> {
         let width = self.reachable(width);
         self.parts.iter().map(|part| (part.motion.at(width), part)).collect()
+    }
+
+    /// Names and positions (metres or radians) of the joints when the pads are `width` metres apart;
+    /// empty where they are not known.
+    pub fn joints_at(&self, width: f64) -> Vec<(&str, f64)> {
+        let width = self.reachable(width);
+        self.joints.iter().map(|joint| (joint.name.as_str(), joint.at(width))).collect()
     }
 
     /// The TCP's pose in the flange's frame when the pads are `width` metres apart.

@@ -32,7 +32,9 @@ fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
     let none = if answer.found.grasps.is_empty() { " {}" } else { "" };
     let _ = writeln!(text, "grasps:{none}");
     for (i, grasp) in answer.found.grasps.iter().enumerate() {
-        let (p, q) = position_and_rotation(grasp.object_from_tcp * answer.gripper.flange_from_tcp_at(grasp.width).inverse());
+        let (p, q) = position_and_rotation(
+            grasp.object_from_tcp * answer.gripper.flange_from_tcp_at(grasp.width).inverse(),
+        );
         let _ = writeln!(text, "  \"grasp_{i}\":\n    confidence: {}", number(grasp.score));
         let _ = writeln!(text, "    position: {}", list(p.to_array()));
         let xyz = list([q.x, q.y, q.z]);
@@ -43,7 +45,7 @@ fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
             let joints = answer.gripper.joints_at(width);
             let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });
             for (joint, value) in joints {
-                let _ = writeln!(text, "      {}: {}", quoted(&joint), number(value));
+                let _ = writeln!(text, "      {}: {}", quoted(joint), number(value));
             }
         }
     }

@@ -19,7 +19,11 @@ pub const FORMAT: &str = "semfm.grasps/1";
 ///
 /// # Errors
 /// [`semfm_geom::Error::Io`] where the file cannot be written.
-pub fn write_grasps(path: &Path, answer: &GraspAnswer<'_>, about: Map<String, Value>) -> Result<()> {
+pub fn write_grasps(
+    path: &Path,
+    answer: &GraspAnswer<'_>,
+    about: Map<String, Value>,
+) -> Result<()> {
     let mut value = grasps_json(answer);
     for (key, entry) in about {
         value[key] = entry;

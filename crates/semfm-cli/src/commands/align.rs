@@ -1,0 +1,146 @@
+//! `semfm-cli align`: the pose and the metres of a reconstruction in what a camera sees.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::{ArgGroup, Args};
+use semfm::aligned::{aligned_json, read_pose, write_aligned};
+use semfm::geom::io::read_points;
+use semfm::geom::math::DVec3;
+use semfm::grasp::align::{AlignSettings, Alignment, Observation, Verdict, align};
+use semfm::observed::{read_depth, read_intrinsics, read_mask};
+
+use super::Outcome;
+use crate::options::{Common, numbers};
+use crate::{load, talk};
+
+/// Find a mesh of unknown scale in a depth image or a point cloud
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("observed").required(true).args(["cloud", "depth"]))]
+#[command(after_help = "Examples:\n  \
+    semfm-cli align mug.obj --depth depth.png --intrinsics K.json --mask mask.png -o aligned.json\n  \
+    semfm-cli align mug.obj --cloud seen.ply -o aligned.json\n\n\
+    Without a mask the cloud should hold little but the object: what else it holds counts as clutter.\n\
+    Exit code 0: a pose to use or to check. 1: verdict `refuse` (the file is written all the same). 2: bad input.")]
+pub struct FindPose {
+    /// The mesh, in any frame and any unit
+    mesh: PathBuf,
+    /// Where to write the pose (JSON)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    #[command(flatten)]
+    observed: ObservedOptions,
+    /// A guess: aligned.json or a 4 × 4 matrix, scale included; the search stays near its rotation
+    #[arg(long, value_name = "FILE", help_heading = "Search")]
+    init: Option<PathBuf>,
+    /// Least and greatest scale, metres per unit of the mesh [default: from the sizes]
+    #[arg(long, value_name = "LOW,HIGH", help_heading = "Search")]
+    scale_range: Option<String>,
+    /// Rotations to start from where there is no guess
+    #[arg(long, value_name = "N", default_value_t = AlignSettings::default().n_starts, help_heading = "Search")]
+    starts: usize,
+    /// Seed of the mesh's samples
+    #[arg(long, value_name = "N", default_value_t = AlignSettings::default().seed, help_heading = "Search")]
+    seed: u64,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What the camera sees")]
+struct ObservedOptions {
+    /// A cloud of the object in the camera's frame, metres: PLY, PCD, OBJ or OFF
+    #[arg(long, value_name = "FILE")]
+    cloud: Option<PathBuf>,
+    /// Where the camera stood in the cloud's frame
+    #[arg(long, value_name = "X,Y,Z", requires = "cloud", allow_hyphen_values = true)]
+    viewpoint: Option<String>,
+    /// The cloud was put together from many views: any side may be in it
+    #[arg(long, requires = "cloud", conflicts_with = "viewpoint")]
+    many_views: bool,
+    /// A depth image (16-bit PNG)
+    #[arg(long, value_name = "D.png", requires = "intrinsics")]
+    depth: Option<PathBuf>,
+    /// Units of the depth image to the metre
+    #[arg(long, value_name = "N", default_value_t = 1000.0, allow_negative_numbers = true)]
+    depth_scale: f64,
+    /// The camera: `{"fx", "fy", "cx", "cy"}` or `{"K": 3 × 3}`
+    #[arg(long, value_name = "K.json", requires = "depth")]
+    intrinsics: Option<PathBuf>,
+    /// A picture of the depth image's size, bright where the object is
+    #[arg(long, value_name = "M.png", requires = "depth")]
+    mask: Option<PathBuf>,
+}
+
+impl FindPose {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        let file = load::mesh(&self.mesh, None)?;
+        let start = Instant::now();
+        let observed = self.observed.read()?;
+        let read = start.elapsed().as_secs_f64() * 1e3;
+        let settings = AlignSettings {
+            init: self.init.as_deref().map(read_pose).transpose()?,
+            scale_range: (self.scale_range.as_deref().map(numbers).transpose())
+                .context("--scale-range: expected two numbers, LOW,HIGH")?,
+            n_starts: self.starts,
+            seed: self.seed,
+        };
+        let task = talk::watched(common.quiet);
+        let mut found = align(&file.mesh, &observed, &settings, &task)
+            .with_context(|| self.mesh.display().to_string())?;
+        found.stages_ms.insert(0, ("observe", read));
+        let value = aligned_json(&found, &file.mesh, &settings);
+        write_aligned(&self.output, &value)?;
+        if !common.quiet {
+            remark(&found);
+        }
+        if common.json {
+            talk::say(value);
+        } else {
+            talk::say(self.output.display());
+        }
+        let refused = found.verdict == Verdict::Refuse;
+        Ok(if refused { Outcome::NoAnswer } else { Outcome::Done })
+    }
+}
+
+impl ObservedOptions {
+    fn read(&self) -> Result<Observation> {
+        if let (Some(depth), Some(intrinsics)) = (&self.depth, &self.intrinsics) {
+            let image = read_depth(depth, self.depth_scale)?;
+            let camera = read_intrinsics(intrinsics, &image)?;
+            let mask = self.mask.as_deref().map(|mask| read_mask(mask, &image)).transpose()?;
+            let named = || self.mask.as_ref().unwrap_or(depth).display().to_string();
+            return Observation::from_depth(&image, &camera, mask.as_deref()).with_context(named);
+        }
+        let cloud = self.cloud.as_deref().context("--cloud or --depth is needed")?;
+        let points = read_points(cloud)?.points;
+        let viewpoint = match self.viewpoint.as_deref().map(numbers) {
+            Some(numbers) => {
+                DVec3::from_array(numbers.context("--viewpoint: expected three numbers, X,Y,Z")?)
+            }
+            None => DVec3::ZERO,
+        };
+        let observed = if self.many_views {
+            Observation::from_many_views(&points)
+        } else {
+            Observation::from_view(&points, viewpoint)
+        };
+        observed.with_context(|| cloud.display().to_string())
+    }
+}
+
+fn remark(found: &Alignment) {
+    let scale = found.camera_from_object.scale;
+    talk::remark(format_args!(
+        "scale {scale:.5} ± {:.5} metres per unit, residual {:.2} mm",
+        found.scale_std,
+        1e3 * found.residual_m
+    ));
+    talk::remark(format_args!(
+        "{:.0} % of the points on the model, {:.0} % of its visible side seen: {}",
+        100.0 * found.inlier_share,
+        100.0 * found.visibility,
+        format!("{:?}", found.verdict).to_lowercase()
+    ));
+    found.reasons.iter().for_each(|reason| talk::remark(format_args!("  {reason}")));
+}
