@@ -1,4 +1,4 @@
-"""Reads a ``*.views.mcap`` file: pictures, triangle images, cameras, and the mesh where it is there.
+"""Reads a ``*.views.mcap`` file: pictures, triangle images, cameras, and the mesh if it is there.
 
 Contract: ``/views/NNN/{image,camera,triangles}`` and ``/tf``, NNN from 000 without gaps, and the
 metadata record ``semfm``. Messages of cameras, poses and the mesh are not interpreted here beyond
