@@ -8,7 +8,7 @@ import random
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, Protocol
 from urllib.parse import urlsplit, urlunsplit
@@ -122,7 +122,7 @@ class EndpointSettings:
     """
 
     model: str
-    base_url: str = _OPENAI_URL
+    base_url: str = field(default=_OPENAI_URL, repr=False)  # may hold a password
     key: ApiKey | None = None
     timeout_s: float = 120.0
     max_attempts: int = 5
@@ -219,8 +219,9 @@ class ChatEndpoint:
             asked = time.perf_counter()
             try:
                 completion = self._client.chat.completions.create(**request)
-            except self._openai.OpenAIError as error:
-                # Its chain holds the request with its headers: leave that behind.
+            except (self._openai.OpenAIError, ValueError) as error:
+                # A ValueError is a body that says it is JSON and is not. Errors hold the request
+                # with its headers: nothing of theirs but their words goes on.
                 failure = self._failure(error)
                 pause = self._pause(error, failure, attempt, jitter)
             else:
