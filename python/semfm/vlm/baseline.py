@@ -40,7 +40,7 @@ class BaselineSettings:
 
     mode: str = "polygons"
     threshold: float = 0.5
-    n_segments: int = 48
+    n_segments: int = 64
     drawing: Drawing = field(default_factory=Drawing)
     hint: str = ""
 

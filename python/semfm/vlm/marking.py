@@ -106,30 +106,41 @@ def _draw_ruler(picture: Image.Image) -> Image.Image:
 
 
 def _draw_numbers(picture: Image.Image, segments: np.ndarray, factor: int) -> None:
-    """A number in the middle of every piece that has room for one."""
+    """A number in the middle of every piece that has room for one; large pieces choose first."""
     draw = ImageDraw.Draw(picture)
     font = _font(max(12, max(picture.size) // 40))
     parts, depth = components(segments), depth_inside(segments)
     sizes = np.bincount(parts.ravel())
     room = FRAGMENT * (segments > 0).sum()
     largest = {int(n): sizes[parts[segments == n]].max() for n in np.unique(segments[segments > 0])}
-    for part in range(len(sizes)):
+    taken: list[tuple[float, float, float, float]] = []
+    for part in np.argsort(-sizes, kind="stable").tolist():
         inside = parts == part
         number = int(segments[inside][0])
-        # Every patch gets a number somewhere, however small it is.
+        # Of a patch in small pieces the largest still gets its number.
         if not number or sizes[part] < min(room, largest[number]):
             continue
-        deepest = np.argwhere(inside & (depth == depth[inside].max()))
-        row, col = deepest[np.argmin(((deepest - deepest.mean(0)) ** 2).sum(1))]
-        place = ((col + 0.5) * factor, (row + 0.5) * factor)
-        box = draw.textbbox(place, str(number), font=font, anchor="mm")
-        draw.rounded_rectangle(
-            (box[0] - 3, box[1] - 2, box[2] + 3, box[3] + 2),
-            4,
-            fill=(0, 0, 0),
-            outline=_colour(number),
-        )
-        draw.text(place, str(number), font=font, anchor="mm", fill=(255, 255, 255))
+        for row, col in _places(inside, depth):
+            place = ((col + 0.5) * factor, (row + 0.5) * factor)
+            left, top, right, bottom = draw.textbbox(place, str(number), font=font, anchor="mm")
+            box = (left - 3, top - 2, right + 3, bottom + 2)
+            if not any(_overlap(box, other) for other in taken):
+                taken.append(box)
+                draw.rounded_rectangle(box, 4, fill=(0, 0, 0), outline=_colour(number))
+                draw.text(place, str(number), font=font, anchor="mm", fill=(255, 255, 255))
+                break
+
+
+def _places(inside: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Pixels (n × 2) of a piece, as (row, col), from its middle outwards, deep ones only."""
+    deep = np.argwhere(inside & (2 * depth >= depth[inside].max()))
+    deepest = deep[depth[tuple(deep.T)] == depth[inside].max()]
+    middle = deepest[np.argmin(((deepest - deepest.mean(0)) ** 2).sum(1))]
+    return deep[np.argsort(((deep - middle) ** 2).sum(1), kind="stable")]
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _colour(number: int) -> tuple[int, int, int]:

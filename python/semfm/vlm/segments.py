@@ -3,8 +3,9 @@
 Yang et al., "Set-of-Mark Prompting Unleashes Extraordinary Visual Grounding in GPT-4V", 2023: a
 model names regions better by numbers drawn on them than by coordinates. There the regions come
 from a segmentation network; here the surface itself is cut into patches of even size: k-means on
-the points behind the pixels and the directions in which the surface faces. A patch has the same
-number in every view that shows it.
+the points behind the pixels and the directions in which the surface faces, then a cut wherever a
+patch falls apart, as between a handle and the body beside it. A patch has the same number in every
+view that shows it.
 """
 
 from __future__ import annotations
@@ -16,11 +17,16 @@ import numpy as np
 from .object_views import ObjectView, ObjectViews
 
 #: Weight of the direction (a unit vector) beside the position (in sides of a patch): two faces at
-#: a right angle are 1.4 times this many patches apart, so sharp edges part patches.
-FACING = 1.0
+#: a right angle are 1.4 times this many patches apart. On 24 real objects, six views, 48 patches,
+#: true regions came back with IoU .867 at 0.5, .856 at 1 and .840 at 2; without the cut into pieces
+#: below, .849 at 1.
+FACING = 0.5
 #: Fragments below this share of the object's pixels in a view are given to their neighbours: no
 #: number would fit on them.
 FRAGMENT = 0.004
+#: Pieces of a patch that are this many pixels apart are patches of their own. Below 2, surfaces seen
+#: at a slant fall to dust.
+GAP_PIXELS = 3.0
 _SAMPLES, _ROUNDS = 12_000, 12
 
 
@@ -34,7 +40,7 @@ def segment(of: ObjectViews, views: Sequence[ObjectView], n_segments: int) -> li
     views
         Those that the model will be shown.
     n_segments
-        How many patches, at most.
+        How many patches, before those that fall apart are cut.
 
     Returns
     -------
@@ -49,9 +55,11 @@ def segment(of: ObjectViews, views: Sequence[ObjectView], n_segments: int) -> li
     # follows from the area that the samples spread over.
     side = np.sqrt(_area_seen(of, views) / n_segments)
     features = np.concatenate([points / max(side, 1e-300), FACING * facing], 1)
-    labels = _cluster(features, n_segments) + 1
+    labels = _pieces(points, _cluster(features, n_segments), GAP_PIXELS * _pixel(views)) + 1
     cuts = np.cumsum([len(view.surface.rows) for view in views])[:-1]
-    return [_tidy(view.image(part)) for view, part in zip(views, np.split(labels, cuts))]
+    images = [_tidy(view.image(part)) for view, part in zip(views, np.split(labels, cuts))]
+    numbers = np.unique(np.concatenate([[0], *(image.ravel() for image in images)]))
+    return [np.searchsorted(numbers, image) for image in images]
 
 
 def _facing(of: ObjectViews, view: ObjectView) -> np.ndarray:
@@ -69,6 +77,40 @@ def _area_seen(of: ObjectViews, views: Sequence[ObjectView]) -> float:
     corners = np.unique(np.concatenate([view.surface.corners for view in views]), axis=0)
     a, b, c = (of.vertices[corners[:, i]] for i in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def _pixel(views: Sequence[ObjectView]) -> float:
+    """Width of a pixel on the object, in its units."""
+    widths = [
+        np.linalg.norm(view.surface.points - view.camera.eye, axis=1) / view.camera.focal.min()
+        for view in views
+    ]
+    return float(np.median(np.concatenate(widths)))
+
+
+def _pieces(points: np.ndarray, labels: np.ndarray, gap: float) -> np.ndarray:
+    """Labels (n) from 0 of connected pieces: points (n × 3) of one label, in cells of side ``gap``
+    of a grid that touch, if only in a corner."""
+    cells = np.floor((points - points.min(0)) / max(gap, 1e-300)).astype(np.int64) + 1
+    x, y, z = cells.max(0) + 2
+    strides = np.array([y * z, z, 1])
+    keys, of_point = np.unique(labels * (x * y * z) + cells @ strides, return_inverse=True)
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), -1).reshape(-1, 3) @ strides
+    edges = []
+    for step in steps[steps > 0]:
+        at = np.searchsorted(keys, keys + step).clip(max=len(keys) - 1)
+        near = np.flatnonzero(keys[at] == keys + step)
+        edges.append(np.stack([near, at[near]]))
+    a, b = np.concatenate(edges, 1)
+    piece = np.arange(len(keys))
+    while True:
+        lowest = piece.copy()
+        np.minimum.at(lowest, a, piece[b])
+        np.minimum.at(lowest, b, piece[a])
+        lowest = lowest[lowest]  # follow the lower piece to its own lower one
+        if (lowest == piece).all():
+            return np.unique(piece, return_inverse=True)[1].reshape(-1)[of_point.reshape(-1)]
+        piece = lowest
 
 
 def _cluster(features: np.ndarray, k: int) -> np.ndarray:
