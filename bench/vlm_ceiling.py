@@ -51,7 +51,8 @@ def views_of(label: Path, args: argparse.Namespace) -> Path:
     path = args.views / f"{label.stem}.views.mcap"
     if not path.exists():
         args.views.mkdir(parents=True, exist_ok=True)
-        mesh = next(m for m in sorted(label.parent.glob(f"{label.stem}.*")) if m != label)
+        meshes = [label.with_suffix(suffix) for suffix in (".obj", ".ply", ".stl", ".off", ".glb")]
+        mesh = next(mesh for mesh in meshes if mesh.exists())
         command = [args.cli, "views", str(mesh), "-o", str(path), "--size", str(args.size), "-q"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return path
@@ -65,7 +66,8 @@ def ceilings(label: Path, views: Path, ways: list[tuple[str, int]], n_segments: 
     for mode, n_views in ways:
         settings = BaselineSettings(mode=mode, n_segments=n_segments)
         outcome = transfer(of, of, weights, n_views, TrueMasks(weights), settings)
-        found.append(0.0 if outcome.weights is None else iou(outcome.weights >= 0.5, weights >= 0.5))
+        lifted = np.zeros_like(weights) if outcome.weights is None else outcome.weights
+        found.append(iou(lifted >= 0.5, weights >= 0.5))
     return found
 
 

@@ -34,8 +34,8 @@ examples:
   semfm-vlm mug.views.mcap jug.views.mcap --region handle.json -o region.json --views 6
   semfm-vlm --pairs data/pairs.json --views-dir views -o rows.json --views 1,3,6 --cache replies
 
-exit code: 0 a region (with --pairs: in every row that got a reply there may be one), 1 a reply
-without one, 2 bad input or failure, 130 interrupted (rows so far are kept)
+exit code: 0 a region (with --pairs: at least one), 1 replies without any, 2 bad input or failure
+(with --pairs also a row without a reply), 130 interrupted; rows that are done are kept
 """
 
 

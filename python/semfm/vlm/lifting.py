@@ -23,6 +23,8 @@ from .region import COUNTS
 #: vertex between them has one within a width and a half. Below 1, slanted faces fall out of sight;
 #: above 2, the far sides of blades count as seen.
 REACH_PIXELS = 1.5
+#: Lead of a vertex's own triangles, in reaches; beyond any distance between neighbouring pixels.
+_OWN = 1e6
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,8 @@ def seen_in(of: ObjectViews, view: ObjectView) -> np.ndarray:
     -------
     numpy.ndarray
         (n) int, an index into the view's surface; −1 where the view does not see the vertex. Of
-        several such pixels the one whose surface point is nearest.
+        several such pixels one that shows a triangle of the vertex, and of those the one whose
+        surface point is nearest.
     """
     surface, n = view.surface, len(of.vertices)
     height, width = view.on_object.shape
@@ -108,8 +111,10 @@ def seen_in(of: ObjectViews, view: ObjectView) -> np.ndarray:
             ids, pixels = ids[pixels >= 0], pixels[pixels >= 0]
             distance = np.linalg.norm(surface.points[pixels] - of.vertices[ids], axis=1)
             own = (surface.corners[pixels] == ids[:, None]).any(1)
-            better = ((distance <= reach[ids]) | own) & (distance < nearest[ids])
-            best[ids[better]], nearest[ids[better]] = pixels[better], distance[better]
+            # At an edge the next side may be nearer: a triangle of the vertex itself goes first.
+            rank = distance / reach[ids] - np.where(own, _OWN, 0.0)
+            better = ((distance <= reach[ids]) | own) & (rank < nearest[ids])
+            best[ids[better]], nearest[ids[better]] = pixels[better], rank[better]
     return best
 
 

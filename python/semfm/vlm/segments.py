@@ -24,8 +24,8 @@ FACING = 0.5
 #: Fragments below this share of the object's pixels in a view are given to their neighbours: no
 #: number would fit on them.
 FRAGMENT = 0.004
-#: Pieces of a patch that are this many pixels apart are patches of their own. Below 2, surfaces seen
-#: at a slant fall to dust.
+#: Pieces of a patch that are this many pixels apart are patches of their own. Below 2, surfaces
+#: seen at a slant fall to dust.
 GAP_PIXELS = 3.0
 _SAMPLES, _ROUNDS = 12_000, 12
 
