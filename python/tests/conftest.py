@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from vlm_fixtures import endpoint, mallets  # noqa: F401
 
 
 def pytest_addoption(parser):

@@ -13,6 +13,7 @@ from foxglove_schemas_protobuf import (
     CompressedImage_pb2,
     FrameTransform_pb2,
     RawImage_pb2,
+    SceneUpdate_pb2,
 )
 from mcap.writer import CompressionType
 from semfm.sidecar import schemas
@@ -136,12 +137,25 @@ def test_metadata_and_existence_are_asked_for(tmp_path):
         read_views(tmp_path / "nowhere.mcap")
 
 
-def fields(descriptor) -> dict[str, tuple]:
-    return {field.name: (field.number, field.type) for field in descriptor.fields}
+def fields(descriptor, under: str = "") -> dict[str, tuple]:
+    """Number and type of every field, those of messages inside included."""
+    found = {}
+    for field in descriptor.fields:
+        found[under + field.name] = (field.number, field.type)
+        if field.message_type:
+            found.update(fields(field.message_type, f"{under}{field.name}."))
+    return found
 
 
 @pytest.mark.parametrize(
-    "module", [CameraCalibration_pb2, CompressedImage_pb2, FrameTransform_pb2, RawImage_pb2]
+    "module",
+    [
+        CameraCalibration_pb2,
+        CompressedImage_pb2,
+        FrameTransform_pb2,
+        RawImage_pb2,
+        SceneUpdate_pb2,
+    ],
 )
 def test_foxglove_fields_agree_with_the_published_schemas(module):
     name = module.__name__.rsplit(".", 1)[1][: -len("_pb2")]

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import IO
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from . import schemas
 from .encoder import Grid
-from .errors import SidecarError
 from .mcap_records import Message
+from .replacing import replacing
 from .views_file import METADATA_NAME, ViewRecord
 
 #: The ``format`` entry of an embeddings file's metadata.
@@ -57,7 +54,7 @@ def write_embeddings(
     dtype
         ``f16`` or ``f32``.
     """
-    with _replacing(path) as file:
+    with replacing(path) as file:
         # Such tensors do not compress: lz4 saves nothing, zstd 8 % at a third of the speed.
         writer = Writer(file, compression=CompressionType.NONE, enable_data_crcs=True)
         writer.start(profile="", library="semfm-embed")
@@ -130,29 +127,3 @@ class _Copies:
             sequence=message.sequence,
             data=message.data,
         )
-
-
-@contextmanager
-def _replacing(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """A file that takes the place of ``path`` if the block ends well, and vanishes if not."""
-    target = os.path.abspath(path)
-    folder, name = os.path.split(target)
-    try:
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{name}.", suffix=".tmp", dir=folder)
-    except OSError as error:
-        raise SidecarError(f"{os.fspath(path)}: {error.strerror or error}") from error
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes a private file; give it the rights that open() would have given.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, target)
-    except BaseException as error:
-        os.unlink(temporary)
-        if isinstance(error, OSError):
-            raise SidecarError(f"{os.fspath(path)}: {error.strerror or error}") from error
-        raise

@@ -18,19 +18,22 @@ class Progress(Protocol):
     def close(self) -> None: ...
 
 
-def open_progress(mode: str) -> Progress:
-    """The progress display of one of :data:`MODES`."""
+def open_progress(mode: str, unit: str = "images") -> Progress:
+    """The progress display of one of :data:`MODES`, counting in ``unit``."""
     if mode == "json":
-        return _JsonLines()
+        return _JsonLines(unit)
     if mode == "none" or not sys.stderr.isatty():
-        return _Silent()
+        return _Silent(unit)
     try:
-        return _TqdmBar()
+        return _TqdmBar(unit)
     except ImportError:
-        return _PlainBar()
+        return _PlainBar(unit)
 
 
 class _Silent:
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+
     def __call__(self, done: int, total: int) -> None:
         pass
 
@@ -42,7 +45,7 @@ class _JsonLines(_Silent):
     """One object a line: {"event": "progress", "done": 28, "total": 56, "unit": "images"}."""
 
     def __call__(self, done: int, total: int) -> None:
-        line = {"event": "progress", "done": done, "total": total, "unit": "images"}
+        line = {"event": "progress", "done": done, "total": total, "unit": self.unit}
         print(json.dumps(line), file=sys.stderr, flush=True)
 
 
@@ -50,17 +53,18 @@ class _PlainBar(_Silent):
     def __call__(self, done: int, total: int) -> None:
         filled = 30 * done // max(total, 1)
         bar = "#" * filled + "." * (30 - filled)
-        print(f"\r[{bar}] {done}/{total} images", end="", file=sys.stderr, flush=True)
+        print(f"\r[{bar}] {done}/{total} {self.unit}", end="", file=sys.stderr, flush=True)
 
     def close(self) -> None:
         print(file=sys.stderr)
 
 
 class _TqdmBar(_Silent):
-    def __init__(self) -> None:
+    def __init__(self, unit: str) -> None:
         from tqdm import tqdm
 
-        self.bar = tqdm(unit=" images", file=sys.stderr, leave=False)
+        super().__init__(unit)
+        self.bar = tqdm(unit=f" {unit}", file=sys.stderr, leave=False)
 
     def __call__(self, done: int, total: int) -> None:
         self.bar.total = total

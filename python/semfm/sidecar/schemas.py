@@ -23,7 +23,8 @@ _TYPES = {
 }
 _TIMESTAMP = "google.protobuf.Timestamp"
 
-# Message name -> its fields as (number, type, name); a "*" marks a repeated field.
+# Message name -> its fields as (number, type, name); a "*" marks a repeated field. A type with a
+# dot is another message, which stands above its user.
 _MESSAGES = {
     "semfm.PatchEmbeddings": [
         (1, _TIMESTAMP, "timestamp"),
@@ -62,35 +63,60 @@ _MESSAGES = {
         (6, "double*", "K"),
         (9, "string", "frame_id"),
     ],
+    "foxglove.Vector3": [(1, "double", "x"), (2, "double", "y"), (3, "double", "z")],
+    "foxglove.Quaternion": [
+        (1, "double", "x"),
+        (2, "double", "y"),
+        (3, "double", "z"),
+        (4, "double", "w"),
+    ],
     "foxglove.FrameTransform": [
         (1, _TIMESTAMP, "timestamp"),
         (2, "string", "parent_frame_id"),
         (3, "string", "child_frame_id"),
+        (4, "foxglove.Vector3", "translation"),
+        (5, "foxglove.Quaternion", "rotation"),
     ],
+    "foxglove.Point3": [(1, "double", "x"), (2, "double", "y"), (3, "double", "z")],
+    "foxglove.TriangleListPrimitive": [
+        (2, "foxglove.Point3*", "points"),
+        (5, "fixed32*", "indices"),
+    ],
+    "foxglove.SceneEntity": [
+        (2, "string", "frame_id"),
+        (12, "foxglove.TriangleListPrimitive*", "triangles"),
+    ],
+    "foxglove.SceneUpdate": [(2, "foxglove.SceneEntity*", "entities")],
 }
 
 
 def _file(full_name: str) -> descriptor_pb2.FileDescriptorProto:
     package, name = full_name.split(".")
+    kinds = [kind.rstrip("*") for _, kind, _ in _MESSAGES[full_name]]
+    used = [_file_name(kind) for kind in dict.fromkeys(kinds) if kind in _MESSAGES]
     file = descriptor_pb2.FileDescriptorProto(
-        name=f"{package}/{name}.proto",
+        name=_file_name(full_name),
         package=package,
         syntax="proto3",
-        dependency=[timestamp_pb2.DESCRIPTOR.name],
+        dependency=[timestamp_pb2.DESCRIPTOR.name, *used],
     )
     message = file.message_type.add(name=name)
-    for number, kind, field_name in _MESSAGES[full_name]:
-        repeated = kind.endswith("*")
+    for (number, kind, field_name), base in zip(_MESSAGES[full_name], kinds):
+        repeated = kind != base
         field = message.field.add(
             name=field_name,
             number=number,
             label=_Field.LABEL_REPEATED if repeated else _Field.LABEL_OPTIONAL,
         )
-        if kind == _TIMESTAMP:
-            field.type, field.type_name = _Field.TYPE_MESSAGE, f".{_TIMESTAMP}"
+        if "." in base:
+            field.type, field.type_name = _Field.TYPE_MESSAGE, f".{base}"
         else:
-            field.type = _TYPES[kind.rstrip("*")]
+            field.type = _TYPES[base]
     return file
+
+
+def _file_name(full_name: str) -> str:
+    return full_name.replace(".", "/") + ".proto"
 
 
 def _timestamp_file() -> descriptor_pb2.FileDescriptorProto:
@@ -114,6 +140,7 @@ CompressedImage = _message_class("foxglove.CompressedImage")
 RawImage = _message_class("foxglove.RawImage")
 CameraCalibration = _message_class("foxglove.CameraCalibration")
 FrameTransform = _message_class("foxglove.FrameTransform")
+SceneUpdate = _message_class("foxglove.SceneUpdate")
 
 PATCH_EMBEDDINGS = "semfm.PatchEmbeddings"
 

@@ -1,8 +1,8 @@
-"""Reads what the sidecar needs from a ``*.views.mcap`` file: pictures, triangle images, cameras.
+"""Reads a ``*.views.mcap`` file: pictures, triangle images, cameras, and the mesh if it is there.
 
 Contract: ``/views/NNN/{image,camera,triangles}`` and ``/tf``, NNN from 000 without gaps, and the
-metadata record ``semfm``. Camera and pose messages are not interpreted here beyond what guards
-against a foreign file; their bytes and schemas are handed on as they are.
+metadata record ``semfm``. Messages of cameras, poses and the mesh are not interpreted here beyond
+what guards against a foreign file; their bytes and schemas are handed on as they are.
 """
 
 from __future__ import annotations
@@ -31,19 +31,25 @@ _SCHEMAS = {
     "camera": ("foxglove.CameraCalibration", schemas.CameraCalibration),
     "triangles": ("foxglove.RawImage", schemas.RawImage),
     "tf": ("foxglove.FrameTransform", schemas.FrameTransform),
+    "mesh": ("foxglove.SceneUpdate", schemas.SceneUpdate),
 }
 
 
 @dataclass(frozen=True)
 class ViewRecord:
-    """One view: its picture, what is object in it, and the messages to hand on."""
+    """One view: its picture, the triangle seen in each pixel, and the messages to hand on."""
 
     name: str  # "000"
     rgb: np.ndarray  # (height × width × 3) uint8
-    on_object: np.ndarray  # (height × width) bool: a triangle is seen in the pixel
+    triangles: np.ndarray  # (height × width) int32, as in the mesh; −1 on the background
     image: Message
     camera: Message
     tf: Message
+
+    @property
+    def on_object(self) -> np.ndarray:
+        """Where a triangle is seen, (height × width) bool."""
+        return self.triangles >= 0
 
     @property
     def frame_id(self) -> str:
@@ -58,6 +64,7 @@ class ViewsFile:
     path: str
     views: list[ViewRecord]
     metadata: dict[str, str]
+    mesh: Message | None = None  # /mesh: the object, a foxglove.SceneUpdate
 
     @property
     def size(self) -> tuple[int, int]:
@@ -76,7 +83,7 @@ def read_views(path: str | os.PathLike[str]) -> ViewsFile:
     name = os.fspath(path)
     file = read_mcap(name)
     metadata = _metadata(name, file)
-    by_view, tf = _sort(name, file)
+    by_view, tf, mesh = _sort(name, file)
     if not by_view:
         raise expected(name, "topics", "/views/NNN/image from NNN = 000", "no views")
     views = []
@@ -93,7 +100,7 @@ def read_views(path: str | os.PathLike[str]) -> ViewsFile:
     for key, value in (("n_views", n_views), ("width", width), ("height", height)):
         if metadata.get(key) != str(value):
             raise expected(name, f"metadata {key}", value, repr(metadata.get(key)))
-    return ViewsFile(name, views, metadata)
+    return ViewsFile(name, views, metadata, mesh)
 
 
 def _metadata(path: str, file: McapFile) -> dict[str, str]:
@@ -105,14 +112,19 @@ def _metadata(path: str, file: McapFile) -> dict[str, str]:
     return found[0]
 
 
-def _sort(path: str, file: McapFile) -> tuple[dict[int, dict[str, Message]], dict[str, Message]]:
-    """Messages by view and kind, and poses by frame; each there at most once."""
+def _sort(
+    path: str, file: McapFile
+) -> tuple[dict[int, dict[str, Message]], dict[str, Message], Message | None]:
+    """Messages by view and kind, poses by frame, and the mesh; each there at most once."""
     by_view: dict[int, dict[str, Message]] = {}
     tf: dict[str, Message] = {}
+    mesh: dict[str, Message] = {}
     for message in file.messages:
         topic = message.channel.topic
         if topic == "/tf":
-            kind, slots = _decode(path, "tf", message).child_frame_id, tf
+            kind, slots = decode(path, "tf", message).child_frame_id, tf
+        elif topic == "/mesh":
+            kind, slots = "mesh", mesh
         elif match := _TOPIC.fullmatch(topic):
             kind, slots = match[2], by_view.setdefault(int(match[1]), {})
         else:
@@ -120,10 +132,11 @@ def _sort(path: str, file: McapFile) -> tuple[dict[int, dict[str, Message]], dic
         if kind in slots:
             raise expected(path, topic, f"one message ({kind})", "a second one")
         slots[kind] = message
-    return by_view, tf
+    return by_view, tf, mesh.get("mesh")
 
 
-def _decode(path: str, kind: str, message: Message) -> Any:
+def decode(path: str, kind: str, message: Message) -> Any:
+    """The message as its schema's class; ``kind``: image, camera, triangles, tf or mesh."""
     wanted, message_class = _SCHEMAS[kind]
     channel = message.channel
     found = channel.schema.name if channel.schema else "none"
@@ -142,14 +155,14 @@ def _view(path: str, name: str, kinds: dict[str, Message], tf: dict[str, Message
             raise expected(path, f"{topic}/{kind}", "one message", "none")
     if f"view_{name}" not in tf:
         raise expected(path, "/tf", f"the pose of view_{name}", "none")
-    camera = _decode(path, "camera", kinds["camera"])
+    camera = decode(path, "camera", kinds["camera"])
     if len(camera.K) != 9:
         raise expected(path, f"{topic}/camera", "K with 9 numbers", len(camera.K))
     size = (camera.height, camera.width)
-    rgb = _picture(path, f"{topic}/image", _decode(path, "image", kinds["image"]), size)
-    raw = _decode(path, "triangles", kinds["triangles"])
-    on_object = _triangles(path, f"{topic}/triangles", raw, size) >= 0
-    return ViewRecord(name, rgb, on_object, kinds["image"], kinds["camera"], tf[f"view_{name}"])
+    rgb = _picture(path, f"{topic}/image", decode(path, "image", kinds["image"]), size)
+    raw = decode(path, "triangles", kinds["triangles"])
+    triangles = _triangles(path, f"{topic}/triangles", raw, size)
+    return ViewRecord(name, rgb, triangles, kinds["image"], kinds["camera"], tf[f"view_{name}"])
 
 
 def _picture(path: str, place: str, message: Any, size: tuple[int, int]) -> np.ndarray:

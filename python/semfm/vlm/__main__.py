@@ -1,0 +1,7 @@
+"""``python -m semfm.vlm`` is ``semfm-vlm``."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())
