@@ -197,7 +197,8 @@ impl Anchors {
     }
 
     fn __repr__(&self) -> String {
-        let pair = |pair: &fmap::Anchor| format!("{}–{} {:.2}", pair.source, pair.target, pair.cosine);
+        let pair =
+            |pair: &fmap::Anchor| format!("{}–{} {:.2}", pair.source, pair.target, pair.cosine);
         let pairs: Vec<String> = self.held.pairs.iter().map(pair).collect();
         format!("Anchors({})", pairs.join(", "))
     }

@@ -97,16 +97,17 @@ pub fn ids(
     }
     let array = checked(value, name, WHOLE, axes)?;
     let unsigned = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? == "u";
-    let out_of_range = |found: String| {
-        errors::invalid(py, name, "ids from 0 to 4294967295", &found)
-    };
+    let out_of_range =
+        |found: String| errors::invalid(py, name, "ids from 0 to 4294967295", &found);
     if unsigned {
         let (wide, shape) = contiguous::<u64>(&array, name)?;
-        let narrow = wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
+        let narrow =
+            wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
         Ok((narrow.collect::<PyResult<_>>()?, shape))
     } else {
         let (wide, shape) = contiguous::<i64>(&array, name)?;
-        let narrow = wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
+        let narrow =
+            wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
         Ok((narrow.collect::<PyResult<_>>()?, shape))
     }
 }

@@ -202,7 +202,9 @@ impl Camera {
     mesh, *, count=14, size=224, field_of_view=std::f64::consts::FRAC_PI_6, fill=0.8, max_zoom=1.5,
     principal_frame=true
 ))]
-#[pyo3(text_signature = "(mesh, *, count=14, size=224, field_of_view=0.5235987755982988, fill=0.8, max_zoom=1.5, principal_frame=True)")]
+#[pyo3(
+    text_signature = "(mesh, *, count=14, size=224, field_of_view=0.5235987755982988, fill=0.8, max_zoom=1.5, principal_frame=True)"
+)]
 pub fn rig(
     mesh: &Bound<'_, PyAny>,
     count: usize,

@@ -177,11 +177,7 @@ impl Eigenbasis {
     /// Returns
     /// -------
     /// (n,) or (n, p) float64 array
-    fn diffuse<'py>(
-        &self,
-        functions: &Bound<'py, PyAny>,
-        t: f64,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn diffuse<'py>(&self, functions: &Bound<'py, PyAny>, t: f64) -> PyResult<Bound<'py, PyAny>> {
         if !(t >= 0.0 && t.is_finite()) {
             let py = functions.py();
             return Err(errors::invalid(py, "t", "a time of at least 0", &t.to_string()));
@@ -329,8 +325,7 @@ pub fn eigenbasis(
     let laplacian = laplacian.get().held.clone();
     check_size(py, k, laplacian.n_vertices())?;
     let settings = EigenSettings { tolerance, seed };
-    let basis =
-        run(py, progress, move |task| Ok(solve(&laplacian, k, &settings, task)?))?;
+    let basis = run(py, progress, move |task| Ok(solve(&laplacian, k, &settings, task)?))?;
     Ok(Eigenbasis { held: Held::new(basis) })
 }
 

@@ -100,8 +100,10 @@ impl PatchEmbeddings {
 
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>))>
-    {
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+    )> {
         let restore = slf.py().import("semfm._semfm")?.getattr("_restore_patches")?;
         let rect = slf.get().rect(slf.py());
         Ok((restore, (Self::data(slf)?, rect, Self::coverage(slf)?, Self::valid(slf)?)))

@@ -46,13 +46,7 @@ pub fn internal(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "InternalError", &message, "internal", None)
 }
 
-fn exception(
-    py: Python<'_>,
-    class: &str,
-    message: &str,
-    code: &str,
-    place: Option<&str>,
-) -> PyErr {
+fn exception(py: Python<'_>, class: &str, message: &str, code: &str, place: Option<&str>) -> PyErr {
     let made = py
         .import("semfm.errors")
         .and_then(|module| module.getattr(class))

@@ -218,9 +218,9 @@ impl FunctionalMap {
         let start = (*self.held).clone();
         let settings = ZoomOutSettings { k_start: 1, k_final, step, feature_weight };
         let grown = run(py, progress, move |task| {
-            let (on_source, on_target) = on_both.as_ref().map_or((None, None), |(a, b)| {
-                (Some(a.as_ref()), Some(b.as_ref()))
-            });
+            let (on_source, on_target) = on_both
+                .as_ref()
+                .map_or((None, None), |(a, b)| (Some(a.as_ref()), Some(b.as_ref())));
             let source = MapSide { basis: &source, features: on_source, samples: &[] };
             let target = MapSide { basis: &target, features: on_target, samples: &samples };
             Ok(zoomout::zoomout(start, &source, &target, &settings, task)?)

@@ -41,8 +41,7 @@ impl HeatGeodesics {
         let py = mesh.py();
         let settings = HeatSettings { kind: kind_of(py, kind)?, time };
         let mesh = from_any(mesh, "mesh")?;
-        let held =
-            run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
+        let held = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
         Ok(Self { held: Held::new(held) })
     }
 

@@ -136,7 +136,9 @@ pub fn kind_of(py: Python<'_>, name: &str) -> PyResult<LaplacianKind> {
     match name {
         "tufted" => Ok(LaplacianKind::Tufted),
         "cotan" => Ok(LaplacianKind::Cotan),
-        other => Err(errors::invalid(py, "laplacian", "'tufted' or 'cotan'", &format!("{other:?}"))),
+        other => {
+            Err(errors::invalid(py, "laplacian", "'tufted' or 'cotan'", &format!("{other:?}")))
+        }
     }
 }
 
@@ -156,7 +158,7 @@ pub fn kind_of(py: Python<'_>, name: &str) -> PyResult<LaplacianKind> {
 /// --------
 /// >>> import semfm, semfm.zoo
 /// >>> laplacian = semfm.laplacian(semfm.zoo.icosphere(2))
-/// >>> abs(laplacian.stiffness.sum()) < 1e-9
+/// >>> bool(abs(laplacian.stiffness.sum()) < 1e-9)
 /// True
 #[pyfunction]
 #[pyo3(signature = (mesh, kind="tufted"))]

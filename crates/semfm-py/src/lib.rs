@@ -41,7 +41,7 @@ mod _semfm {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::anchors::{Anchors, Clusters, _restore_anchors, spectral_clusters};
+    use crate::anchors::{_restore_anchors, Anchors, Clusters, spectral_clusters};
     #[pymodule_export]
     use crate::camera::{Camera, camera_towards, rig};
     #[pymodule_export]
@@ -51,9 +51,7 @@ mod _semfm {
     #[pymodule_export]
     use crate::eigenbasis::{Eigenbasis, eigenbasis};
     #[pymodule_export]
-    use crate::embeddings::{
-        _restore_embeddings, _restore_patches, Embeddings, PatchEmbeddings,
-    };
+    use crate::embeddings::{_restore_embeddings, _restore_patches, Embeddings, PatchEmbeddings};
     #[pymodule_export]
     use crate::functional_map::FunctionalMap;
     #[pymodule_export]

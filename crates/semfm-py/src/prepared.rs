@@ -8,9 +8,9 @@ use self_cell::self_cell;
 use semfm::fmap::clusters::ClusterSettings;
 use semfm::fmap::{PreparedShape, SemanticShape};
 use semfm::geom::SemanticCloud as Cloud;
-use semfm::views::LiftReport;
-use semfm::views::mcap::EmbeddingsFile;
 use semfm::{Meaning, PipelineSettings, Task};
+use semfm_views::LiftReport;
+use semfm_views::mcap::EmbeddingsFile;
 
 use crate::arrays::{self, Axis};
 use crate::cloud::{SemanticCloud, embeddings_of};
@@ -96,7 +96,8 @@ impl PreparedObject {
     /// dict: milliseconds by stage.
     #[getter]
     fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let stages: std::collections::BTreeMap<_, _> = self.held.stages_ms.iter().copied().collect();
+        let stages: std::collections::BTreeMap<_, _> =
+            self.held.stages_ms.iter().copied().collect();
         json::to_python(py, &stages)
     }
 

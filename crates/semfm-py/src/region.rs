@@ -312,8 +312,7 @@ pub fn region_of(
         return Ok(region.get().held.clone());
     }
     let wanted = "a Region or a path (for ids, masks and weights see Region's constructors)";
-    let path: PathBuf =
-        value.extract().map_err(|_| errors::wrong_type("region", wanted, value))?;
+    let path: PathBuf = value.extract().map_err(|_| errors::wrong_type("region", wanted, value))?;
     let region = guard(value.py(), || region_file::read_region(&path, mesh))?;
     Ok(Held::new(region))
 }

@@ -45,7 +45,12 @@ impl TransferSettings {
         let mut value = serde_json::to_value(settings).unwrap_or_default();
         merge(py, &mut value, changes, "")?;
         let settings = serde_json::from_value(value).map_err(|error| {
-            errors::invalid(py, "changes", "the types of the method's own settings", &error.to_string())
+            errors::invalid(
+                py,
+                "changes",
+                "the types of the method's own settings",
+                &error.to_string(),
+            )
         })?;
         Ok(Self { settings })
     }

@@ -201,7 +201,10 @@ impl Shape {
         format!("Shape({n} vertices, {working} working, {k} eigenpairs)")
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Mesh, Bound<'py, PyBytes>))> {
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Mesh, Bound<'py, PyBytes>))> {
         let bytes = guard(py, || Ok(self.held.to_bytes()?))?;
         let restore = py.import("semfm._semfm")?.getattr("_restore_shape")?;
         Ok((restore, (self.original(), PyBytes::new(py, &bytes))))
@@ -220,10 +223,10 @@ impl Shape {
 #[pyfunction]
 pub fn _restore_shape(mesh: &Bound<'_, Mesh>, bytes: &Bound<'_, PyBytes>) -> PyResult<Shape> {
     let py = mesh.py();
-    let shape = guard(py, || {
-        Ok(geom::Shape::from_bytes((*mesh.get().held).clone(), bytes.as_bytes()))
-    })?;
-    let damaged = || errors::invalid(py, "pickled shape", "bytes of this version of semfm", "others");
+    let shape =
+        guard(py, || Ok(geom::Shape::from_bytes((*mesh.get().held).clone(), bytes.as_bytes())))?;
+    let damaged =
+        || errors::invalid(py, "pickled shape", "bytes of this version of semfm", "others");
     Ok(Shape { held: Held::new(shape.ok_or_else(damaged)?) })
 }
 

@@ -111,7 +111,11 @@ impl DemoObject {
             let pictures = render_views(&object, task).map_err(raised)?;
             let side = pictures.first().map_or(0, |view| view.camera.width);
             let views = embed(&object, &pictures, level).map_err(raised)?;
-            Ok(EmbeddingsFile { path: PathBuf::new(), metadata: about(&object, level, side), views })
+            Ok(EmbeddingsFile {
+                path: PathBuf::new(),
+                metadata: about(&object, level, side),
+                views,
+            })
         })?;
         Ok(Embeddings { held: Held::new(file) })
     }
@@ -254,9 +258,11 @@ fn raised(error: semfm_synth::Error) -> semfm::Error {
     match error {
         semfm_synth::Error::Geom(error) => error.into(),
         semfm_synth::Error::Views(error) => error.into(),
-        semfm_synth::Error::Unknown { what, expected, found } => {
-            semfm::Error::Invalid { what: what.into(), expected: format!("one of {expected}"), found }
-        }
+        semfm_synth::Error::Unknown { what, expected, found } => semfm::Error::Invalid {
+            what: what.into(),
+            expected: format!("one of {expected}"),
+            found,
+        },
         other => semfm::Error::Invalid {
             what: "procedural object".into(),
             expected: "one that can be made".into(),

@@ -85,15 +85,8 @@ impl Matching {
         settings: Option<&Bound<'_, TransferSettings>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let options = Options {
-            method,
-            rule,
-            seed,
-            settings,
-            k: None,
-            working_vertices: None,
-            cache: None,
-        };
+        let options =
+            Options { method, rule, seed, settings, k: None, working_vertices: None, cache: None };
         let settings = options.pipeline(py)?.transfer;
         let (source, target) = (source.get().clone(), target.get().clone());
         run(py, progress, move |task| Self::of(source, target, &settings, task))
@@ -312,10 +305,8 @@ impl Transfer {
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyAny>,
-        (PreparedObject, PreparedObject, Region, Bound<'py, PyBytes>),
-    )> {
+    ) -> PyResult<(Bound<'py, PyAny>, (PreparedObject, PreparedObject, Region, Bound<'py, PyBytes>))>
+    {
         let restore = py.import("semfm._semfm")?.getattr("_restore_transfer")?;
         let transfer = &*self.held;
         let parts = json!({

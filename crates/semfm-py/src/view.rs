@@ -64,8 +64,7 @@ impl View {
         (Camera, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
     )> {
         let restore = slf.py().import("semfm._semfm")?.getattr("_restore_view")?;
-        let parts =
-            (slf.get().camera(), Self::rgb(slf)?, Self::depth(slf)?, Self::triangles(slf)?);
+        let parts = (slf.get().camera(), Self::rgb(slf)?, Self::depth(slf)?, Self::triangles(slf)?);
         Ok((restore, parts))
     }
 
@@ -198,9 +197,8 @@ pub fn write_views(
     let mut rendered = Vec::new();
     for view in views.try_iter()? {
         let view = view?;
-        let view = view
-            .cast::<View>()
-            .map_err(|_| errors::wrong_type("views", "View objects", &view))?;
+        let view =
+            view.cast::<View>().map_err(|_| errors::wrong_type("views", "View objects", &view))?;
         rendered.push((*view.get().held).clone());
     }
     run(mesh.py(), None, move |_| {
