@@ -203,7 +203,6 @@ impl Anchors {
         format!("Anchors({})", pairs.join(", "))
     }
 
-    #[expect(clippy::type_complexity, reason = "a function and its arguments")]
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
     ) -> PyResult<(Bound<'py, PyAny>, (Vec<(u32, u32, f64, f64)>, Bound<'py, PyAny>))> {

@@ -48,7 +48,6 @@ pub struct Camera {
 #[pymethods]
 impl Camera {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "a camera has that many numbers")]
     fn new(
         width: u32,
         height: u32,

@@ -250,7 +250,6 @@ impl FunctionalMap {
         source, target, *, adjoint=false, source_features=None, target_features=None,
         feature_weight=0.0
     ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
     fn to_point_map(
         &self,
         source: &Bound<'_, Eigenbasis>,

@@ -76,5 +76,5 @@ pub fn owned_matrix<'py>(py: Python<'py>, matrix: MatRef<'_, f64>) -> PyResult<B
     let (n, k) = (matrix.nrows(), matrix.ncols());
     let values: Vec<f64> = (0..k).flat_map(|j| matrix.col(j).iter().copied()).collect();
     let array = PyArray1::from_vec(py, values);
-    Ok(array.reshape([k, n])?.call_method0("transpose")?)
+    array.reshape([k, n])?.call_method0("transpose")
 }

@@ -1,9 +1,10 @@
 //! The compiled half of the Python package: arrays in, facade calls, arrays out.
 //!
-//! One room per class, named as in Rust. A class holds the Rust value ([`held`]) and converts:
-//! [`arrays`] takes what NumPy has, [`lend`] hands views out, [`work`] runs what takes long,
-//! [`errors`] raises. Documentation is Python's: numpydoc, read by `help`, run by doctest, and read
+//! One room per class, named as in Rust. A class holds the Rust value (`held`) and converts:
+//! `arrays` takes what NumPy has, `lend` hands views out, `work` runs what takes long,
+//! `errors` raises. Documentation is Python's: numpydoc, read by `help`, run by doctest, and read
 //! by the script that writes the type stubs.
+#![allow(clippy::type_complexity, reason = "pickles: a function and its arguments, as they are")]
 #![allow(clippy::doc_lazy_continuation, reason = "docstrings are numpydoc, not Markdown")]
 #![allow(clippy::doc_overindented_list_items, reason = "docstrings are numpydoc, not Markdown")]
 

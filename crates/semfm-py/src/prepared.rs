@@ -37,8 +37,11 @@ self_cell!(
 #[derive(Clone)]
 pub struct PreparedObject {
     pub held: Held<semfm::PreparedObject>,
-    parts: Arc<Mutex<Option<(ClusterSettings, Arc<PreparedParts>)>>>,
+    parts: Arc<Mutex<Option<Kept>>>,
 }
+
+/// The parts of the last matching and how they were cut.
+type Kept = (ClusterSettings, Arc<PreparedParts>);
 
 impl PreparedObject {
     pub fn new(object: semfm::PreparedObject) -> Self {
@@ -88,8 +91,8 @@ impl PreparedObject {
     }
 
     /// bool: whether the shape was read from the cache.
-    #[getter]
-    fn from_cache(&self) -> bool {
+    #[getter(from_cache)]
+    fn is_from_cache(&self) -> bool {
         self.held.from_cache
     }
 
@@ -106,7 +109,6 @@ impl PreparedObject {
         format!("PreparedObject({n} vertices, {points} points, dim {})", self.held.cloud.dim())
     }
 
-    #[expect(clippy::type_complexity, reason = "a function and its arguments")]
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,

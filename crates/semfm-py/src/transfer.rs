@@ -301,7 +301,6 @@ impl Transfer {
         format!("Transfer({verdict}, confidence {confidence:.2}, {n} of {of} vertices)")
     }
 
-    #[expect(clippy::type_complexity, reason = "a function and its arguments")]
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,

@@ -56,7 +56,6 @@ impl View {
         format!("View({} × {})", self.held.camera.width, self.held.camera.height)
     }
 
-    #[expect(clippy::type_complexity, reason = "a function and its arguments")]
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
     ) -> PyResult<(
