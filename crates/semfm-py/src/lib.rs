@@ -24,7 +24,9 @@ mod held;
 mod json;
 mod laplacian;
 mod lend;
+mod matching;
 mod mesh;
+mod one_call;
 mod point_map;
 mod prepared;
 mod region;
@@ -62,7 +64,11 @@ mod _semfm {
         Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,
     };
     #[pymodule_export]
+    use crate::matching::Matching;
+    #[pymodule_export]
     use crate::mesh::{Mesh, MeshFile, read_mesh};
+    #[pymodule_export]
+    use crate::one_call::transfer;
     #[pymodule_export]
     use crate::point_map::PointMap;
     #[pymodule_export]
@@ -80,7 +86,7 @@ mod _semfm {
     #[pymodule_export]
     use crate::synth::{DemoObject, demo_object};
     #[pymodule_export]
-    use crate::transfer::{_restore_transfer, Hypothesis, Matching, Transfer, transfer};
+    use crate::transfer::{_restore_transfer, Hypothesis, Transfer};
     #[pymodule_export]
     use crate::view::{_restore_view, View, read_views, render, write_views};
     #[pymodule_export]
