@@ -12,6 +12,7 @@ mod process;
 mod python;
 mod tally;
 mod test;
+mod wheel;
 mod workspace;
 
 use std::process::ExitCode;
@@ -30,6 +31,8 @@ cargo xtask doc             the documentation, warnings are errors
 cargo xtask features        the facade without its default features
 cargo xtask deny            one version of each crate whose types cross our borders
 cargo xtask corpus          the readers against the corpus of bad files, where it is at hand
+cargo xtask stubs           writes the type stubs of the Python package anew
+cargo xtask wheel           builds the wheel (release) and checks its size and how fast it imports
 cargo xtask bench           builds the benchmark programs (release) and names them
 cargo xtask ci              fmt, lint, doc, features, deny, then test --full";
 
@@ -67,7 +70,7 @@ fn run(words: &[&str]) -> Result<bool> {
 
 type Job = fn(&Workspace) -> Result<()>;
 
-const JOBS: [(&str, Job); 7] = [
+const JOBS: [(&str, Job); 9] = [
     ("fmt", |workspace| cargo(workspace, &["fmt", "--all", "--check"]).succeed()),
     ("lint", |workspace| {
         let arguments = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
@@ -84,6 +87,8 @@ const JOBS: [(&str, Job); 7] = [
         let arguments = ["test", "--workspace", "--test", "corpus*", "--", "--show-output"];
         cargo(workspace, &arguments).succeed()
     }),
+    ("stubs", python::stubs),
+    ("wheel", wheel::check),
     ("bench", bench),
 ];
 

@@ -1,4 +1,4 @@
-//! The virtual environment `.venv` with the sidecar and what its tests need.
+//! The virtual environment `.venv` with the Python package and what its tests need.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -8,8 +8,11 @@ use anyhow::{Context, Result, bail};
 use crate::process::program;
 use crate::workspace::Workspace;
 
-/// Makes `.venv` where it is not there, installs the sidecar with `extras` where something changed
-/// since, and returns the folder of its programs.
+/// Makes `.venv` where it is not there, installs the package with `extras` where something
+/// changed since, and returns the folder of its programs.
+///
+/// maturin compiles it with the profile and the target folder of the other jobs, and with features
+/// that are those of the whole workspace, so that only PyO3 and the extension itself are new.
 pub fn environment(workspace: &Workspace, extras: &str) -> Result<PathBuf> {
     let folder = workspace.root.join(".venv");
     let programs = folder.join("bin");
@@ -31,24 +34,40 @@ pub fn environment(workspace: &Workspace, extras: &str) -> Result<PathBuf> {
         return Ok(programs);
     }
     let package = format!(".[{extras}]");
-    let arguments =
-        ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", package.as_str()];
+    let arguments = [
+        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check"],
+        &["--config-settings", "build-args=--profile dev", package.as_str()][..],
+    ]
+    .concat();
     println!("pip install '{package}'");
     program(workspace, &python, &arguments).succeed()?;
     std::fs::write(&stamp, installed).with_context(|| stamp.display().to_string())?;
     Ok(programs)
 }
 
+/// Writes the type stubs of the compiled module into the sources.
+pub fn stubs(workspace: &Workspace) -> Result<()> {
+    let python = environment(workspace, "onnx,test")?.join("python");
+    program(workspace, &python, &["python/tools/stubs.py"]).succeed()
+}
+
+/// What the package is made of; `typed` is the end of `py.typed`.
+const SOURCES: [&str; 5] = ["py", "pyi", "rs", "toml", "typed"];
+
 /// Extras and content of the package, so that nothing is installed twice.
 fn stamp_of(workspace: &Workspace, extras: &str) -> Result<String> {
-    let mut files = vec![workspace.root.join("pyproject.toml")];
-    let mut folders = vec![workspace.root.join("python/semfm")];
+    let mut files = ["pyproject.toml", "Cargo.toml", "Cargo.lock"].map(PathBuf::from).to_vec();
+    files.iter_mut().for_each(|file| *file = workspace.root.join(&*file));
+    let mut folders = ["python/semfm", "crates"].map(|folder| workspace.root.join(folder)).to_vec();
     while let Some(folder) = folders.pop() {
         for entry in folder.read_dir().with_context(|| folder.display().to_string())? {
             let path = entry?.path();
             if path.is_dir() {
                 folders.push(path);
-            } else if path.extension().is_some_and(|kind| kind == "py") {
+            } else if path
+                .extension()
+                .is_some_and(|kind| SOURCES.iter().any(|source| kind == *source))
+            {
                 files.push(path);
             }
         }

@@ -52,7 +52,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         }
     };
     let common = arguments.common;
-    let outcome = common.apply().and_then(|()| match arguments.command {
+    let run = || match arguments.command {
         Command::Demo(command) => command.run(&common),
         Command::Views(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
@@ -62,7 +62,8 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Align(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
-    });
+    };
+    let outcome = common.workers().and_then(|workers| workers.install(run));
     match outcome {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NoAnswer) => 1,

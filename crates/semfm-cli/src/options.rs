@@ -22,11 +22,11 @@ pub struct Common {
 }
 
 impl Common {
-    /// Sets up the workers.
-    pub fn apply(&self) -> Result<()> {
+    /// Worker threads of this command's own: a process may run several commands, one after another.
+    pub fn workers(&self) -> Result<rayon::ThreadPool> {
         rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
-            .build_global()
+            .build()
             .context("cannot start the worker threads")
     }
 }

@@ -95,7 +95,7 @@ fn main() -> Outcome<()> {
     for method in methods {
         let settings = TransferSettings::of(method);
         let mut prepare_ms = Vec::new();
-        let mut stages = BTreeMap::<&str, Vec<f64>>::new();
+        let mut stages = BTreeMap::<String, Vec<f64>>::new();
         let (mut warm_ms, mut all, mut line) = (Vec::new(), Vec::new(), String::new());
         for (category, objects) in &categories {
             let mut ious = Vec::new();
@@ -116,7 +116,7 @@ fn main() -> Outcome<()> {
                 let answer = matching.transfer(&objects[i].grip)?;
                 warm_ms.push(start.elapsed().as_secs_f64() * 1e3);
                 for (stage, ms) in answer.report.stages_ms.iter() {
-                    stages.entry(stage).or_default().push(ms);
+                    stages.entry(stage.to_owned()).or_default().push(ms);
                 }
                 let iou = metrics::iou(&answer.region, &objects[j].grip)?;
                 if std::env::var_os("PAIRS").is_some() {

@@ -152,6 +152,23 @@ impl ShapeCache {
     }
 }
 
+impl Shape {
+    /// Everything but the original mesh, in the layout of a cache entry; the key is the mesh's hash.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the report cannot be written, which does not happen.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        encode(self, &self.original().hash().0)
+    }
+
+    /// The shape that [`to_bytes`](Self::to_bytes) wrote, of the same mesh; `None` for any other
+    /// bytes.
+    pub fn from_bytes(original: Mesh, bytes: &[u8]) -> Option<Self> {
+        let (working, laplacian, basis, report) = decode(bytes, &original.hash().0, &original)?;
+        Some(Self::from_parts(original, working, laplacian, basis, report))
+    }
+}
+
 /// BLAKE3 of the format, the mesh's hash and the settings in words.
 fn key(mesh: MeshHash, settings: &ShapeSettings) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
@@ -359,6 +376,15 @@ mod tests {
         assert!(!cache.shape(mesh.clone(), &other, &Task::default()).unwrap().hit);
         assert!(!ask(&cache, &zoo::torus(20, 12)).hit);
         assert!(!ask(&ShapeCache::off(), &mesh).hit);
+    }
+
+    #[test]
+    fn bytes_are_of_one_mesh_and_give_the_shape_back() {
+        let mesh = zoo::icosphere(2);
+        let made = ask(&ShapeCache::off(), &mesh).shape;
+        let bytes = made.to_bytes().unwrap();
+        assert_same(&made, &Shape::from_bytes(mesh, &bytes).unwrap());
+        assert!(Shape::from_bytes(zoo::icosphere(1), &bytes).is_none());
     }
 
     #[test]

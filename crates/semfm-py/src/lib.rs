@@ -1,15 +1,118 @@
-//! The Python package: arrays in, facade calls, arrays out.
+//! The compiled half of the Python package: arrays in, facade calls, arrays out.
+//!
+//! One room per class, named as in Rust. A class holds the Rust value (`held`) and converts:
+//! `arrays` takes what NumPy has, `lend` hands views out, `work` runs what takes long,
+//! `errors` raises. Documentation is Python's: numpydoc, read by `help`, run by doctest, and read
+//! by the script that writes the type stubs.
+#![allow(clippy::type_complexity, reason = "pickles: a function and its arguments, as they are")]
+#![allow(clippy::doc_lazy_continuation, reason = "docstrings are numpydoc, not Markdown")]
+#![allow(clippy::doc_overindented_list_items, reason = "docstrings are numpydoc, not Markdown")]
 
 use pyo3::prelude::*;
+
+mod anchors;
+mod arrays;
+mod camera;
+mod cloud;
+mod descriptors;
+mod eigenbasis;
+mod embeddings;
+mod errors;
+mod functional_map;
+mod geodesic;
+mod held;
+mod json;
+mod laplacian;
+mod lend;
+mod matching;
+mod mesh;
+mod one_call;
+mod point_map;
+mod prepared;
+mod region;
+mod settings;
+mod shape;
+mod surface;
+mod synth;
+mod transfer;
+mod view;
+mod work;
 
 /// The compiled half of `semfm`.
 #[pymodule]
 mod _semfm {
-    use super::*;
+    use pyo3::prelude::*;
 
-    /// Runs the command line of `semfm-cli`, arguments without the program's name; the exit code.
+    #[pymodule_export]
+    use crate::anchors::{_restore_anchors, Anchors, Clusters, spectral_clusters};
+    #[pymodule_export]
+    use crate::camera::{Camera, camera_towards, rig};
+    #[pymodule_export]
+    use crate::cloud::{SemanticCloud, lift};
+    #[pymodule_export]
+    use crate::descriptors::{diffused_indicators, hks, wks};
+    #[pymodule_export]
+    use crate::eigenbasis::{Eigenbasis, eigenbasis};
+    #[pymodule_export]
+    use crate::embeddings::{_restore_embeddings, _restore_patches, Embeddings, PatchEmbeddings};
+    #[pymodule_export]
+    use crate::functional_map::FunctionalMap;
+    #[pymodule_export]
+    use crate::geodesic::{HeatGeodesics, geodesic_distances};
+    #[pymodule_export]
+    use crate::laplacian::{
+        Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,
+    };
+    #[pymodule_export]
+    use crate::matching::Matching;
+    #[pymodule_export]
+    use crate::mesh::{Mesh, MeshFile, read_mesh};
+    #[pymodule_export]
+    use crate::one_call::transfer;
+    #[pymodule_export]
+    use crate::point_map::PointMap;
+    #[pymodule_export]
+    use crate::prepared::{_restore_prepared, PreparedObject, prepare};
+    #[pymodule_export]
+    use crate::region::Region;
+    #[pymodule_export]
+    use crate::settings::{_restore_settings, TransferSettings};
+    #[pymodule_export]
+    use crate::shape::{_restore_shape, Shape};
+    #[pymodule_export]
+    use crate::surface::{
+        SurfaceIndex, farthest_points, icosphere, sample_even, sample_uniform, torus,
+    };
+    #[pymodule_export]
+    use crate::synth::{DemoObject, demo_object};
+    #[pymodule_export]
+    use crate::transfer::{_restore_transfer, Hypothesis, Transfer};
+    #[pymodule_export]
+    use crate::view::{_restore_view, View, read_views, render, write_views};
+    #[pymodule_export]
+    use crate::work::{_work_for_tests, get_num_threads, set_num_threads};
+
+    /// Runs the command line of `semfm-cli`.
+    ///
+    /// Parameters
+    /// ----------
+    /// arguments : list of str
+    ///     Without the program's name.
+    ///
+    /// Returns
+    /// -------
+    /// int
+    ///     The exit code.
     #[pyfunction]
-    fn run_cli(py: Python<'_>, arguments: Vec<String>) -> u8 {
-        py.detach(|| semfm_cli::run(std::iter::once("semfm-cli".to_owned()).chain(arguments)))
+    fn run_cli(py: Python<'_>, arguments: Vec<String>) -> PyResult<u8> {
+        let words = std::iter::once("semfm-cli".to_owned()).chain(arguments);
+        let words: Vec<String> = words.collect();
+        crate::work::run(py, None, move |_| Ok(semfm_cli::run(words)))
+    }
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::work::silence_panics();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -1,11 +1,14 @@
 //! How an answer came about, for people and for files.
 
+use std::borrow::Cow;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use semfm_geom::PointIndex;
 use semfm_geom::math::DVec3;
-use serde::Serialize;
+use serde::de::{MapAccess, Visitor};
 use serde::ser::SerializeMap;
+use serde::{Deserialize, Serialize};
 
 use super::{Matching, Rule, TransferSettings, mask};
 use crate::fit::FitReport;
@@ -14,12 +17,12 @@ use crate::{Anchor, Result};
 
 /// Time per stage in milliseconds, in the order in which the stages ran; a JSON object by name.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stages(Vec<(&'static str, f64)>);
+pub struct Stages(Vec<(Cow<'static, str>, f64)>);
 
 impl Stages {
     /// Name and milliseconds of each stage.
-    pub fn iter(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.0.iter().copied()
+    pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.0.iter().map(|(stage, ms)| (&**stage, *ms))
     }
 
     /// Milliseconds in all.
@@ -44,12 +47,12 @@ impl Stages {
         let ms = time.as_secs_f64() * 1e3;
         match self.0.iter_mut().find(|entry| entry.0 == stage) {
             Some(entry) => entry.1 += ms,
-            None => self.0.push((stage, ms)),
+            None => self.0.push((Cow::Borrowed(stage), ms)),
         }
     }
 
     pub(super) fn put_first(&mut self, stage: &'static str, time: Duration) {
-        self.0.insert(0, (stage, time.as_secs_f64() * 1e3));
+        self.0.insert(0, (Cow::Borrowed(stage), time.as_secs_f64() * 1e3));
     }
 }
 
@@ -66,8 +69,36 @@ impl Serialize for Stages {
     }
 }
 
+/// Reads the names in the order of the file.
+impl<'de> Deserialize<'de> for Stages {
+    fn deserialize<D: serde::Deserializer<'de>>(
+        deserializer: D,
+    ) -> std::result::Result<Self, D::Error> {
+        struct InOrder;
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = Stages;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("milliseconds by stage")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> std::result::Result<Stages, A::Error> {
+                let mut stages = Vec::new();
+                while let Some((name, ms)) = map.next_entry::<String, f64>()? {
+                    stages.push((Cow::Owned(name), ms));
+                }
+                Ok(Stages(stages))
+            }
+        }
+        deserializer.deserialize_map(InOrder)
+    }
+}
+
 /// An anchor and how the finished map treats it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnchorReport {
     /// The pair of clusters, its cosine and margin.
     #[serde(flatten)]
@@ -78,7 +109,7 @@ pub struct AnchorReport {
 }
 
 /// Quality measures of the map. They do not predict success, and nothing is decided by them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapQuality {
     /// Dirichlet energy of the point map with both shapes at area 1: 1 for the identity.
     pub dirichlet_energy: f64,
@@ -93,7 +124,7 @@ pub struct MapQuality {
 }
 
 /// How the transport went.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TransportReport {
     /// Points of the source's and of the target's cloud.
     pub n_source: usize,
@@ -106,7 +137,7 @@ pub struct TransportReport {
 }
 
 /// The answer under the other rule, beside the one that was asked for.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OtherRule {
     /// Which rule that is.
     pub rule: Rule,
@@ -115,7 +146,7 @@ pub struct OtherRule {
 }
 
 /// How a transfer came about.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TransferReport {
     /// The settings, map sizes clipped to the bases.
     pub settings: TransferSettings,

@@ -1,0 +1,242 @@
+//! Arrays of any dtype, order and stride in; checked rows of numbers out.
+//!
+//! Every door names the argument, the array it wants and the array it found: a TypeError for kinds
+//! of numbers, `semfm.InvalidInput` (a ValueError) for shapes and values.
+
+use faer::Mat;
+use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use semfm::geom::math::DVec3;
+
+use crate::errors;
+
+/// One axis of the shape that is wanted.
+#[derive(Clone, Copy)]
+pub enum Axis {
+    /// Any length, called by this letter.
+    Any(&'static str),
+    /// This length.
+    Is(usize),
+}
+
+use Axis::{Any, Is};
+
+/// A kind of numbers, by NumPy's letters.
+#[derive(Clone, Copy)]
+struct Kind {
+    letters: &'static str,
+    name: &'static str,
+}
+
+const REAL: Kind = Kind { letters: "fiu", name: "real numbers (float64, float32 or integers)" };
+const WHOLE: Kind = Kind { letters: "iu", name: "integers (int32, int64, uint32 …)" };
+const TRUTH: Kind = Kind { letters: "b", name: "bool" };
+
+/// Row-major values and shape; every value finite.
+pub fn floats(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let (values, shape) = values::<f64>(value, name, REAL, axes)?;
+    finite(value.py(), name, &values, &shape, |x| x.is_finite())?;
+    Ok((values, shape))
+}
+
+/// As [`floats`], in 32 bits.
+pub fn floats32(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<f32>, Vec<usize>)> {
+    let (values, shape) = values::<f32>(value, name, REAL, axes)?;
+    finite(value.py(), name, &values, &shape, |x| x.is_finite())?;
+    Ok((values, shape))
+}
+
+/// As [`floats32`], but any number will do.
+pub fn any32(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<f32>, Vec<usize>)> {
+    values::<f32>(value, name, REAL, axes)
+}
+
+/// A matrix (rows × columns) of finite numbers.
+pub fn matrix(value: &Bound<'_, PyAny>, name: &str, axes: [Axis; 2]) -> PyResult<Mat<f64>> {
+    let (values, shape) = floats(value, name, &axes)?;
+    let columns = shape[1];
+    Ok(Mat::from_fn(shape[0], columns, |i, j| values[i * columns + j]))
+}
+
+/// Points (n × 3). Numbers that are not finite are left to the constructor behind the door, which
+/// names the vertex.
+pub fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<DVec3>> {
+    let (values, _) = values::<f64>(value, name, REAL, &[Any("n"), Is(3)])?;
+    Ok(values.as_chunks::<3>().0.iter().map(|&p| DVec3::from_array(p)).collect())
+}
+
+/// One point (3).
+pub fn point(value: &Bound<'_, PyAny>, name: &str) -> PyResult<DVec3> {
+    let (values, _) = floats(value, name, &[Is(3)])?;
+    Ok(DVec3::new(values[0], values[1], values[2]))
+}
+
+/// Ids from 0 to 2³² − 1, row-major, and the shape.
+pub fn ids(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<u32>, Vec<usize>)> {
+    let py = value.py();
+    // An empty list has no integers to be recognised by.
+    if value.len().is_ok_and(|n| n == 0) && axes.len() == 1 {
+        return Ok((Vec::new(), vec![0]));
+    }
+    let array = checked(value, name, WHOLE, axes)?;
+    let unsigned = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? == "u";
+    let out_of_range =
+        |found: String| errors::invalid(py, name, "ids from 0 to 4294967295", &found);
+    if unsigned {
+        let (wide, shape) = contiguous::<u64>(&array, name)?;
+        let narrow =
+            wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
+        Ok((narrow.collect::<PyResult<_>>()?, shape))
+    } else {
+        let (wide, shape) = contiguous::<i64>(&array, name)?;
+        let narrow =
+            wide.iter().map(|&id| u32::try_from(id).map_err(|_| out_of_range(id.to_string())));
+        Ok((narrow.collect::<PyResult<_>>()?, shape))
+    }
+}
+
+/// Truth values, row-major, and the shape.
+pub fn mask(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<bool>, Vec<usize>)> {
+    values::<bool>(value, name, TRUTH, axes)
+}
+
+/// Bytes (0 to 255), row-major, and the shape.
+pub fn bytes(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Vec<u8>, Vec<usize>)> {
+    let array = checked(value, name, WHOLE, axes)?;
+    let dtype = array.getattr("dtype")?;
+    if dtype.getattr("itemsize")?.extract::<usize>()? != 1 {
+        let found = dtype.str()?.to_string();
+        return Err(PyTypeError::new_err(format!("{name}: expected uint8, found {found}")));
+    }
+    contiguous::<u8>(&array, name)
+}
+
+fn values<T: Element + Copy>(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    kind: Kind,
+    axes: &[Axis],
+) -> PyResult<(Vec<T>, Vec<usize>)> {
+    contiguous(&checked(value, name, kind, axes)?, name)
+}
+
+/// The value as an array of the right kind and shape, as it lies in memory.
+fn checked<'py>(
+    value: &Bound<'py, PyAny>,
+    name: &str,
+    kind: Kind,
+    axes: &[Axis],
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    let wanted = || format!("an array of {}, shape {}", kind.name, wanted_shape(axes));
+    let numpy = py.import("numpy")?;
+    let array = numpy
+        .call_method1("asarray", (value,))
+        .map_err(|_| errors::wrong_type(name, &wanted(), value))?;
+    let untyped = array.cast::<PyUntypedArray>()?;
+    let dtype = array.getattr("dtype")?;
+    let letter: String = dtype.getattr("kind")?.extract()?;
+    let width: usize = dtype.getattr("itemsize")?.extract()?;
+    if !kind.letters.contains(letter.as_str()) || width > 8 {
+        let message = format!("{name}: expected {}, found dtype {dtype}", wanted());
+        return Err(PyTypeError::new_err(message));
+    }
+    let shape = untyped.shape();
+    let fits = shape.len() == axes.len()
+        && shape.iter().zip(axes).all(|(&n, axis)| match axis {
+            Any(_) => true,
+            Is(wanted) => n == *wanted,
+        });
+    if !fits {
+        return Err(errors::invalid(py, name, &wanted(), &format!("shape {}", tuple(shape))));
+    }
+    Ok(array)
+}
+
+/// Row-major values in the machine's own byte order.
+fn contiguous<T: Element + Copy>(
+    array: &Bound<'_, PyAny>,
+    name: &str,
+) -> PyResult<(Vec<T>, Vec<usize>)> {
+    let py = array.py();
+    let shape = array.cast::<PyUntypedArray>()?.shape().to_vec();
+    let dtype = T::get_dtype(py);
+    let array = py.import("numpy")?.call_method1("ascontiguousarray", (array, dtype))?;
+    let array: PyReadonlyArrayDyn<'_, T> =
+        array.extract().map_err(|_| errors::wrong_type(name, "an array", &array))?;
+    Ok((array.as_slice()?.to_vec(), shape))
+}
+
+fn finite<T: Copy + std::fmt::Display>(
+    py: Python<'_>,
+    name: &str,
+    values: &[T],
+    shape: &[usize],
+    is_finite: impl Fn(T) -> bool,
+) -> PyResult<()> {
+    let Some(mut at) = values.iter().position(|&x| !is_finite(x)) else { return Ok(()) };
+    let found = values[at];
+    let mut place = vec![0; shape.len()];
+    for (index, n) in place.iter_mut().zip(shape).rev() {
+        (*index, at) = (at % n, at / n);
+    }
+    let found = format!("{found} at {place:?}").to_lowercase();
+    Err(errors::invalid(py, name, "finite numbers", &found))
+}
+
+fn wanted_shape(axes: &[Axis]) -> String {
+    let words: Vec<String> = axes
+        .iter()
+        .map(|axis| match axis {
+            Any(letter) => (*letter).to_owned(),
+            Is(n) => n.to_string(),
+        })
+        .collect();
+    brackets(&words)
+}
+
+fn tuple(shape: &[usize]) -> String {
+    brackets(&shape.iter().map(ToString::to_string).collect::<Vec<_>>())
+}
+
+fn brackets(words: &[String]) -> String {
+    if let [only] = words { format!("({only},)") } else { format!("({})", words.join(", ")) }
+}
+
+/// Numbers that one call may allocate in a single array: 16 GiB of float64.
+const MOST_NUMBERS: u128 = 1 << 31;
+
+/// Refuses a count whose result no machine would hold: an allocation that fails ends the process.
+pub fn within_memory(py: Python<'_>, name: &str, count: usize, each: usize) -> PyResult<()> {
+    let numbers = count as u128 * each as u128;
+    if numbers <= MOST_NUMBERS {
+        return Ok(());
+    }
+    let most = MOST_NUMBERS / (each as u128).max(1);
+    Err(errors::invalid(py, name, &format!("at most {most} here"), &count.to_string()))
+}

@@ -1,0 +1,335 @@
+//! `PatchEmbeddings` of single views and `Embeddings` of a whole object.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use semfm::views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
+use semfm::views::{self, EmbeddedView};
+
+use crate::arrays::{self, Axis};
+use crate::camera::Camera;
+use crate::held::Held;
+use crate::mesh::from_any;
+use crate::work::{guard, run};
+use crate::{errors, lend};
+
+/// What an encoder says about a view: one vector per image patch.
+///
+/// Parameters
+/// ----------
+/// data : (rows, cols, d) array_like
+///     Vectors, top-left patch first; finite in valid patches.
+/// rect : (4,) array_like
+///     The grid's rectangle in pixels, edges not centres: left, top, right, bottom.
+/// coverage : (rows, cols) array_like, optional
+///     Share of each patch covered by the object, 0 to 255 (uint8); 255 where none is given.
+/// valid : (rows, cols) array_like, optional
+///     False where the patch is to be ignored (bool).
+#[pyclass(frozen, module = "semfm")]
+pub struct PatchEmbeddings {
+    pub held: Held<views::PatchEmbeddings>,
+}
+
+#[pymethods]
+impl PatchEmbeddings {
+    #[new]
+    #[pyo3(signature = (data, rect, *, coverage=None, valid=None))]
+    fn new(
+        data: &Bound<'_, PyAny>,
+        rect: &Bound<'_, PyAny>,
+        coverage: Option<&Bound<'_, PyAny>>,
+        valid: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = data.py();
+        let axes = [Axis::Any("rows"), Axis::Any("cols"), Axis::Any("d")];
+        // Numbers of patches that do not count may be anything.
+        let (data, shape) = arrays::any32(data, "data", &axes)?;
+        let [rows, cols, dim] = [shape[0], shape[1], shape[2]];
+        let grid = [Axis::Is(rows), Axis::Is(cols)];
+        let coverage = match coverage {
+            Some(coverage) => arrays::bytes(coverage, "coverage", &grid)?.0,
+            None => vec![255; rows * cols],
+        };
+        let valid = match valid {
+            Some(valid) => arrays::mask(valid, "valid", &grid)?.0,
+            None => vec![true; rows * cols],
+        };
+        let rect = arrays::floats32(rect, "rect", &[Axis::Is(4)])?.0;
+        let rect = [rect[0], rect[1], rect[2], rect[3]];
+        let patches = views::PatchEmbeddings { rows, cols, dim, data, rect, coverage, valid };
+        guard(py, || Ok(patches.check("patches")?))?;
+        Ok(Self { held: Held::new(patches) })
+    }
+
+    /// (rows, cols, d) float32 array: the vectors, a read-only view.
+    #[getter]
+    fn data<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let patches = &slf.get().held;
+        let shape = (patches.rows, patches.cols, patches.dim);
+        lend::vector(slf, |patches| patches.held.data.as_slice())?.call_method1("reshape", (shape,))
+    }
+
+    /// (4,) float32 array: left, top, right, bottom of the grid in pixels.
+    #[getter]
+    fn rect<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.held.rect.to_vec())
+    }
+
+    /// (rows, cols) uint8 array: share of each patch covered by the object, a read-only view.
+    #[getter]
+    fn coverage<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::rows(slf, slf.get().held.cols, |patches| patches.held.coverage.as_slice())
+    }
+
+    /// (rows, cols) bool array: False where the patch is to be ignored, a read-only view.
+    #[getter]
+    fn valid<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::rows(slf, slf.get().held.cols, |patches| patches.held.valid.as_slice())
+    }
+
+    /// int: dimension d of each vector.
+    #[getter]
+    fn dim(&self) -> usize {
+        self.held.dim
+    }
+
+    fn __repr__(&self) -> String {
+        format!("PatchEmbeddings({} × {}, dim {})", self.held.rows, self.held.cols, self.held.dim)
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+    )> {
+        let restore = slf.py().import("semfm._semfm")?.getattr("_restore_patches")?;
+        let rect = slf.get().rect(slf.py());
+        Ok((restore, (Self::data(slf)?, rect, Self::coverage(slf)?, Self::valid(slf)?)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// Patch embeddings out of a pickle.
+#[pyfunction]
+pub fn _restore_patches(
+    data: &Bound<'_, PyAny>,
+    rect: &Bound<'_, PyAny>,
+    coverage: &Bound<'_, PyAny>,
+    valid: &Bound<'_, PyAny>,
+) -> PyResult<PatchEmbeddings> {
+    PatchEmbeddings::new(data, rect, Some(coverage), Some(valid))
+}
+
+/// The embeddings of an object's views, with the cameras and the mesh they were made of.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+///     The mesh that the views show.
+/// cameras : list of Camera
+///     One per view, all of one size.
+/// patches : list of PatchEmbeddings
+///     One per view, all of one dimension.
+/// encoder : str, default "unnamed"
+///     Name of the encoder, for the file.
+#[pyclass(frozen, module = "semfm")]
+pub struct Embeddings {
+    pub held: Held<EmbeddingsFile>,
+}
+
+#[pymethods]
+impl Embeddings {
+    #[new]
+    #[pyo3(signature = (mesh, cameras, patches, *, encoder="unnamed"))]
+    fn new(
+        mesh: &Bound<'_, PyAny>,
+        cameras: &Bound<'_, PyAny>,
+        patches: &Bound<'_, PyAny>,
+        encoder: &str,
+    ) -> PyResult<Self> {
+        let py = mesh.py();
+        let held = from_any(mesh, "mesh")?;
+        let cameras = crate::camera::list(cameras)?;
+        let mut grids = Vec::new();
+        for grid in patches.try_iter()? {
+            let grid = grid?;
+            let wanted = "PatchEmbeddings objects";
+            let grid = grid
+                .cast::<PatchEmbeddings>()
+                .map_err(|_| errors::wrong_type("patches", wanted, &grid))?;
+            grids.push((*grid.get().held).clone());
+        }
+        if cameras.len() != grids.len() || grids.is_empty() {
+            let expected = format!("{}, one per camera, and at least one", cameras.len());
+            return Err(errors::invalid(py, "patches", &expected, &grids.len().to_string()));
+        }
+        let (width, height) = (cameras[0].width, cameras[0].height);
+        let dim = grids[0].dim;
+        for (view, (camera, grid)) in cameras.iter().zip(&grids).enumerate() {
+            if (camera.width, camera.height) != (width, height) {
+                let found = format!("{} × {} in view {view}", camera.width, camera.height);
+                return Err(errors::invalid(py, "cameras", &format!("{width} × {height}"), &found));
+            }
+            if grid.dim != dim {
+                let found = format!("{} in view {view}", grid.dim);
+                return Err(errors::invalid(py, "patches", &format!("dimension {dim}"), &found));
+            }
+        }
+        let views = ViewsMetadata {
+            mesh: MeshIdentity::of(&held),
+            width,
+            height,
+            rig: "given as cameras".into(),
+            background: "unknown".into(),
+            seed: 0,
+            more: Default::default(),
+        };
+        let metadata = EmbeddingsMetadata {
+            views,
+            encoder: encoder.to_owned(),
+            revision: "unknown".into(),
+            preprocessing: "unknown".into(),
+            rolls: 1,
+            outliers: "unknown".into(),
+            simulated: false,
+        };
+        let views = cameras.into_iter().zip(grids);
+        let views = views.map(|(camera, patches)| EmbeddedView { camera, patches }).collect();
+        Ok(Self { held: Held::new(EmbeddingsFile { path: PathBuf::new(), metadata, views }) })
+    }
+
+    /// Reads a ``NAME.emb.mcap`` and checks everything in it.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///
+    /// Returns
+    /// -------
+    /// Embeddings
+    #[staticmethod]
+    pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let file = run(py, None, move |_| Ok(EmbeddingsFile::read(&path)?))?;
+        Ok(Self { held: Held::new(file) })
+    }
+
+    /// Writes a ``NAME.emb.mcap``, whole or not at all.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    /// dtype : str, default "f16"
+    ///     ``"f16"`` or ``"f32"``.
+    #[pyo3(signature = (path, *, dtype="f16"))]
+    fn write(&self, py: Python<'_>, path: PathBuf, dtype: &str) -> PyResult<()> {
+        let dtype = match dtype {
+            "f16" => Dtype::F16,
+            "f32" => Dtype::F32,
+            other => {
+                return Err(errors::invalid(py, "dtype", "'f16' or 'f32'", &format!("{other:?}")));
+            }
+        };
+        let held = self.held.clone();
+        run(py, None, move |_| Ok(held.write(&path, dtype)?))
+    }
+
+    /// int: number of views.
+    #[getter]
+    fn n_views(&self) -> usize {
+        self.held.views.len()
+    }
+
+    /// int: dimension d of the vectors.
+    #[getter]
+    fn dim(&self) -> usize {
+        self.held.dim()
+    }
+
+    /// list of Camera: one per view.
+    #[getter]
+    fn cameras(&self) -> Vec<Camera> {
+        self.held.views.iter().map(|view| Camera { camera: view.camera }).collect()
+    }
+
+    /// list of PatchEmbeddings: one per view.
+    #[getter]
+    fn patches(&self) -> Vec<PatchEmbeddings> {
+        let grid = |view: &EmbeddedView| PatchEmbeddings { held: Held::new(view.patches.clone()) };
+        self.held.views.iter().map(grid).collect()
+    }
+
+    /// str: hash of the mesh that the views show.
+    #[getter]
+    fn mesh_hash(&self) -> String {
+        self.held.metadata.views.mesh.hash.to_string()
+    }
+
+    /// str: name of the encoder.
+    #[getter]
+    fn encoder(&self) -> String {
+        self.held.metadata.encoder.clone()
+    }
+
+    /// bool: True where the embeddings were made up, without a network.
+    #[getter]
+    fn simulated(&self) -> bool {
+        self.held.metadata.simulated
+    }
+
+    fn __len__(&self) -> usize {
+        self.held.views.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, dim) = (self.held.views.len(), self.held.dim());
+        format!("Embeddings({n} views, dim {dim}, by {:?})", self.held.metadata.encoder)
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_embeddings")?;
+        // The file is the one form that holds everything, to the last bit in f32.
+        let bytes = in_scratch_file(py, |path| {
+            self.write(py, path.to_owned(), "f32")?;
+            Ok(std::fs::read(path)?)
+        })?;
+        Ok((restore, (PyBytes::new(py, &bytes),)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// Embeddings out of a pickle.
+#[pyfunction]
+pub fn _restore_embeddings(bytes: &Bound<'_, PyBytes>) -> PyResult<Embeddings> {
+    let py = bytes.py();
+    in_scratch_file(py, |path| {
+        std::fs::write(path, bytes.as_bytes())?;
+        Embeddings::read(py, path.to_owned())
+    })
+}
+
+fn in_scratch_file<T>(py: Python<'_>, work: impl FnOnce(&Path) -> PyResult<T>) -> PyResult<T> {
+    let folder = py.import("tempfile")?.getattr("TemporaryDirectory")?.call0()?;
+    let path = folder.getattr("name")?.extract::<PathBuf>()?.join("pickled.emb.mcap");
+    let result = work(&path);
+    folder.call_method0("cleanup")?;
+    result
+}

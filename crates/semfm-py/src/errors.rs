@@ -1,0 +1,55 @@
+//! Our errors as Python exceptions, and bugs as `semfm.InternalError`.
+//!
+//! The classes are written in Python (`semfm/errors.py`): there they can be ValueErrors and
+//! OSErrors at the same time, and go through pickle.
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use semfm::geom;
+
+/// The exception of an error of any floor, with its code and place.
+pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
+    let class = match error {
+        semfm::Error::Geom(geom::Error::InFile { .. }) => "FormatError",
+        semfm::Error::Format { .. } => "FormatError",
+        semfm::Error::Views(
+            semfm::views::Error::Format { .. }
+            | semfm::views::Error::Container { .. }
+            | semfm::views::Error::OtherMesh { .. },
+        ) => "FormatError",
+        _ => match error.code() {
+            "io" => "FileError",
+            "format" => "FormatError",
+            "cancelled" => "Cancelled",
+            "not-converged" | "not-positive-definite" | "linear-algebra" => "ComputationError",
+            _ => "InvalidInput",
+        },
+    };
+    exception(py, class, &error.to_string(), error.code(), error.place().as_deref())
+}
+
+/// An argument of the right type that holds what it may not: `semfm.InvalidInput`, a ValueError.
+pub fn invalid(py: Python<'_>, argument: &str, expected: &str, found: &str) -> PyErr {
+    let message = format!("{argument}: expected {expected}, found {found}");
+    exception(py, "InvalidInput", &message, "invalid", Some(argument))
+}
+
+/// An argument of the wrong type.
+pub fn wrong_type(argument: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
+    let found = found.get_type().name().map_or_else(|_| "something else".into(), |n| n.to_string());
+    PyTypeError::new_err(format!("{argument}: expected {expected}, found {found}"))
+}
+
+/// A bug of ours.
+pub fn internal(py: Python<'_>, message: &str) -> PyErr {
+    let message = format!("a bug in semfm, please report it: {message}");
+    exception(py, "InternalError", &message, "internal", None)
+}
+
+fn exception(py: Python<'_>, class: &str, message: &str, code: &str, place: Option<&str>) -> PyErr {
+    let made = py
+        .import("semfm.errors")
+        .and_then(|module| module.getattr(class))
+        .and_then(|class| class.call1((message, code, place)));
+    made.map_or_else(|error| error, PyErr::from_value)
+}

@@ -1,0 +1,421 @@
+//! `FunctionalMap`: fitted, refined, read off.
+
+use std::path::PathBuf;
+
+use faer::Mat;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use semfm::fmap::fit::{FitSettings, fit};
+use semfm::fmap::zoomout::{self, MapSide, ZoomOutSettings};
+use semfm::{fmap, geom};
+
+use crate::arrays::{self, Axis};
+use crate::eigenbasis::Eigenbasis;
+use crate::held::Held;
+use crate::mesh::Reduced;
+use crate::point_map::PointMap;
+use crate::work::{guard, run};
+use crate::{errors, json, lend};
+
+/// C (k_target × k_source): takes coefficients of a source function to those on the target.
+///
+/// Parameters
+/// ----------
+/// matrix : (k_target, k_source) array_like
+///
+/// See Also
+/// --------
+/// PointMap : the map of vertices, which runs the other way.
+#[pyclass(frozen, module = "semfm")]
+pub struct FunctionalMap {
+    pub held: Held<fmap::FunctionalMap>,
+}
+
+#[pymethods]
+impl FunctionalMap {
+    #[new]
+    fn new(matrix: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let axes = [Axis::Any("k_target"), Axis::Any("k_source")];
+        let c = arrays::matrix(matrix, "matrix", axes)?;
+        if c.nrows() == 0 || c.ncols() == 0 {
+            let found = format!("{} × {}", c.nrows(), c.ncols());
+            return Err(errors::invalid(matrix.py(), "matrix", "at least 1 × 1", &found));
+        }
+        Ok(Self { held: Held::new(fmap::FunctionalMap::new(c)) })
+    }
+
+    /// The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
+    ///
+    /// Without regularisers and with fewer descriptors than eigenfunctions the minimum-norm one.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    /// source_descriptors : (n_source, p) array_like
+    ///     Functions on the source's vertices.
+    /// target_descriptors : (n_target, p) array_like
+    ///     The same functions on the target's vertices.
+    /// k : int, optional
+    ///     Size of the map (k × k); the smaller basis where none is given.
+    /// laplacian : float, default 0.0
+    ///     μ, weight of commutation with the Laplacian, ``‖C Λ_source − Λ_target C‖²``.
+    /// descriptors : float, default 0.0
+    ///     ν, weight of commutation with multiplication by each descriptor (Nogneng & Ovsjanikov).
+    /// coefficients : bool, default False
+    ///     Whether the descriptors are given as coefficients (k × p) in the two bases.
+    /// progress : progress, optional
+    ///
+    /// Returns
+    /// -------
+    /// FunctionalMap
+    ///
+    /// Examples
+    /// --------
+    /// >>> import semfm, semfm.zoo
+    /// >>> shape = semfm.Shape(semfm.zoo.torus(20, 10), k=10)
+    /// >>> signature = semfm.wks(shape.basis)
+    /// >>> fitted = semfm.FunctionalMap.fit(
+    /// ...     shape.basis, shape.basis, signature, signature, laplacian=0.01)
+    /// >>> fitted
+    /// FunctionalMap(10 × 10)
+    #[staticmethod]
+    #[pyo3(signature = (
+        source, target, source_descriptors, target_descriptors, *, k=None, laplacian=0.0,
+        descriptors=0.0, coefficients=false, progress=None
+    ))]
+    #[pyo3(name = "fit")]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+    fn fit_to(
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+        source_descriptors: &Bound<'_, PyAny>,
+        target_descriptors: &Bound<'_, PyAny>,
+        k: Option<usize>,
+        laplacian: f64,
+        descriptors: f64,
+        coefficients: bool,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = source.py();
+        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let k = k.unwrap_or(source.k().min(target.k()));
+        if k == 0 {
+            return Err(errors::invalid(py, "k", "at least 1", "0"));
+        }
+        for basis in [&source, &target] {
+            check_size(py, "k", k, basis)?;
+        }
+        let rows = |basis: &geom::Eigenbasis| if coefficients { k } else { basis.n_vertices() };
+        let a = [Axis::Is(rows(&source)), Axis::Any("p")];
+        let a = arrays::matrix(source_descriptors, "source_descriptors", a)?;
+        let b = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
+        let b = arrays::matrix(target_descriptors, "target_descriptors", b)?;
+        let settings = FitSettings { laplacian, descriptors };
+        let map = run(py, progress, move |task| {
+            let project = |basis: &geom::Eigenbasis, f: Mat<f64>| {
+                if coefficients { f } else { basis.project_all(f.as_ref()) }
+            };
+            let (a, b) = (project(&source, a), project(&target, b));
+            let (a, b) = (a.as_ref().subrows(0, k), b.as_ref().subrows(0, k));
+            Ok(fit((a, b), &source, &target, &settings, task)?.map)
+        })?;
+        Ok(Self { held: Held::new(map) })
+    }
+
+    /// C f = f ∘ T in the two bases: ``Φ_targetᵀ M_target Φ_source[T]``.
+    ///
+    /// Parameters
+    /// ----------
+    /// map : PointMap
+    ///     Target → source.
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    /// k : int, optional
+    ///     Size of the map (k × k); the smaller basis where none is given.
+    ///
+    /// Returns
+    /// -------
+    /// FunctionalMap
+    #[staticmethod]
+    #[pyo3(signature = (map, source, target, *, k=None))]
+    fn from_point_map(
+        map: &Bound<'_, PointMap>,
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+        k: Option<usize>,
+    ) -> PyResult<Self> {
+        let py = map.py();
+        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let k = k.unwrap_or(source.k().min(target.k()));
+        let n_source = map.get().n_source;
+        if n_source != source.n_vertices() {
+            let expected = format!("a map onto {} source vertices", source.n_vertices());
+            return Err(errors::invalid(py, "map", &expected, &n_source.to_string()));
+        }
+        let map = map.get().held.clone();
+        let held = run(py, None, move |_| {
+            Ok(fmap::FunctionalMap::from_point_map(&map, &source, &target, k)?)
+        })?;
+        Ok(Self { held: Held::new(held) })
+    }
+
+    /// ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    /// k_final : int, default 50
+    ///     Size of the last map.
+    /// step : int, default 5
+    ///     Growth per turn.
+    /// source_features : (n_source, d) array_like, optional
+    ///     Features that take part in the search, in the same space on both sides.
+    /// target_features : (n_target, d) array_like, optional
+    /// feature_weight : float, default 0.0
+    ///     w: the search runs in ``[spectral, w √k · features]``.
+    /// target_samples : (s,) array_like, optional
+    ///     Target vertices that are matched while the map grows; all where none are given.
+    /// progress : progress, optional
+    ///
+    /// Returns
+    /// -------
+    /// FunctionalMap
+    #[pyo3(signature = (
+        source, target, *, k_final=50, step=5, source_features=None, target_features=None,
+        feature_weight=0.0, target_samples=None, progress=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+    fn zoomout(
+        &self,
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+        k_final: usize,
+        step: usize,
+        source_features: Option<&Bound<'_, PyAny>>,
+        target_features: Option<&Bound<'_, PyAny>>,
+        feature_weight: f64,
+        target_samples: Option<&Bound<'_, PyAny>>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = source.py();
+        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let on_both = features(&source, &target, source_features, target_features)?;
+        if !(feature_weight >= 0.0 && feature_weight.is_finite()) {
+            let found = feature_weight.to_string();
+            return Err(errors::invalid(py, "feature_weight", "a number of at least 0", &found));
+        }
+        let samples = match target_samples {
+            Some(samples) => arrays::ids(samples, "target_samples", &[Axis::Any("s")])?.0,
+            None => Vec::new(),
+        };
+        let n = target.n_vertices();
+        if let Some(id) = samples.iter().find(|&&id| id as usize >= n) {
+            let (expected, found) = (format!("ids below {n}"), id.to_string());
+            return Err(errors::invalid(py, "target_samples", &expected, &found));
+        }
+        let start = (*self.held).clone();
+        let settings = ZoomOutSettings { k_start: 1, k_final, step, feature_weight };
+        let grown = run(py, progress, move |task| {
+            let (on_source, on_target) = on_both
+                .as_ref()
+                .map_or((None, None), |(a, b)| (Some(a.as_ref()), Some(b.as_ref())));
+            let source = MapSide { basis: &source, features: on_source, samples: &[] };
+            let target = MapSide { basis: &target, features: on_target, samples: &samples };
+            Ok(zoomout::zoomout(start, &source, &target, &settings, task)?)
+        })?;
+        Ok(Self { held: Held::new(grown) })
+    }
+
+    /// The point map target → source: each target vertex takes the source vertex whose delta
+    /// function, sent through C, comes nearest to its own.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    /// adjoint : bool, default False
+    ///     Compare on the source instead, with the target's deltas brought back through Cᵀ. The same
+    ///     for an orthogonal C.
+    /// source_features : (n_source, d) array_like, optional
+    ///     Features that take part in the search, as in `zoomout`.
+    /// target_features : (n_target, d) array_like, optional
+    /// feature_weight : float, default 0.0
+    ///
+    /// Returns
+    /// -------
+    /// PointMap
+    #[pyo3(signature = (
+        source, target, *, adjoint=false, source_features=None, target_features=None,
+        feature_weight=0.0
+    ))]
+    fn to_point_map(
+        &self,
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+        adjoint: bool,
+        source_features: Option<&Bound<'_, PyAny>>,
+        target_features: Option<&Bound<'_, PyAny>>,
+        feature_weight: f64,
+    ) -> PyResult<PointMap> {
+        let py = source.py();
+        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        self.check_bases(py, &source, &target)?;
+        let on_both = features(&source, &target, source_features, target_features)?;
+        let n_source = source.n_vertices();
+        let map = self.held.clone();
+        let found = run(py, None, move |_| {
+            Ok(match &on_both {
+                Some((a, b)) => {
+                    let on = |basis, features| MapSide { basis, features, samples: &[] };
+                    let source = on(&source, Some(a.as_ref()));
+                    let target = on(&target, Some(b.as_ref()));
+                    zoomout::point_map(&map, &source, &target, feature_weight)
+                }
+                None if adjoint => map.adjoint_point_map(&source, &target),
+                None => map.point_map(&source, &target),
+            })
+        })?;
+        Ok(PointMap { held: Held::new(found), n_source })
+    }
+
+    /// (k_target, k_source) float64 array: C, a read-only view.
+    #[getter]
+    fn matrix<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::matrix(slf, |map| map.held.matrix())
+    }
+
+    /// int: size of the source basis.
+    #[getter]
+    fn k_source(&self) -> usize {
+        self.held.k_source()
+    }
+
+    /// int: size of the target basis.
+    #[getter]
+    fn k_target(&self) -> usize {
+        self.held.k_target()
+    }
+
+    /// ‖C Cᵀ − I‖ / √k_target: 0 where the map keeps areas.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    fn orthogonality(&self, py: Python<'_>) -> PyResult<f64> {
+        guard(py, || Ok(self.held.orthogonality()))
+    }
+
+    /// ‖C Λ_source − Λ_target C‖ / (λ_max ‖C‖): 0 where the map keeps lengths.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    ///
+    /// Returns
+    /// -------
+    /// float
+    fn commutativity(
+        &self,
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+    ) -> PyResult<f64> {
+        let py = source.py();
+        let (source, target) = (&source.get().held, &target.get().held);
+        self.check_bases(py, source, target)?;
+        guard(py, || Ok(self.held.commutativity(source, target)))
+    }
+
+    /// Writes `matrix` to an .npz file.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    fn to_npz(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        let arrays = PyDict::new(slf.py());
+        arrays.set_item("matrix", Self::matrix(slf)?)?;
+        json::write_npz(slf.py(), path, &arrays)
+    }
+
+    /// Reads what `to_npz` wrote.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///
+    /// Returns
+    /// -------
+    /// FunctionalMap
+    #[staticmethod]
+    fn from_npz(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let [matrix] = json::read_npz(py, &path, ["matrix"])?;
+        Self::new(&matrix)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("FunctionalMap({} × {})", self.held.k_target(), self.held.k_source())
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let parts = (Self::matrix(slf)?,);
+        Ok((slf.get_type(), parts.into_pyobject(slf.py())?.into_any()))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+impl FunctionalMap {
+    fn check_bases(
+        &self,
+        py: Python<'_>,
+        source: &geom::Eigenbasis,
+        target: &geom::Eigenbasis,
+    ) -> PyResult<()> {
+        check_size(py, "source", self.held.k_source(), source)?;
+        check_size(py, "target", self.held.k_target(), target)
+    }
+}
+
+fn check_size(py: Python<'_>, name: &str, k: usize, basis: &geom::Eigenbasis) -> PyResult<()> {
+    if k <= basis.k() {
+        return Ok(());
+    }
+    let expected = format!("a basis of at least {k} pairs");
+    Err(errors::invalid(py, name, &expected, &format!("{} pairs", basis.k())))
+}
+
+/// The features of both sides, or of neither.
+fn features(
+    source: &geom::Eigenbasis,
+    target: &geom::Eigenbasis,
+    on_source: Option<&Bound<'_, PyAny>>,
+    on_target: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<(Mat<f64>, Mat<f64>)>> {
+    match (on_source, on_target) {
+        (None, None) => Ok(None),
+        (Some(a), Some(b)) => {
+            let rows = [Axis::Is(source.n_vertices()), Axis::Any("d")];
+            let a = arrays::matrix(a, "source_features", rows)?;
+            let rows = [Axis::Is(target.n_vertices()), Axis::Is(a.ncols())];
+            Ok(Some((a, arrays::matrix(b, "target_features", rows)?)))
+        }
+        (Some(lonely), None) => {
+            Err(errors::invalid(lonely.py(), "target_features", "features of both sides", "None"))
+        }
+        (None, Some(lonely)) => {
+            Err(errors::invalid(lonely.py(), "source_features", "features of both sides", "None"))
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Distances along the surface, by the heat method.
+
+use pyo3::prelude::*;
+use semfm::geom::geodesic::{self, HeatSettings};
+
+use crate::arrays::{self, Axis, within_memory};
+use crate::held::Held;
+use crate::laplacian::kind_of;
+use crate::lend;
+use crate::mesh::from_any;
+use crate::work::run;
+
+/// Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
+/// once, then every question costs two triangular solves.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+/// kind : str, default "tufted"
+///     The Laplacian: ``"tufted"`` or ``"cotan"``.
+/// time : float, default 1.0
+///     Diffusion time in squared mean edge lengths; larger is smoother and less exact.
+///
+/// Examples
+/// --------
+/// >>> import semfm, semfm.zoo
+/// >>> heat = semfm.HeatGeodesics(semfm.zoo.icosphere(4))
+/// >>> distances = heat.distances(0)
+/// >>> float(distances[0]), round(float(distances.max()), 1)  # half a great circle
+/// (0.0, 3.1)
+#[pyclass(frozen, module = "semfm")]
+pub struct HeatGeodesics {
+    held: Held<geodesic::HeatGeodesics>,
+}
+
+#[pymethods]
+impl HeatGeodesics {
+    #[new]
+    #[pyo3(signature = (mesh, *, kind="tufted", time=1.0))]
+    fn new(mesh: &Bound<'_, PyAny>, kind: &str, time: f64) -> PyResult<Self> {
+        let py = mesh.py();
+        let settings = HeatSettings { kind: kind_of(py, kind)?, time };
+        let mesh = from_any(mesh, "mesh")?;
+        let held = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
+        Ok(Self { held: Held::new(held) })
+    }
+
+    /// Distance of every vertex from the nearest source.
+    ///
+    /// One source is good to about an edge length. Several far apart share one function; where that
+    /// matters, take the minimum over `distances_from_each`.
+    ///
+    /// Parameters
+    /// ----------
+    /// sources : int or (s,) array_like
+    ///     Vertex ids.
+    ///
+    /// Returns
+    /// -------
+    /// (n,) float64 array
+    ///     In the units of the mesh; infinite on components without a source.
+    fn distances<'py>(&self, sources: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let py = sources.py();
+        let sources = ids(sources)?;
+        let heat = self.held.clone();
+        let distances = run(py, None, move |_| Ok(heat.distances(&sources)?))?;
+        Ok(lend::owned(py, distances))
+    }
+
+    /// Distances from each source alone.
+    ///
+    /// Parameters
+    /// ----------
+    /// sources : int or (s,) array_like
+    ///     Vertex ids.
+    ///
+    /// Returns
+    /// -------
+    /// (n, s) float64 array
+    ///     One column per source.
+    fn distances_from_each<'py>(&self, sources: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let py = sources.py();
+        let sources = ids(sources)?;
+        within_memory(py, "sources", sources.len(), self.held.n_vertices())?;
+        let heat = self.held.clone();
+        // In blocks, so that Ctrl-C leaves no long work behind.
+        let blocks = run(py, None, move |task| {
+            let block = |ids: &[u32]| {
+                task.check()?;
+                Ok(heat.distances_from_each(ids)?)
+            };
+            sources.chunks(64).map(block).collect::<semfm::Result<Vec<_>>>()
+        })?;
+        let blocks: Vec<_> = blocks
+            .iter()
+            .map(|block| lend::owned_matrix(py, block.as_ref()))
+            .collect::<PyResult<_>>()?;
+        if blocks.is_empty() {
+            return py.import("numpy")?.call_method1("zeros", ((self.held.n_vertices(), 0),));
+        }
+        py.import("numpy")?.call_method1("concatenate", (blocks, 1))
+    }
+
+    /// int: number of vertices n.
+    #[getter]
+    fn n_vertices(&self) -> usize {
+        self.held.n_vertices()
+    }
+}
+
+fn ids(sources: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    match sources.extract::<u32>() {
+        Ok(single) => Ok(vec![single]),
+        Err(_) => Ok(arrays::ids(sources, "sources", &[Axis::Any("s")])?.0),
+    }
+}
+
+/// Distance of every vertex from the nearest source: `HeatGeodesics` for a single question.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+/// sources : int or (s,) array_like
+///     Vertex ids.
+/// kind : str, default "tufted"
+///     The Laplacian: ``"tufted"`` or ``"cotan"``.
+/// time : float, default 1.0
+///     Diffusion time in squared mean edge lengths.
+///
+/// Returns
+/// -------
+/// (n,) float64 array
+#[pyfunction]
+#[pyo3(signature = (mesh, sources, *, kind="tufted", time=1.0))]
+pub fn geodesic_distances<'py>(
+    mesh: &Bound<'py, PyAny>,
+    sources: &Bound<'py, PyAny>,
+    kind: &str,
+    time: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    HeatGeodesics::new(mesh, kind, time)?.distances(sources)
+}

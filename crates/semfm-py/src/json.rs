@@ -1,0 +1,61 @@
+//! Reports and settings: JSON on our side, dicts and lists on Python's.
+
+use pyo3::prelude::*;
+use semfm::geom::io::write_atomically;
+use serde_json::Value;
+use std::path::PathBuf;
+
+use crate::errors;
+use crate::work::run;
+
+/// A dict, a list or a number from whatever can be written as JSON.
+pub fn to_python<'py>(
+    py: Python<'py>,
+    value: &impl serde::Serialize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).map_err(|e| errors::internal(py, &e.to_string()))?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// JSON from dicts, lists, strings and finite numbers.
+pub fn from_python(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
+    let py = value.py();
+    let options = pyo3::types::PyDict::new(py);
+    options.set_item("allow_nan", false)?;
+    let text = py.import("json")?.call_method("dumps", (value,), Some(&options));
+    let text: String = text
+        .map_err(|_| errors::wrong_type(name, "dicts, lists, text and finite numbers", value))?
+        .extract()?;
+    serde_json::from_str(&text).map_err(|error| errors::internal(py, &error.to_string()))
+}
+
+/// Writes named arrays as an .npz file, whole or not at all.
+pub fn write_npz(
+    py: Python<'_>,
+    path: PathBuf,
+    arrays: &Bound<'_, pyo3::types::PyDict>,
+) -> PyResult<()> {
+    let buffer = py.import("io")?.getattr("BytesIO")?.call0()?;
+    py.import("numpy")?.call_method("savez", (&buffer,), Some(arrays))?;
+    let bytes: Vec<u8> = buffer.call_method0("getvalue")?.extract()?;
+    run(py, None, move |_| Ok(write_atomically(&path, |out| out.write_all(&bytes))?))
+}
+
+/// The named arrays of an .npz file.
+pub fn read_npz<'py, const N: usize>(
+    py: Python<'py>,
+    path: &std::path::Path,
+    names: [&str; N],
+) -> PyResult<[Bound<'py, PyAny>; N]> {
+    let file = py.import("numpy")?.call_method1("load", (path,))?; // without pickles
+    let found = names.map(|name| file.get_item(name));
+    file.call_method0("close")?;
+    let mut arrays = Vec::with_capacity(N);
+    for (name, array) in names.iter().zip(found) {
+        let place = path.display().to_string();
+        let missing =
+            |_| errors::invalid(py, &place, &format!("an .npz file with `{name}`"), "none");
+        arrays.push(array.map_err(missing)?);
+    }
+    arrays.try_into().map_err(|_| errors::internal(py, "arrays of an .npz file"))
+}

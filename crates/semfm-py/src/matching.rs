@@ -1,0 +1,165 @@
+//! `Matching`: a pair, matched once, that carries any number of regions.
+
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use self_cell::self_cell;
+use semfm::fmap;
+use semfm::fmap::Matching as Matched;
+
+use crate::anchors::Anchors;
+use crate::functional_map::FunctionalMap;
+use crate::held::Held;
+use crate::point_map::PointMap;
+use crate::prepared::{PreparedObject, PreparedParts};
+use crate::region::region_of;
+use crate::settings::{Options, TransferSettings};
+use crate::transfer::Transfer;
+use crate::work::run;
+
+self_cell!(
+    /// A matched pair with both objects, from which it borrows.
+    struct MatchedPair {
+        owner: (Arc<PreparedParts>, Arc<PreparedParts>),
+        #[covariant]
+        dependent: Matched,
+    }
+);
+
+/// A matched pair: computed once, it carries any number of regions.
+///
+/// Parameters
+/// ----------
+/// source : PreparedObject
+///     The demonstrated object.
+/// target : PreparedObject
+///     The one to act on.
+/// method : str, optional
+///     ``fused`` (where neither this nor `settings` is given), ``semfm``, ``anchored``,
+///     ``sinkhorn``, ``nearest`` or ``wks``.
+/// rule : str, optional
+///     How a map carries the region: ``preimage`` (where none is given) or ``image``.
+/// seed : int, optional
+///     Of everything drawn by chance; 0 where none is given.
+/// settings : TransferSettings, optional
+///     Everything that can be set, in place of `method` and `rule`.
+/// progress : progress, optional
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
+/// >>> source, target = (
+/// ...     semfm.prepare(o.mesh, features=o.shared_features(), k=30) for o in (mug, kettle))
+/// >>> matching = semfm.Matching(source, target)
+/// >>> matching.transfer(mug.region).verdict in ("accept", "check", "refuse")
+/// True
+#[pyclass(frozen, module = "semfm")]
+#[derive(Clone)]
+pub struct Matching {
+    pair: Arc<MatchedPair>,
+    source: PreparedObject,
+    target: PreparedObject,
+}
+
+#[pymethods]
+impl Matching {
+    #[new]
+    #[pyo3(signature = (
+        source, target, *, method=None, rule=None, seed=None, settings=None, progress=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+    fn new(
+        py: Python<'_>,
+        source: &Bound<'_, PreparedObject>,
+        target: &Bound<'_, PreparedObject>,
+        method: Option<&str>,
+        rule: Option<&str>,
+        seed: Option<u64>,
+        settings: Option<&Bound<'_, TransferSettings>>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let options =
+            Options { method, rule, seed, settings, k: None, working_vertices: None, cache: None };
+        let settings = options.pipeline(py)?.transfer;
+        let (source, target) = (source.get().clone(), target.get().clone());
+        run(py, progress, move |task| Self::of(source, target, &settings, task))
+    }
+
+    /// Carries one region.
+    ///
+    /// Parameters
+    /// ----------
+    /// region : Region or path
+    ///     On the source's mesh as given.
+    ///
+    /// Returns
+    /// -------
+    /// Transfer
+    fn transfer(&self, region: &Bound<'_, PyAny>) -> PyResult<Transfer> {
+        let py = region.py();
+        let region = region_of(region, &self.source.held.part(|o| o.shape.original()))?;
+        let matching = self.clone();
+        run(py, None, move |_| matching.carry(region))
+    }
+
+    /// Anchors: the paired parts of the two objects.
+    #[getter]
+    fn anchors(&self) -> Anchors {
+        Anchors { held: Held::new(self.pair.borrow_dependent().anchors().clone()) }
+    }
+
+    /// FunctionalMap, optional: C between the working shapes; None for methods without a map.
+    #[getter]
+    fn functional_map(&self) -> Option<FunctionalMap> {
+        let map = self.pair.borrow_dependent().functional_map()?;
+        Some(FunctionalMap { held: Held::new(map.clone()) })
+    }
+
+    /// PointMap: target → source, between the working meshes.
+    #[getter]
+    fn working_point_map(&self) -> PointMap {
+        let map = self.pair.borrow_dependent().working_point_map();
+        let n_source = self.source.held.shape.mesh().n_vertices();
+        PointMap { held: Held::new(map.clone()), n_source }
+    }
+
+    /// PreparedObject: the demonstrated object.
+    #[getter]
+    fn source(&self) -> PreparedObject {
+        self.source.clone()
+    }
+
+    /// PreparedObject: the one to act on.
+    #[getter]
+    fn target(&self) -> PreparedObject {
+        self.target.clone()
+    }
+
+    fn __repr__(&self) -> &'static str {
+        "Matching(PreparedObject, PreparedObject)"
+    }
+}
+
+impl Matching {
+    /// Matches two prepared objects.
+    pub fn of(
+        source: PreparedObject,
+        target: PreparedObject,
+        settings: &fmap::TransferSettings,
+        task: &semfm::Task,
+    ) -> semfm::Result<Self> {
+        let parts = |object: &PreparedObject| object.parts(&settings.clusters, task);
+        let (on_source, on_target) = rayon::join(|| parts(&source), || parts(&target));
+        let pair = MatchedPair::try_new((on_source?, on_target?), |(source, target)| {
+            Matched::new(source.borrow_dependent(), target.borrow_dependent(), settings, task)
+        })?;
+        Ok(Self { pair: Arc::new(pair), source, target })
+    }
+
+    /// Carries one region, which must be of the source's mesh.
+    pub fn carry(&self, region: Held<semfm::Region>) -> semfm::Result<Transfer> {
+        let held = Held::new(self.pair.borrow_dependent().transfer(&region)?);
+        Ok(Transfer { held, source: self.source.clone(), target: self.target.clone(), region })
+    }
+}

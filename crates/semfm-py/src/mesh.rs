@@ -1,0 +1,346 @@
+//! `Mesh`: checked arrays and mesh files.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+use semfm::geom::connectivity::MeshReport;
+use semfm::geom::io;
+
+use crate::arrays::{self, Axis};
+use crate::held::Held;
+use crate::work::{guard, run};
+use crate::{errors, json, lend};
+
+/// A triangle mesh in its own frame and units.
+///
+/// The arrays are checked once and kept as they are: no vertex is moved, merged or dropped, so that
+/// a vertex id means the same everywhere. Components, holes, non-manifold edges and degenerate
+/// triangles are all allowed. A mesh cannot be changed.
+///
+/// Parameters
+/// ----------
+/// vertices : (n, 3) array_like
+///     Positions, finite.
+/// faces : (m, 3) array_like
+///     Vertex ids of each triangle, counter-clockwise seen from outside.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     No vertex or no triangle, a coordinate that is not finite, an id out of range.
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> mesh = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+/// >>> mesh
+/// Mesh(3 vertices, 1 triangles)
+/// >>> mesh.area
+/// 0.5
+#[pyclass(frozen, module = "semfm")]
+pub struct Mesh {
+    pub held: Held<semfm::Mesh>,
+}
+
+#[pymethods]
+impl Mesh {
+    #[new]
+    fn new(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = vertices.py();
+        let points = arrays::points(vertices, "vertices")?;
+        let (ids, _) = arrays::ids(faces, "faces", &[Axis::Any("m"), Axis::Is(3)])?;
+        let faces = ids.as_chunks::<3>().0.to_vec();
+        let mesh = guard(py, || Ok(semfm::Mesh::new(points, faces)?))?;
+        Ok(Self { held: Held::new(mesh) })
+    }
+
+    /// Reads an OBJ, PLY, STL, OFF, glTF or GLB file; polygons are cut to triangles.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     The file; its format is told by the extension, else by the first bytes.
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    ///
+    /// See Also
+    /// --------
+    /// read_mesh : the same with the colours of the file.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let mesh = run(py, None, move |_| Ok(io::read_mesh(&path)?.mesh))?;
+        Ok(Self { held: Held::new(mesh) })
+    }
+
+    /// The mesh of a `trimesh.Trimesh`, vertex by vertex (load it with ``process=False``, or trimesh
+    /// will have merged vertices).
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : object
+    ///     Anything with `vertices` (n, 3) and `faces` (m, 3).
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    #[staticmethod]
+    fn from_trimesh(mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::new(&mesh.getattr("vertices")?, &mesh.getattr("faces")?)
+    }
+
+    /// The mesh of an `open3d.geometry.TriangleMesh`.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : object
+    ///     Anything with `vertices` (n, 3) and `triangles` (m, 3).
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    #[staticmethod]
+    fn from_open3d(mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::new(&mesh.getattr("vertices")?, &mesh.getattr("triangles")?)
+    }
+
+    /// Writes an OBJ, OFF, PLY, STL or GLB file, whole or not at all.
+    ///
+    /// OBJ, OFF and PLY keep coordinates exactly. GLB and STL have 32 bits a number.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     The file; its extension names the format.
+    /// colors : (n, 4) array_like, optional
+    ///     RGBA bytes of each vertex, in sRGB (uint8). Not for STL.
+    /// scalars : dict, optional
+    ///     Names of numbers, (n,) each, kept at the vertices in 32 bits. PLY and GLB only.
+    #[pyo3(signature = (path, *, colors=None, scalars=None))]
+    fn write(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        colors: Option<&Bound<'_, PyAny>>,
+        scalars: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<()> {
+        let n = Axis::Is(self.held.n_vertices());
+        let colors = colors.map(|colors| arrays::bytes(colors, "colors", &[n, Axis::Is(4)]));
+        let colors = colors.transpose()?.map(|(bytes, _)| bytes.as_chunks::<4>().0.to_vec());
+        let mut named: Vec<(String, Vec<f64>)> = Vec::new();
+        for (name, values) in scalars.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let values = arrays::floats(&values, &format!("scalars[{name:?}]"), &[n])?.0;
+            named.push((name, values));
+        }
+        let mesh = self.held.clone();
+        run(py, None, move |_| {
+            let scalars: Vec<(&str, &[f64])> =
+                named.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+            let paint = io::Paint { colors: colors.as_deref(), scalars: &scalars };
+            Ok(io::write_painted_mesh(&path, &mesh, &paint)?)
+        })
+    }
+
+    /// (n, 3) float64 array: positions, a read-only view.
+    #[getter]
+    fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::rows(slf, 3, |mesh| bytemuck::cast_slice::<_, f64>(mesh.held.vertices()))
+    }
+
+    /// (m, 3) uint32 array: vertex ids of each triangle, a read-only view.
+    #[getter]
+    fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::rows(slf, 3, |mesh| mesh.held.faces().as_flattened())
+    }
+
+    /// int: number of vertices n.
+    #[getter]
+    fn n_vertices(&self) -> usize {
+        self.held.n_vertices()
+    }
+
+    /// int: number of triangles m.
+    #[getter]
+    fn n_faces(&self) -> usize {
+        self.held.n_faces()
+    }
+
+    /// float: surface area, in squared units of the mesh.
+    #[getter]
+    fn area(&self) -> f64 {
+        self.held.area()
+    }
+
+    /// float: length of the bounding box's diagonal.
+    #[getter]
+    fn diagonal(&self) -> f64 {
+        self.held.diagonal()
+    }
+
+    /// (2, 3) float64 array: lower and upper corner of the bounding box.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (low, high) = self.held.bounds();
+        lend::owned_rows(py, [low.to_array(), high.to_array()].concat(), 3)
+    }
+
+    /// str: the mesh's name, ``blake3:`` and 64 digits over counts, positions and triangles.
+    #[getter]
+    fn hash(&self) -> String {
+        self.held.hash().to_string()
+    }
+
+    /// A third of the area of the triangles around each vertex.
+    ///
+    /// Returns
+    /// -------
+    /// (n,) float64 array
+    fn vertex_areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.held.vertex_areas())
+    }
+
+    /// What is regular and what is not: edges, components, boundaries, manifoldness.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     Counts and flags by name, as `semfm-cli info --json` has them.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import semfm.zoo
+    /// >>> semfm.zoo.icosphere(2).report()["watertight"]
+    /// True
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mesh = self.held.clone();
+        let report = run(py, None, move |_| Ok(MeshReport::new(&mesh)))?;
+        json::to_python(py, &report)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Mesh({} vertices, {} triangles)", self.held.n_vertices(), self.held.n_faces())
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+    }
+
+    fn __hash__(&self) -> u64 {
+        let hash = self.held.hash().0;
+        hash.iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let arrays = (Self::vertices(slf)?, Self::faces(slf)?);
+        Ok((slf.get_type(), arrays.into_pyobject(slf.py())?.into_any()))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// What `__reduce__` answers: the class and its arguments.
+pub type Reduced<'py> = (Bound<'py, PyType>, Bound<'py, PyAny>);
+
+/// A mesh from whatever is one: `Mesh`, a file, or an object with vertices and faces or triangles.
+pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Held<semfm::Mesh>> {
+    if let Ok(mesh) = value.cast::<Mesh>() {
+        return Ok(mesh.get().held.clone());
+    }
+    if let Ok(path) = value.extract::<PathBuf>() {
+        return Ok(Mesh::read(value.py(), path)?.held);
+    }
+    if value.hasattr("vertices")? {
+        if value.hasattr("faces")? {
+            return Ok(Mesh::from_trimesh(value)?.held);
+        }
+        if value.hasattr("triangles")? {
+            return Ok(Mesh::from_open3d(value)?.held);
+        }
+    }
+    let wanted = "a Mesh, a path, or an object with vertices and faces (or triangles)";
+    Err(errors::wrong_type(name, wanted, value))
+}
+
+/// A mesh file: the mesh and what the file says about its colours.
+#[pyclass(frozen, module = "semfm")]
+pub struct MeshFile {
+    pub held: Held<io::MeshFile>,
+}
+
+#[pymethods]
+impl MeshFile {
+    /// Mesh: the geometry.
+    #[getter]
+    fn mesh(&self) -> Mesh {
+        Mesh { held: self.held.part(|file| &file.mesh) }
+    }
+
+    /// (n, 4) uint8 array, optional: RGBA of each vertex in sRGB; None where the file has none.
+    #[getter]
+    fn vertex_colors<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        if slf.get().held.appearance.vertex_colors.is_none() {
+            return Ok(None);
+        }
+        fn colors(file: &MeshFile) -> &[u8] {
+            file.held.appearance.vertex_colors.as_deref().map_or(&[], <[[u8; 4]]>::as_flattened)
+        }
+        lend::rows(slf, 4, colors).map(Some)
+    }
+
+    /// bool: whether the file has vertex colours, materials or images.
+    #[getter]
+    fn has_colors(&self) -> bool {
+        !self.held.appearance.is_plain()
+    }
+
+    /// str: the format, such as ``"ply"``.
+    #[getter]
+    fn format(&self) -> String {
+        format!("{:?}", self.held.format).to_lowercase()
+    }
+
+    /// list of str: what could not be read of the colours, and why.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.held.appearance.notes.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let mesh = &self.held.mesh;
+        format!("MeshFile({} vertices, {} triangles)", mesh.n_vertices(), mesh.n_faces())
+    }
+}
+
+/// Reads a mesh file with its colours.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     OBJ, PLY, STL, OFF, glTF or GLB.
+/// texture : path, optional
+///     An image for a mesh with texture coordinates (OBJ, PLY).
+///
+/// Returns
+/// -------
+/// MeshFile
+#[pyfunction]
+#[pyo3(signature = (path, *, texture=None))]
+pub fn read_mesh(py: Python<'_>, path: PathBuf, texture: Option<PathBuf>) -> PyResult<MeshFile> {
+    let file = run(py, None, move |_| {
+        let mut file = io::read_mesh(&path)?;
+        if let Some(texture) = &texture {
+            file.appearance.attach_image(texture)?;
+        }
+        Ok(file)
+    })?;
+    Ok(MeshFile { held: Held::new(file) })
+}

@@ -1,0 +1,162 @@
+//! The one-call door: two objects and a region in, a carried region out.
+
+use pyo3::prelude::*;
+use semfm::PipelineSettings;
+
+use crate::cloud::SemanticCloud;
+use crate::errors;
+use crate::held::Held;
+use crate::matching::Matching;
+use crate::mesh::from_any;
+use crate::prepared::{OwnedMeaning, PreparedObject};
+use crate::region::region_of;
+use crate::settings::{Options, TransferSettings};
+use crate::shape::check_shape_size;
+use crate::transfer::Transfer;
+use crate::work::run;
+
+/// One of the two objects, prepared or to be prepared.
+enum Side {
+    Ready(PreparedObject),
+    Raw(Held<semfm::Mesh>, OwnedMeaning),
+}
+
+impl Side {
+    fn of(
+        value: &Bound<'_, PyAny>,
+        name: &str,
+        features: Option<&Bound<'_, PyAny>>,
+        embeddings: Option<&Bound<'_, PyAny>>,
+        cloud: Option<&Bound<'_, SemanticCloud>>,
+        settings: &PipelineSettings,
+    ) -> PyResult<Self> {
+        let py = value.py();
+        if let Ok(prepared) = value.cast::<PreparedObject>() {
+            if features.is_some() || embeddings.is_some() || cloud.is_some() {
+                let argument = format!("{name}_features");
+                let expected = "nothing beside a PreparedObject, which has its features";
+                return Err(errors::invalid(py, &argument, expected, "more"));
+            }
+            return Ok(Self::Ready(prepared.get().clone()));
+        }
+        let mesh = from_any(value, name)?;
+        check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
+        let meaning =
+            OwnedMeaning::of(py, &format!("{name}_"), &mesh, features, embeddings, cloud)?;
+        Ok(Self::Raw(mesh, meaning))
+    }
+
+    fn mesh(&self) -> Held<semfm::Mesh> {
+        match self {
+            Self::Ready(object) => object.held.part(|object| object.shape.original()),
+            Self::Raw(mesh, _) => mesh.clone(),
+        }
+    }
+
+    fn prepare(
+        self,
+        settings: &PipelineSettings,
+        task: &semfm::Task,
+    ) -> semfm::Result<PreparedObject> {
+        match self {
+            Self::Ready(object) => Ok(object),
+            Self::Raw(mesh, meaning) => meaning.prepare(&mesh, settings, task),
+        }
+    }
+}
+
+/// Carries a demonstrated region from one object to another.
+///
+/// Parameters
+/// ----------
+/// source : mesh_like or PreparedObject
+///     The demonstrated object.
+/// target : mesh_like or PreparedObject
+///     The one to act on.
+/// region : Region or path
+///     Where the demonstration touched the source.
+/// source_features : (n_source, d) array_like, optional
+///     A feature vector per vertex, from anybody's network.
+/// target_features : (n_target, d) array_like, optional
+/// source_embeddings : Embeddings or path, optional
+///     Patch embeddings of rendered views.
+/// target_embeddings : Embeddings or path, optional
+/// source_cloud : SemanticCloud, optional
+///     Surface points with features, made by the caller.
+/// target_cloud : SemanticCloud, optional
+/// method : str, optional
+///     ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
+///     ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
+/// rule : str, optional
+///     How a map carries the region: ``preimage`` (where none is given) or ``image``.
+/// seed : int, optional
+///     Of everything drawn by chance; 0 where none is given.
+/// settings : TransferSettings, optional
+///     Everything that can be set, in place of `method` and `rule`.
+/// k : int, optional
+///     Eigenpairs of each shape; 60, or what the mesh allows, where none is given.
+/// working_vertices : int, optional
+///     Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
+/// cache : cache, optional
+///     Where prepared shapes are kept: a folder, or True for the user's own.
+/// progress : progress, optional
+///
+/// Returns
+/// -------
+/// Transfer
+///     A region that lands nowhere is no error but the verdict ``"refuse"``.
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
+/// >>> carried = semfm.transfer(
+/// ...     mug.mesh, kettle.mesh, mug.region,
+/// ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
+/// >>> carried.region.n_vertices == kettle.mesh.n_vertices
+/// True
+#[pyfunction]
+#[pyo3(signature = (
+    source, target, region, *, source_features=None, target_features=None, source_embeddings=None,
+    target_embeddings=None, source_cloud=None, target_cloud=None, method=None, rule=None, seed=None,
+    settings=None, k=None, working_vertices=None, cache=None, progress=None
+))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+pub fn transfer(
+    source: &Bound<'_, PyAny>,
+    target: &Bound<'_, PyAny>,
+    region: &Bound<'_, PyAny>,
+    source_features: Option<&Bound<'_, PyAny>>,
+    target_features: Option<&Bound<'_, PyAny>>,
+    source_embeddings: Option<&Bound<'_, PyAny>>,
+    target_embeddings: Option<&Bound<'_, PyAny>>,
+    source_cloud: Option<&Bound<'_, SemanticCloud>>,
+    target_cloud: Option<&Bound<'_, SemanticCloud>>,
+    method: Option<&str>,
+    rule: Option<&str>,
+    seed: Option<u64>,
+    settings: Option<&Bound<'_, TransferSettings>>,
+    k: Option<usize>,
+    working_vertices: Option<usize>,
+    cache: Option<&Bound<'_, PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Transfer> {
+    let py = source.py();
+    let options = Options { method, rule, seed, settings, k, working_vertices, cache };
+    let settings = options.pipeline(py)?;
+    let source =
+        Side::of(source, "source", source_features, source_embeddings, source_cloud, &settings)?;
+    let target =
+        Side::of(target, "target", target_features, target_embeddings, target_cloud, &settings)?;
+    let region = region_of(region, &source.mesh())?;
+    let n = source.mesh().n_vertices();
+    if region.n_vertices() != n {
+        let expected = format!("a region of the source's {n} vertices");
+        return Err(errors::invalid(py, "region", &expected, &region.n_vertices().to_string()));
+    }
+    run(py, progress, move |task| {
+        let prepare = |side: Side| side.prepare(&settings, task);
+        let (source, target) = rayon::join(|| prepare(source), || prepare(target));
+        Matching::of(source?, target?, &settings.transfer, task)?.carry(region)
+    })
+}

@@ -1,0 +1,288 @@
+//! `PreparedObject`: shape and meaning of one object, made once.
+
+use std::borrow::Cow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use self_cell::self_cell;
+use semfm::fmap::clusters::ClusterSettings;
+use semfm::fmap::{PreparedShape, SemanticShape};
+use semfm::geom::SemanticCloud as Cloud;
+use semfm::{Meaning, PipelineSettings, Task};
+use semfm_views::LiftReport;
+use semfm_views::mcap::EmbeddingsFile;
+
+use crate::arrays::{self, Axis};
+use crate::cloud::{SemanticCloud, embeddings_of};
+use crate::held::Held;
+use crate::mesh::{Mesh, from_any};
+use crate::settings::{Options, TransferSettings};
+use crate::shape::{Shape, check_shape_size};
+use crate::work::run;
+use crate::{errors, json};
+
+self_cell!(
+    /// A prepared object with its parts, which borrow from it.
+    pub struct PreparedParts {
+        owner: Held<semfm::PreparedObject>,
+        #[covariant]
+        dependent: PreparedShape,
+    }
+);
+
+/// An object ready to be matched: its shape and its semantic cloud.
+///
+/// Made by `prepare`. Semantic parts are cut at the first matching and kept.
+#[pyclass(frozen, module = "semfm")]
+#[derive(Clone)]
+pub struct PreparedObject {
+    pub held: Held<semfm::PreparedObject>,
+    parts: Arc<Mutex<Option<Kept>>>,
+}
+
+/// The parts of the last matching and how they were cut.
+type Kept = (ClusterSettings, Arc<PreparedParts>);
+
+impl PreparedObject {
+    pub fn new(object: semfm::PreparedObject) -> Self {
+        Self { held: Held::new(object), parts: Arc::default() }
+    }
+
+    /// The object's parts, cut as `settings` say; those of the last call are kept.
+    pub fn parts(
+        &self,
+        settings: &ClusterSettings,
+        task: &Task,
+    ) -> semfm::Result<Arc<PreparedParts>> {
+        let kept = || self.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((of, parts)) = &*kept()
+            && of == settings
+        {
+            return Ok(Arc::clone(parts));
+        }
+        let parts = PreparedParts::try_new(self.held.clone(), |object| {
+            let semantic = SemanticShape { shape: &object.shape, cloud: &object.cloud };
+            PreparedShape::new(semantic, settings, task)
+        })?;
+        let parts = Arc::new(parts);
+        *kept() = Some((*settings, Arc::clone(&parts)));
+        Ok(parts)
+    }
+}
+
+#[pymethods]
+impl PreparedObject {
+    /// Mesh: the mesh as given.
+    #[getter]
+    fn mesh(&self) -> Mesh {
+        Mesh { held: self.held.part(|object| object.shape.original()) }
+    }
+
+    /// Shape: working mesh and eigenbasis.
+    #[getter]
+    fn shape(&self) -> Shape {
+        Shape { held: self.held.part(|object| &object.shape) }
+    }
+
+    /// SemanticCloud: surface points with features.
+    #[getter]
+    fn cloud(&self) -> SemanticCloud {
+        SemanticCloud { held: self.held.part(|object| &object.cloud) }
+    }
+
+    /// bool: whether the shape was read from the cache.
+    #[getter(from_cache)]
+    fn is_from_cache(&self) -> bool {
+        self.held.from_cache
+    }
+
+    /// dict: milliseconds by stage.
+    #[getter]
+    fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let stages: std::collections::BTreeMap<_, _> =
+            self.held.stages_ms.iter().copied().collect();
+        json::to_python(py, &stages)
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, points) = (self.held.shape.original().n_vertices(), self.held.cloud.n_points());
+        format!("PreparedObject({n} vertices, {points} points, dim {})", self.held.cloud.dim())
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (Shape, SemanticCloud, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
+    )> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
+        let lifted = self.held.lifted.as_ref();
+        let lifted = lifted.map(|lifted| (lifted.n_seen, lifted.lifted_by_view.clone()));
+        let stages = self.held.stages_ms.clone();
+        Ok((restore, (self.shape(), self.cloud(), self.held.from_cache, lifted, stages)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// A prepared object out of a pickle.
+#[pyfunction]
+#[pyo3(signature = (shape, cloud, from_cache, lifted, stages_ms))]
+pub fn _restore_prepared(
+    shape: &Bound<'_, Shape>,
+    cloud: &Bound<'_, SemanticCloud>,
+    from_cache: bool,
+    lifted: Option<(usize, Vec<usize>)>,
+    stages_ms: Vec<(String, f64)>,
+) -> PreparedObject {
+    let stages_ms = stages_ms
+        .iter()
+        .map(|(name, ms)| (if name == "lift" { "lift" } else { "shape" }, *ms))
+        .collect();
+    PreparedObject::new(semfm::PreparedObject {
+        shape: (*shape.get().held).clone(),
+        from_cache,
+        cloud: (*cloud.get().held).clone(),
+        lifted: lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view }),
+        stages_ms,
+    })
+}
+
+/// Where an object's features come from, owned.
+pub enum OwnedMeaning {
+    Views(Held<EmbeddingsFile>),
+    PerVertex(Vec<f32>),
+    Cloud(Held<Cloud>),
+}
+
+impl OwnedMeaning {
+    /// The one meaning that was given, of three arguments whose names begin with `side`.
+    pub fn of(
+        py: Python<'_>,
+        side: &str,
+        mesh: &semfm::Mesh,
+        features: Option<&Bound<'_, PyAny>>,
+        embeddings: Option<&Bound<'_, PyAny>>,
+        cloud: Option<&Bound<'_, SemanticCloud>>,
+    ) -> PyResult<Self> {
+        match (features, embeddings, cloud) {
+            (Some(features), None, None) => {
+                let rows = [Axis::Is(mesh.n_vertices()), Axis::Any("d")];
+                let (values, shape) =
+                    arrays::floats32(features, &format!("{side}features"), &rows)?;
+                if shape[1] == 0 {
+                    let name = format!("{side}features");
+                    return Err(errors::invalid(py, &name, "at least one column", "none"));
+                }
+                Ok(Self::PerVertex(values))
+            }
+            (None, Some(embeddings), None) => {
+                let name = format!("{side}embeddings");
+                Ok(Self::Views(embeddings_of(embeddings, &name, mesh)?))
+            }
+            (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().held.clone())),
+            (None, None, None) => {
+                let expected = "features per vertex, embeddings, or a cloud";
+                Err(errors::invalid(py, &format!("{side}features"), expected, "none of them"))
+            }
+            _ => {
+                let expected = "one of features, embeddings and cloud";
+                Err(errors::invalid(py, &format!("{side}features"), expected, "several"))
+            }
+        }
+    }
+
+    /// Prepares the object.
+    pub fn prepare(
+        &self,
+        mesh: &semfm::Mesh,
+        settings: &PipelineSettings,
+        task: &Task,
+    ) -> semfm::Result<PreparedObject> {
+        let meaning = match self {
+            Self::Views(file) => Meaning::Views(&file.views),
+            Self::PerVertex(features) => Meaning::PerVertex(features),
+            Self::Cloud(cloud) => Meaning::Cloud(Cow::Borrowed(cloud)),
+        };
+        let object = semfm::PreparedObject::new(mesh.clone(), meaning, settings, task)?;
+        Ok(PreparedObject::new(object))
+    }
+}
+
+/// Makes an object ready to be matched with any number of others.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+/// features : (n, d) array_like, optional
+///     A feature vector per vertex, from anybody's network.
+/// embeddings : Embeddings or path, optional
+///     Patch embeddings of rendered views of this very mesh.
+/// cloud : SemanticCloud, optional
+///     Surface points with features, made by the caller.
+/// method : str, optional
+///     Lift as this method does: ``"fused"`` where neither this nor `settings` is given.
+/// settings : TransferSettings, optional
+///     Lift as the method of these settings does.
+/// k : int, optional
+///     Eigenpairs; 60, or what the mesh allows, where none is given.
+/// working_vertices : int, optional
+///     Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
+/// n_samples : int, optional
+///     Points of the cloud; the method's own number where none is given.
+/// seed : int, optional
+///     Of everything drawn by chance; 0 where none is given.
+/// cache : cache, optional
+///     Where prepared shapes are kept: a folder, or True for the user's own.
+/// progress : progress, optional
+///
+/// Returns
+/// -------
+/// PreparedObject
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> demo = semfm.demo_object("tools", n_vertices=400)
+/// >>> prepared = semfm.prepare(demo.mesh, features=demo.part_features(), k=20)
+/// >>> prepared.cloud.dim == len(demo.part_names)
+/// True
+#[pyfunction]
+#[pyo3(signature = (
+    mesh, *, features=None, embeddings=None, cloud=None, method=None, settings=None, k=None,
+    working_vertices=None, n_samples=None, seed=None, cache=None, progress=None
+))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+pub fn prepare(
+    py: Python<'_>,
+    mesh: &Bound<'_, PyAny>,
+    features: Option<&Bound<'_, PyAny>>,
+    embeddings: Option<&Bound<'_, PyAny>>,
+    cloud: Option<&Bound<'_, SemanticCloud>>,
+    method: Option<&str>,
+    settings: Option<&Bound<'_, TransferSettings>>,
+    k: Option<usize>,
+    working_vertices: Option<usize>,
+    n_samples: Option<usize>,
+    seed: Option<u64>,
+    cache: Option<&Bound<'_, PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PreparedObject> {
+    let options = Options { method, rule: None, seed, settings, k, working_vertices, cache };
+    let mut settings = options.pipeline(py)?;
+    if let Some(n) = n_samples {
+        arrays::within_memory(py, "n_samples", n, 1024)?;
+        settings.lift.n_samples = n;
+    }
+    let mesh = from_any(mesh, "mesh")?;
+    check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
+    let meaning = OwnedMeaning::of(py, "", &mesh, features, embeddings, cloud)?;
+    run(py, progress, move |task| meaning.prepare(&mesh, &settings, task))
+}

@@ -1,0 +1,318 @@
+//! `Region`: where to act.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use semfm::fmap::metrics;
+use semfm::{region_file, regions};
+
+use crate::arrays::{self, Axis};
+use crate::camera::Camera;
+use crate::held::Held;
+use crate::mesh::{MeshFile, Reduced, from_any};
+use crate::work::{guard, run};
+use crate::{errors, lend};
+
+/// A region (an affordance): a weight in [0, 1] for each vertex of a mesh.
+///
+/// A vertex counts where its weight is at least one half. The vertex ids are those of the mesh as
+/// read.
+///
+/// Parameters
+/// ----------
+/// weights : (n,) array_like
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> grip = semfm.Region.from_vertices(5, [3, 1])
+/// >>> grip.vertices.tolist()
+/// [1, 3]
+/// >>> grip.mask.tolist()
+/// [False, True, False, True, False]
+#[pyclass(frozen, module = "semfm")]
+pub struct Region {
+    pub held: Held<semfm::Region>,
+}
+
+#[pymethods]
+impl Region {
+    #[new]
+    fn new(weights: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, _) = arrays::floats(weights, "weights", &[Axis::Any("n")])?;
+        guarded(weights.py(), || Ok(semfm::Region::from_weights(values)?))
+    }
+
+    /// A region of full weight on some vertices.
+    ///
+    /// Parameters
+    /// ----------
+    /// n_vertices : int
+    ///     Vertices of the mesh.
+    /// vertices : (v,) array_like
+    ///     Ids, which may repeat.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    #[staticmethod]
+    fn from_vertices(n_vertices: usize, vertices: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = vertices.py();
+        arrays::within_memory(py, "n_vertices", n_vertices, 1)?;
+        let (ids, _) = arrays::ids(vertices, "vertices", &[Axis::Any("v")])?;
+        guarded(py, || Ok(semfm::Region::from_vertices(n_vertices, &ids)?))
+    }
+
+    /// A region of full weight where a mask is true.
+    ///
+    /// Parameters
+    /// ----------
+    /// inside : (n,) array_like
+    ///     Of dtype bool.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    #[staticmethod]
+    fn from_mask(inside: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (inside, _) = arrays::mask(inside, "inside", &[Axis::Any("n")])?;
+        Ok(Self { held: Held::new(semfm::Region::from_mask(&inside)) })
+    }
+
+    /// All vertices within a geodesic radius of the surface point nearest to a contact.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : mesh_like
+    /// contact : (3,) array_like
+    ///     In the mesh's frame and units.
+    /// radius : float
+    ///     In the mesh's units.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    ///
+    /// Examples
+    /// --------
+    /// >>> import semfm, semfm.zoo
+    /// >>> cap = semfm.Region.near(semfm.zoo.icosphere(3), [0, 0, 2], radius=0.5)
+    /// >>> 30 < len(cap.vertices) < 50
+    /// True
+    #[staticmethod]
+    fn near(mesh: &Bound<'_, PyAny>, contact: &Bound<'_, PyAny>, radius: f64) -> PyResult<Self> {
+        let contact = arrays::point(contact, "contact")?;
+        let held = from_any(mesh, "mesh")?;
+        let region = run(mesh.py(), None, move |_| regions::near(&held, contact, radius))?;
+        Ok(Self { held: Held::new(region) })
+    }
+
+    /// All vertices that a camera sees inside a mask.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : mesh_like
+    /// camera : Camera
+    /// mask : (height, width) array_like
+    ///     Of dtype bool, of the camera's size.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    #[staticmethod]
+    fn masked(
+        mesh: &Bound<'_, PyAny>,
+        camera: &Bound<'_, Camera>,
+        mask: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let camera = camera.get().camera;
+        let size = [Axis::Is(camera.height as usize), Axis::Is(camera.width as usize)];
+        let (mask, _) = arrays::mask(mask, "mask", &size)?;
+        let held = from_any(mesh, "mesh")?;
+        let region = run(mesh.py(), None, move |_| regions::masked(&held, &camera, &mask))?;
+        Ok(Self { held: Held::new(region) })
+    }
+
+    /// All vertices painted red, or in the paint given.
+    ///
+    /// Parameters
+    /// ----------
+    /// file : MeshFile
+    ///     A mesh with vertex colours, from `read_mesh`.
+    /// paint : tuple of int, int, int, optional
+    ///     sRGB, each 0 to 255.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    #[staticmethod]
+    #[pyo3(signature = (file, paint=None))]
+    fn painted(
+        py: Python<'_>,
+        file: &Bound<'_, MeshFile>,
+        paint: Option<(u8, u8, u8)>,
+    ) -> PyResult<Self> {
+        let colors = file.get().held.appearance.vertex_colors.as_deref();
+        guarded(py, || regions::painted(colors, paint.map(|(r, g, b)| [r, g, b])))
+    }
+
+    /// Reads a region file of a mesh.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///     JSON: ``{"vertices": […], "weights": […]}``, bare or under ``"region"``.
+    /// mesh : mesh_like
+    ///     The mesh it belongs to; where the file names another one, that is an error.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    #[staticmethod]
+    fn read(path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let held = from_any(mesh, "mesh")?;
+        guarded(mesh.py(), || region_file::read_region(&path, &held))
+    }
+
+    /// Writes a region file, whole or not at all.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    /// mesh : mesh_like
+    ///     The mesh it belongs to.
+    fn write(&self, path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<()> {
+        let held = self.of(mesh)?;
+        guard(mesh.py(), || region_file::write_region(&path, &self.held, &held))
+    }
+
+    /// The region file's content as text.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : mesh_like
+    ///     The mesh it belongs to.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    fn to_json(&self, mesh: &Bound<'_, PyAny>) -> PyResult<String> {
+        let held = self.of(mesh)?;
+        guard(mesh.py(), || Ok(region_file::region_json(&self.held, &held).to_string()))
+    }
+
+    /// (n,) float64 array: weight of each vertex, a read-only view.
+    #[getter]
+    fn weights<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        lend::vector(slf, |region| region.held.weights())
+    }
+
+    /// (v,) uint32 array: ids of the vertices that count, ascending.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.held.vertices())
+    }
+
+    /// (n,) bool array: whether each vertex counts.
+    #[getter]
+    fn mask<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.held.mask())
+    }
+
+    /// int: vertices of the mesh, inside or not.
+    #[getter]
+    fn n_vertices(&self) -> usize {
+        self.held.n_vertices()
+    }
+
+    /// bool: whether no vertex counts.
+    #[getter]
+    fn is_empty(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// Intersection over union with the true region, in vertices or in areas.
+    ///
+    /// Parameters
+    /// ----------
+    /// truth : Region
+    ///     Of the same mesh.
+    /// areas : (n,) array_like, optional
+    ///     Area of each vertex (`Mesh.vertex_areas`); vertices are counted where none are given.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///     0 where both are empty.
+    #[pyo3(signature = (truth, areas=None))]
+    fn iou(&self, truth: &Bound<'_, Self>, areas: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
+        let py = truth.py();
+        let truth = &truth.get().held;
+        match areas {
+            None => guard(py, || Ok(metrics::iou(&self.held, truth)?)),
+            Some(areas) => {
+                let areas = arrays::floats(areas, "areas", &[Axis::Any("n")])?.0;
+                guard(py, || Ok(metrics::area_iou(&self.held, truth, &areas)?))
+            }
+        }
+    }
+
+    fn __len__(&self) -> usize {
+        self.held.n_vertices()
+    }
+
+    fn __repr__(&self) -> String {
+        let (inside, n) = (self.held.vertices().len(), self.held.n_vertices());
+        format!("Region({inside} of {n} vertices)")
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let parts = (Self::weights(slf)?,);
+        Ok((slf.get_type(), parts.into_pyobject(slf.py())?.into_any()))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+impl Region {
+    /// The mesh, if it may be the one of this region.
+    fn of(&self, mesh: &Bound<'_, PyAny>) -> PyResult<Held<semfm::Mesh>> {
+        let held = from_any(mesh, "mesh")?;
+        if held.n_vertices() == self.held.n_vertices() {
+            return Ok(held);
+        }
+        let expected = format!("a mesh of {} vertices, as the region's", self.held.n_vertices());
+        Err(errors::invalid(mesh.py(), "mesh", &expected, &held.n_vertices().to_string()))
+    }
+}
+
+fn guarded(
+    py: Python<'_>,
+    make: impl FnOnce() -> semfm::Result<semfm::Region>,
+) -> PyResult<Region> {
+    Ok(Region { held: Held::new(guard(py, make)?) })
+}
+
+/// A region, or the file of one, on `mesh`.
+pub fn region_of(
+    value: &Bound<'_, PyAny>,
+    mesh: &Held<semfm::Mesh>,
+) -> PyResult<Held<semfm::Region>> {
+    if let Ok(region) = value.cast::<Region>() {
+        return Ok(region.get().held.clone());
+    }
+    let wanted = "a Region or a path (for ids, masks and weights see Region's constructors)";
+    let path: PathBuf = value.extract().map_err(|_| errors::wrong_type("region", wanted, value))?;
+    let region = guard(value.py(), || region_file::read_region(&path, mesh))?;
+    Ok(Held::new(region))
+}

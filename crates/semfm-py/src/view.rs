@@ -1,0 +1,231 @@
+//! `View`: rendered pictures with depth and triangles, and their files.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use semfm::views::mcap::{MeshIdentity, ViewsFile, ViewsMetadata, write_views as write};
+use semfm::views::{self, Paint, RenderSettings, RigSettings};
+
+use crate::arrays::{self, Axis};
+use crate::camera::{self, Camera, rows_and_columns};
+use crate::held::Held;
+use crate::mesh::{MeshFile, from_any};
+use crate::work::run;
+use crate::{errors, lend};
+
+/// One rendered view of an object.
+///
+/// See Also
+/// --------
+/// render, read_views
+#[pyclass(frozen, module = "semfm")]
+pub struct View {
+    pub held: Held<views::View>,
+}
+
+#[pymethods]
+impl View {
+    /// Camera: the one the picture was taken with.
+    #[getter]
+    fn camera(&self) -> Camera {
+        Camera { camera: self.held.camera }
+    }
+
+    /// (height, width, 3) uint8 array: sRGB, a read-only view.
+    #[getter]
+    fn rgb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let flat = lend::vector(slf, |view| view.held.rgb.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[3])?,))
+    }
+
+    /// (height, width) float32 array: depth along the camera's axis in mesh units, infinite on the background, a read-only view.
+    #[getter]
+    fn depth<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let flat = lend::vector(slf, |view| view.held.depth.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[])?,))
+    }
+
+    /// (height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view.
+    #[getter]
+    fn triangles<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let flat = lend::vector(slf, |view| view.held.triangles.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[])?,))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("View({} × {})", self.held.camera.width, self.held.camera.height)
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (Camera, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+    )> {
+        let restore = slf.py().import("semfm._semfm")?.getattr("_restore_view")?;
+        let parts = (slf.get().camera(), Self::rgb(slf)?, Self::depth(slf)?, Self::triangles(slf)?);
+        Ok((restore, parts))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// A view out of a pickle.
+#[pyfunction]
+pub fn _restore_view(
+    camera: &Bound<'_, Camera>,
+    rgb: &Bound<'_, PyAny>,
+    depth: &Bound<'_, PyAny>,
+    triangles: &Bound<'_, PyAny>,
+) -> PyResult<View> {
+    let camera = camera.get().camera;
+    let (height, width) = (Axis::Is(camera.height as usize), Axis::Is(camera.width as usize));
+    let shifted = triangles.call_method1("__add__", (1,))?; // ids have no −1
+    let triangles = arrays::ids(&shifted, "triangles", &[height, width])?.0;
+    let view = views::View {
+        camera,
+        rgb: arrays::bytes(rgb, "rgb", &[height, width, Axis::Is(3)])?.0,
+        depth: arrays::any32(depth, "depth", &[height, width])?.0, // infinite on the background
+        triangles: triangles.into_iter().map(|id| id as i32 - 1).collect(),
+    };
+    Ok(View { held: Held::new(view) })
+}
+
+/// Colours to render with, owned.
+enum Colors {
+    Grey,
+    Vertices(Vec<[f32; 3]>),
+    File(Held<semfm::geom::io::MeshFile>),
+}
+
+/// One picture per camera, with depth and triangle of every pixel.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like or MeshFile
+///     A `MeshFile` is drawn in its own colours.
+/// cameras : list of Camera, optional
+///     As `rig` makes them where none are given.
+/// colors : (n, 3) array_like, optional
+///     sRGB of each vertex, 0 to 1.
+/// supersampling : int, default 2
+///     Colour samples along each side of a pixel, 1 to 8.
+/// background : (3,) array_like, optional
+///     sRGB, 0 to 1; white where none is given.
+/// progress : progress, optional
+///
+/// Returns
+/// -------
+/// list of View
+///
+/// Examples
+/// --------
+/// >>> import semfm, semfm.zoo
+/// >>> mesh = semfm.zoo.torus(40, 20)
+/// >>> views = semfm.render(mesh, semfm.rig(mesh, count=3, size=64))
+/// >>> len(views), views[0].rgb.shape
+/// (3, (64, 64, 3))
+#[pyfunction]
+#[pyo3(signature = (mesh, cameras=None, *, colors=None, supersampling=2, background=None, progress=None))]
+pub fn render(
+    mesh: &Bound<'_, PyAny>,
+    cameras: Option<&Bound<'_, PyAny>>,
+    colors: Option<&Bound<'_, PyAny>>,
+    supersampling: u32,
+    background: Option<&Bound<'_, PyAny>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<View>> {
+    let (held, mut paint) = match mesh.cast::<MeshFile>() {
+        Ok(file) => {
+            let file = file.get().held.clone();
+            let colored = !file.appearance.is_plain();
+            (file.part(|file| &file.mesh), if colored { Colors::File(file) } else { Colors::Grey })
+        }
+        Err(_) => (from_any(mesh, "mesh")?, Colors::Grey),
+    };
+    if let Some(colors) = colors {
+        let rows = [Axis::Is(held.n_vertices()), Axis::Is(3)];
+        let values = arrays::floats32(colors, "colors", &rows)?.0;
+        paint = Colors::Vertices(values.as_chunks::<3>().0.to_vec());
+    }
+    let mut settings = RenderSettings { supersampling, ..Default::default() };
+    if let Some(background) = background {
+        settings.background = arrays::point(background, "background")?.as_vec3().to_array();
+    }
+    let cameras = cameras.map(camera::list).transpose()?;
+    let rendered = run(mesh.py(), progress, move |task| {
+        let cameras = match cameras {
+            Some(cameras) => cameras,
+            None => views::rig(&held, &RigSettings::default())?,
+        };
+        let draw = |paint: &Paint<'_>| views::render(&held, paint, &cameras, &settings, task);
+        Ok(match &paint {
+            Colors::Grey => draw(&Paint::default()),
+            Colors::Vertices(colors) => draw(&Paint::Vertices(colors)),
+            Colors::File(file) => draw(&Paint::Surface(&|face, weights| {
+                let [r, g, b, _] = file.appearance.color_at(face, held.faces()[face], weights);
+                [r, g, b].map(|c| f32::from(c) / 255.0)
+            })),
+        }?)
+    })?;
+    Ok(rendered.into_iter().map(|view| View { held: Held::new(view) }).collect())
+}
+
+/// Writes views of a mesh as ``NAME.views.mcap``, whole or not at all: for `semfm-embed`.
+///
+/// Parameters
+/// ----------
+/// path : path
+/// views : list of View
+///     All of one size.
+/// mesh : mesh_like
+///     The mesh that was rendered.
+#[pyfunction]
+pub fn write_views(
+    path: PathBuf,
+    views: &Bound<'_, PyAny>,
+    mesh: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    let mesh_held = from_any(mesh, "mesh")?;
+    let mut rendered = Vec::new();
+    for view in views.try_iter()? {
+        let view = view?;
+        let view =
+            view.cast::<View>().map_err(|_| errors::wrong_type("views", "View objects", &view))?;
+        rendered.push((*view.get().held).clone());
+    }
+    run(mesh.py(), None, move |_| {
+        let size = rendered.first().map_or((0, 0), |view| (view.camera.width, view.camera.height));
+        let metadata = ViewsMetadata {
+            mesh: MeshIdentity::of(&mesh_held),
+            width: size.0,
+            height: size.1,
+            rig: "given as cameras".into(),
+            background: "as rendered".into(),
+            seed: 0,
+            more: Default::default(),
+        };
+        Ok(write(&path, &rendered, &mesh_held, None, &metadata)?)
+    })
+}
+
+/// Reads the views of a ``NAME.views.mcap``.
+///
+/// Parameters
+/// ----------
+/// path : path
+///
+/// Returns
+/// -------
+/// list of View
+#[pyfunction]
+pub fn read_views(py: Python<'_>, path: PathBuf) -> PyResult<Vec<View>> {
+    let file = run(py, None, move |_| Ok(ViewsFile::read(&path)?))?;
+    Ok(file.views.into_iter().map(|view| View { held: Held::new(view) }).collect())
+}

@@ -1,0 +1,2203 @@
+# Written by python/tools/stubs.py from the compiled module. Do not edit.
+# ruff: noqa: E501, UP007, UP045
+"""The compiled half of `semfm`."""
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any, Callable, Optional, Protocol, Union
+
+import numpy
+from numpy.typing import ArrayLike, NDArray
+
+class _WithFaces(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+class _WithTriangles(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def triangles(self) -> Any: ...
+
+_Path = Union[str, os.PathLike[str]]
+_MeshLike = Union["Mesh", _Path, _WithFaces, _WithTriangles]
+_Progress = Union[bool, Callable[[str, int, int], object]]
+_Cache = Union[bool, _Path]
+
+__version__: str
+
+class Anchors:
+    """The paired parts of two objects, by falling cosine.
+
+    See Also
+    --------
+    Anchors.select, Matching.anchors
+    """
+    def __len__(self) -> int: ...
+    @property
+    def cosines(self) -> NDArray[numpy.float64]:
+        """(K_source, K_target) float64 array: all cosines, a read-only view."""
+        ...
+    @property
+    def margins(self) -> NDArray[numpy.float64]:
+        """(a,) float64 array: by how much each cosine exceeds its best rival; infinite without one."""
+        ...
+    @property
+    def pairs(self) -> NDArray[numpy.uint32]:
+        """(a, 2) uint32 array: cluster of the source and of the target of each pair."""
+        ...
+    @property
+    def scores(self) -> NDArray[numpy.float64]:
+        """(a,) float64 array: cosine of the two mean features of each pair."""
+        ...
+    @staticmethod
+    def select(source_cloud: SemanticCloud, source_clusters: Clusters, target_cloud: SemanticCloud, target_clusters: Clusters, *, alpha: int = 2) -> Anchors:
+        """The one-to-one pairs of clusters with the largest total cosine between mean features.
+
+        Parameters
+        ----------
+        source_cloud : SemanticCloud
+        source_clusters : Clusters
+        target_cloud : SemanticCloud
+        target_clusters : Clusters
+        alpha : int, default 2
+            How many pairs; fewer where there are fewer clusters.
+
+        Returns
+        -------
+        Anchors
+        """
+        ...
+
+class Camera:
+    """A pinhole camera without distortion, posed in the object's frame: x right, y down, z forward.
+
+    A point projects to ``u = fx x / z + cx``, ``v = fy y / z + cy`` in pixels; the centre of the
+    pixel in column c and row r is at (c + ½, r + ½).
+
+    Parameters
+    ----------
+    width : int
+        Pixels.
+    height : int
+        Pixels.
+    fx : float
+        Focal length along x, in pixels.
+    fy : float
+        Focal length along y, in pixels.
+    cx : float
+        Principal point, x, in pixels.
+    cy : float
+        Principal point, y, in pixels.
+    camera_from_object : (4, 4) array_like
+        Rigid motion from the object's frame to the camera's, as a homogeneous matrix.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm
+    >>> camera = semfm.Camera(64, 48, 70, 70, 32, 24, np.eye(4))
+    >>> camera.project([[0, 0, 2]]).tolist()
+    [[32.0, 24.0, 2.0]]
+    """
+    def __init__(self, width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_object: ArrayLike) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def camera_from_object(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: rigid motion from the object's frame to the camera's."""
+        ...
+    @property
+    def cx(self) -> float:
+        """float: principal point, x, in pixels."""
+        ...
+    @property
+    def cy(self) -> float:
+        """float: principal point, y, in pixels."""
+        ...
+    @property
+    def eye(self) -> NDArray[numpy.float64]:
+        """(3,) float64 array: where the camera stands, in the object's frame."""
+        ...
+    @property
+    def fx(self) -> float:
+        """float: focal length along x, in pixels."""
+        ...
+    @property
+    def fy(self) -> float:
+        """float: focal length along y, in pixels."""
+        ...
+    @property
+    def height(self) -> int:
+        """int: pixels."""
+        ...
+    def project(self, points: ArrayLike) -> NDArray[numpy.float64]:
+        """Pixel position and depth of points.
+
+        Parameters
+        ----------
+        points : (n, 3) array_like
+            In the object's frame.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            u, v, and depth z; u and v mean nothing where z ≤ 0.
+        """
+        ...
+    @property
+    def width(self) -> int:
+        """int: pixels."""
+        ...
+
+class Clusters:
+    """A cloud cut into parts: one label per point, every label from 0 borne by somebody.
+
+    Parameters
+    ----------
+    labels : (m,) array_like
+        Labels from elsewhere (ids); gaps in the numbering are closed.
+
+    See Also
+    --------
+    spectral_clusters : cuts a cloud by its features.
+    """
+    def __init__(self, labels: ArrayLike) -> None: ...
+    @property
+    def labels(self) -> NDArray[numpy.uint32]:
+        """(m,) uint32 array: label of each point, a read-only view."""
+        ...
+    @property
+    def n_clusters(self) -> int:
+        """int: number of parts."""
+        ...
+
+class DemoObject:
+    """A procedural object with everything that is known about it: shape, parts, true grip.
+
+    Made by `demo_object`.
+    """
+    def embeddings(self, level: str = 'medium', *, progress: Optional[_Progress] = None) -> Embeddings:
+        """Simulated patch embeddings of the default views.
+
+        Parameters
+        ----------
+        level : str, default "medium"
+            How hard they are: ``"easy"``, ``"medium"`` or ``"hard"``.
+        progress : progress, optional
+
+        Returns
+        -------
+        Embeddings
+            They say that they are simulated.
+        """
+        ...
+    @property
+    def kind(self) -> str:
+        """str: hammer, pickaxe, mug …"""
+        ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the surface, bounding-box diagonal 1, in a random upright-ish pose."""
+        ...
+    @property
+    def name(self) -> str:
+        """str: a short name, unique among objects."""
+        ...
+    def part_features(self) -> NDArray[numpy.float32]:
+        """The parts as one-hot features, one column per part of this object.
+
+        Returns
+        -------
+        (n, parts) float32 array
+        """
+        ...
+    @property
+    def part_names(self) -> list[str]:
+        """list of str: names of the parts."""
+        ...
+    @property
+    def parts(self) -> NDArray[numpy.uint8]:
+        """(n,) uint8 array: part of each vertex, an index into `part_names`; a read-only view."""
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the true grip."""
+        ...
+    def shared_features(self) -> NDArray[numpy.float32]:
+        """The parts as one-hot features, with the same columns for every object.
+
+        Returns
+        -------
+        (n, 21) float32 array
+        """
+        ...
+    def write(self, folder: _Path, level: str = 'medium', *, progress: Optional[_Progress] = None) -> dict[str, Any]:
+        """Writes ``NAME.obj``, ``NAME.json`` (the truth) and ``NAME.emb.mcap`` into a folder.
+
+        Parameters
+        ----------
+        folder : path
+            Must exist.
+        level : str, default "medium"
+            As in `embeddings`.
+        progress : progress, optional
+
+        Returns
+        -------
+        dict
+            The files, as ``mesh``, ``truth`` and ``embeddings``.
+        """
+        ...
+
+class Eigenbasis:
+    """The first k eigenpairs of ``L φ = λ M φ``, ascending, orthonormal for the lumped mass M.
+
+    Parameters
+    ----------
+    values : (k,) array_like
+        Eigenvalues, ascending, never negative.
+    functions : (n, k) array_like
+        Eigenfunctions, one column each, with ``functions.T @ (mass[:, None] * functions) = I``.
+    mass : (n,) array_like
+        The diagonal of M, positive.
+    residuals : (k,) array_like, optional
+        Relative residuals; zeros where nothing is known about them.
+
+    See Also
+    --------
+    eigenbasis : computes one from a Laplacian.
+    Shape.basis : the one of a prepared mesh.
+    """
+    def __init__(self, values: ArrayLike, functions: ArrayLike, mass: ArrayLike, residuals: Optional[ArrayLike] = None) -> None: ...
+    def diffuse(self, functions: ArrayLike, t: float) -> NDArray[numpy.float64]:
+        """Heat diffusion exp(−tΔ)F on the truncated basis.
+
+        Parameters
+        ----------
+        functions : (n,) or (n, p) array_like
+        t : float
+            Time, in the units of 1 / `values`; relative to area 1 for the basis of a `Shape`.
+
+        Returns
+        -------
+        (n,) or (n, p) float64 array
+        """
+        ...
+    @staticmethod
+    def from_npz(path: _Path) -> Eigenbasis:
+        """Reads what `to_npz` wrote.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        Eigenbasis
+        """
+        ...
+    @property
+    def functions(self) -> NDArray[numpy.float64]:
+        """(n, k) float64 array: eigenfunctions Φ, one column each, a read-only view."""
+        ...
+    @property
+    def k(self) -> int:
+        """int: number of eigenpairs k."""
+        ...
+    @property
+    def mass(self) -> NDArray[numpy.float64]:
+        """(n,) float64 array: lumped mass, a read-only view."""
+        ...
+    @property
+    def n_vertices(self) -> int:
+        """int: number of vertices n."""
+        ...
+    def orthonormality_error(self) -> float:
+        """Largest entry of |ΦᵀMΦ − I|.
+
+        Returns
+        -------
+        float
+        """
+        ...
+    def project(self, functions: ArrayLike) -> NDArray[numpy.float64]:
+        """Coefficients ΦᵀMF of functions on the vertices.
+
+        Parameters
+        ----------
+        functions : (n,) or (n, p) array_like
+
+        Returns
+        -------
+        (k,) or (k, p) float64 array
+        """
+        ...
+    def reconstruct(self, coefficients: ArrayLike) -> NDArray[numpy.float64]:
+        """The functions ΦA with the coefficients A, of which there may be fewer than k.
+
+        Parameters
+        ----------
+        coefficients : (c,) or (c, p) array_like
+
+        Returns
+        -------
+        (n,) or (n, p) float64 array
+        """
+        ...
+    @property
+    def residuals(self) -> NDArray[numpy.float64]:
+        """(k,) float64 array: relative residuals of the pairs, a read-only view."""
+        ...
+    def to_npz(self, path: _Path) -> None:
+        """Writes `values`, `functions`, `mass` and `residuals` to an .npz file.
+
+        Parameters
+        ----------
+        path : path
+        """
+        ...
+    def truncated(self, k: int) -> Eigenbasis:
+        """The first pairs only.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        Eigenbasis
+        """
+        ...
+    @property
+    def values(self) -> NDArray[numpy.float64]:
+        """(k,) float64 array: eigenvalues λ, ascending, a read-only view."""
+        ...
+
+class Embeddings:
+    """The embeddings of an object's views, with the cameras and the mesh they were made of.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        The mesh that the views show.
+    cameras : list of Camera
+        One per view, all of one size.
+    patches : list of PatchEmbeddings
+        One per view, all of one dimension.
+    encoder : str, default "unnamed"
+        Name of the encoder, for the file.
+    """
+    def __init__(self, mesh: _MeshLike, cameras: Iterable[Camera], patches: Iterable[PatchEmbeddings], *, encoder: str = 'unnamed') -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def cameras(self) -> list[Camera]:
+        """list of Camera: one per view."""
+        ...
+    @property
+    def dim(self) -> int:
+        """int: dimension d of the vectors."""
+        ...
+    @property
+    def encoder(self) -> str:
+        """str: name of the encoder."""
+        ...
+    @property
+    def mesh_hash(self) -> str:
+        """str: hash of the mesh that the views show."""
+        ...
+    @property
+    def n_views(self) -> int:
+        """int: number of views."""
+        ...
+    @property
+    def patches(self) -> list[PatchEmbeddings]:
+        """list of PatchEmbeddings: one per view."""
+        ...
+    @staticmethod
+    def read(path: _Path) -> Embeddings:
+        """Reads a ``NAME.emb.mcap`` and checks everything in it.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        Embeddings
+        """
+        ...
+    @property
+    def simulated(self) -> bool:
+        """bool: True where the embeddings were made up, without a network."""
+        ...
+    def write(self, path: _Path, *, dtype: str = 'f16') -> None:
+        """Writes a ``NAME.emb.mcap``, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        dtype : str, default "f16"
+            ``"f16"`` or ``"f32"``.
+        """
+        ...
+
+class FunctionalMap:
+    """C (k_target × k_source): takes coefficients of a source function to those on the target.
+
+    Parameters
+    ----------
+    matrix : (k_target, k_source) array_like
+
+    See Also
+    --------
+    PointMap : the map of vertices, which runs the other way.
+    """
+    def __init__(self, matrix: ArrayLike) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def commutativity(self, source: Eigenbasis, target: Eigenbasis) -> float:
+        """‖C Λ_source − Λ_target C‖ / (λ_max ‖C‖): 0 where the map keeps lengths.
+
+        Parameters
+        ----------
+        source : Eigenbasis
+        target : Eigenbasis
+
+        Returns
+        -------
+        float
+        """
+        ...
+    @staticmethod
+    def fit(source: Eigenbasis, target: Eigenbasis, source_descriptors: ArrayLike, target_descriptors: ArrayLike, *, k: Optional[int] = None, laplacian: float = 0.0, descriptors: float = 0.0, coefficients: bool = False, progress: Optional[_Progress] = None) -> FunctionalMap:
+        """The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
+
+        Without regularisers and with fewer descriptors than eigenfunctions the minimum-norm one.
+
+        Parameters
+        ----------
+        source : Eigenbasis
+        target : Eigenbasis
+        source_descriptors : (n_source, p) array_like
+            Functions on the source's vertices.
+        target_descriptors : (n_target, p) array_like
+            The same functions on the target's vertices.
+        k : int, optional
+            Size of the map (k × k); the smaller basis where none is given.
+        laplacian : float, default 0.0
+            μ, weight of commutation with the Laplacian, ``‖C Λ_source − Λ_target C‖²``.
+        descriptors : float, default 0.0
+            ν, weight of commutation with multiplication by each descriptor (Nogneng & Ovsjanikov).
+        coefficients : bool, default False
+            Whether the descriptors are given as coefficients (k × p) in the two bases.
+        progress : progress, optional
+
+        Returns
+        -------
+        FunctionalMap
+
+        Examples
+        --------
+        >>> import semfm, semfm.zoo
+        >>> shape = semfm.Shape(semfm.zoo.torus(20, 10), k=10)
+        >>> signature = semfm.wks(shape.basis)
+        >>> fitted = semfm.FunctionalMap.fit(
+        ...     shape.basis, shape.basis, signature, signature, laplacian=0.01)
+        >>> fitted
+        FunctionalMap(10 × 10)
+        """
+        ...
+    @staticmethod
+    def from_npz(path: _Path) -> FunctionalMap:
+        """Reads what `to_npz` wrote.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        FunctionalMap
+        """
+        ...
+    @staticmethod
+    def from_point_map(map: PointMap, source: Eigenbasis, target: Eigenbasis, *, k: Optional[int] = None) -> FunctionalMap:
+        """C f = f ∘ T in the two bases: ``Φ_targetᵀ M_target Φ_source[T]``.
+
+        Parameters
+        ----------
+        map : PointMap
+            Target → source.
+        source : Eigenbasis
+        target : Eigenbasis
+        k : int, optional
+            Size of the map (k × k); the smaller basis where none is given.
+
+        Returns
+        -------
+        FunctionalMap
+        """
+        ...
+    @property
+    def k_source(self) -> int:
+        """int: size of the source basis."""
+        ...
+    @property
+    def k_target(self) -> int:
+        """int: size of the target basis."""
+        ...
+    @property
+    def matrix(self) -> NDArray[numpy.float64]:
+        """(k_target, k_source) float64 array: C, a read-only view."""
+        ...
+    def orthogonality(self) -> float:
+        """‖C Cᵀ − I‖ / √k_target: 0 where the map keeps areas.
+
+        Returns
+        -------
+        float
+        """
+        ...
+    def to_npz(self, path: _Path) -> None:
+        """Writes `matrix` to an .npz file.
+
+        Parameters
+        ----------
+        path : path
+        """
+        ...
+    def to_point_map(self, source: Eigenbasis, target: Eigenbasis, *, adjoint: bool = False, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0) -> PointMap:
+        """The point map target → source: each target vertex takes the source vertex whose delta
+        function, sent through C, comes nearest to its own.
+
+        Parameters
+        ----------
+        source : Eigenbasis
+        target : Eigenbasis
+        adjoint : bool, default False
+            Compare on the source instead, with the target's deltas brought back through Cᵀ. The same
+            for an orthogonal C.
+        source_features : (n_source, d) array_like, optional
+            Features that take part in the search, as in `zoomout`.
+        target_features : (n_target, d) array_like, optional
+        feature_weight : float, default 0.0
+
+        Returns
+        -------
+        PointMap
+        """
+        ...
+    def zoomout(self, source: Eigenbasis, target: Eigenbasis, *, k_final: int = 50, step: int = 5, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0, target_samples: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> FunctionalMap:
+        """ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
+
+        Parameters
+        ----------
+        source : Eigenbasis
+        target : Eigenbasis
+        k_final : int, default 50
+            Size of the last map.
+        step : int, default 5
+            Growth per turn.
+        source_features : (n_source, d) array_like, optional
+            Features that take part in the search, in the same space on both sides.
+        target_features : (n_target, d) array_like, optional
+        feature_weight : float, default 0.0
+            w: the search runs in ``[spectral, w √k · features]``.
+        target_samples : (s,) array_like, optional
+            Target vertices that are matched while the map grows; all where none are given.
+        progress : progress, optional
+
+        Returns
+        -------
+        FunctionalMap
+        """
+        ...
+
+class HeatGeodesics:
+    """Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
+    once, then every question costs two triangular solves.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    kind : str, default "tufted"
+        The Laplacian: ``"tufted"`` or ``"cotan"``.
+    time : float, default 1.0
+        Diffusion time in squared mean edge lengths; larger is smoother and less exact.
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> heat = semfm.HeatGeodesics(semfm.zoo.icosphere(4))
+    >>> distances = heat.distances(0)
+    >>> float(distances[0]), round(float(distances.max()), 1)  # half a great circle
+    (0.0, 3.1)
+    """
+    def __init__(self, mesh: _MeshLike, *, kind: str = 'tufted', time: float = 1.0) -> None: ...
+    def distances(self, sources: Union[int, ArrayLike]) -> NDArray[numpy.float64]:
+        """Distance of every vertex from the nearest source.
+
+        One source is good to about an edge length. Several far apart share one function; where that
+        matters, take the minimum over `distances_from_each`.
+
+        Parameters
+        ----------
+        sources : int or (s,) array_like
+            Vertex ids.
+
+        Returns
+        -------
+        (n,) float64 array
+            In the units of the mesh; infinite on components without a source.
+        """
+        ...
+    def distances_from_each(self, sources: Union[int, ArrayLike]) -> NDArray[numpy.float64]:
+        """Distances from each source alone.
+
+        Parameters
+        ----------
+        sources : int or (s,) array_like
+            Vertex ids.
+
+        Returns
+        -------
+        (n, s) float64 array
+            One column per source.
+        """
+        ...
+    @property
+    def n_vertices(self) -> int:
+        """int: number of vertices n."""
+        ...
+
+class Hypothesis:
+    """One place where the region may belong."""
+    @property
+    def probability(self) -> float:
+        """float: share of the votes that fell there, among the hypotheses returned."""
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the region there."""
+        ...
+
+class Laplacian:
+    """Stiffness and lumped mass of a surface: ``L = M⁻¹ · stiffness`` is the Laplace–Beltrami operator.
+
+    The stiffness is symmetric, positive semidefinite (not negative, as in part of the literature)
+    and its rows sum to zero. The mass is positive and adds up to the surface area.
+
+    Parameters
+    ----------
+    stiffness : object
+        Any SciPy sparse matrix (n × n).
+    mass : (n,) array_like
+        The diagonal of M, positive.
+
+    See Also
+    --------
+    laplacian, tufted_laplacian, cotan_laplacian, point_cloud_laplacian
+    """
+    def __init__(self, stiffness: Any, mass: ArrayLike) -> None: ...
+    @property
+    def mass(self) -> NDArray[numpy.float64]:
+        """(n,) float64 array: the diagonal of the mass matrix, a read-only view."""
+        ...
+    @property
+    def mass_matrix(self) -> Any:
+        """scipy.sparse.csc_matrix: the mass as a diagonal matrix (n × n); needs SciPy."""
+        ...
+    @property
+    def n_vertices(self) -> int:
+        """int: number of vertices n."""
+        ...
+    @property
+    def stiffness(self) -> Any:
+        """scipy.sparse.csc_matrix: stiffness (n × n); needs SciPy."""
+        ...
+
+class Matching:
+    """A matched pair: computed once, it carries any number of regions.
+
+    Parameters
+    ----------
+    source : PreparedObject
+        The demonstrated object.
+    target : PreparedObject
+        The one to act on.
+    method : str, optional
+        ``fused`` (where neither this nor `settings` is given), ``semfm``, ``anchored``,
+        ``sinkhorn``, ``nearest`` or ``wks``.
+    rule : str, optional
+        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+    seed : int, optional
+        Of everything drawn by chance; 0 where none is given.
+    settings : TransferSettings, optional
+        Everything that can be set, in place of `method` and `rule`.
+    progress : progress, optional
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
+    >>> source, target = (
+    ...     semfm.prepare(o.mesh, features=o.shared_features(), k=30) for o in (mug, kettle))
+    >>> matching = semfm.Matching(source, target)
+    >>> matching.transfer(mug.region).verdict in ("accept", "check", "refuse")
+    True
+    """
+    def __init__(self, source: PreparedObject, target: PreparedObject, *, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, settings: Optional[TransferSettings] = None, progress: Optional[_Progress] = None) -> None: ...
+    @property
+    def anchors(self) -> Anchors:
+        """Anchors: the paired parts of the two objects."""
+        ...
+    @property
+    def functional_map(self) -> Optional[FunctionalMap]:
+        """FunctionalMap, optional: C between the working shapes; None for methods without a map."""
+        ...
+    @property
+    def source(self) -> PreparedObject:
+        """PreparedObject: the demonstrated object."""
+        ...
+    @property
+    def target(self) -> PreparedObject:
+        """PreparedObject: the one to act on."""
+        ...
+    def transfer(self, region: Union[Region, _Path]) -> Transfer:
+        """Carries one region.
+
+        Parameters
+        ----------
+        region : Region or path
+            On the source's mesh as given.
+
+        Returns
+        -------
+        Transfer
+        """
+        ...
+    @property
+    def working_point_map(self) -> PointMap:
+        """PointMap: target → source, between the working meshes."""
+        ...
+
+class Mesh:
+    """A triangle mesh in its own frame and units.
+
+    The arrays are checked once and kept as they are: no vertex is moved, merged or dropped, so that
+    a vertex id means the same everywhere. Components, holes, non-manifold edges and degenerate
+    triangles are all allowed. A mesh cannot be changed.
+
+    Parameters
+    ----------
+    vertices : (n, 3) array_like
+        Positions, finite.
+    faces : (m, 3) array_like
+        Vertex ids of each triangle, counter-clockwise seen from outside.
+
+    Raises
+    ------
+    InvalidInput
+        No vertex or no triangle, a coordinate that is not finite, an id out of range.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mesh = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh
+    Mesh(3 vertices, 1 triangles)
+    >>> mesh.area
+    0.5
+    """
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+    @property
+    def area(self) -> float:
+        """float: surface area, in squared units of the mesh."""
+        ...
+    @property
+    def bounds(self) -> NDArray[numpy.float64]:
+        """(2, 3) float64 array: lower and upper corner of the bounding box."""
+        ...
+    @property
+    def diagonal(self) -> float:
+        """float: length of the bounding box's diagonal."""
+        ...
+    @property
+    def faces(self) -> NDArray[numpy.uint32]:
+        """(m, 3) uint32 array: vertex ids of each triangle, a read-only view."""
+        ...
+    @staticmethod
+    def from_open3d(mesh: Any) -> Mesh:
+        """The mesh of an `open3d.geometry.TriangleMesh`.
+
+        Parameters
+        ----------
+        mesh : object
+            Anything with `vertices` (n, 3) and `triangles` (m, 3).
+
+        Returns
+        -------
+        Mesh
+        """
+        ...
+    @staticmethod
+    def from_trimesh(mesh: Any) -> Mesh:
+        """The mesh of a `trimesh.Trimesh`, vertex by vertex (load it with ``process=False``, or trimesh
+        will have merged vertices).
+
+        Parameters
+        ----------
+        mesh : object
+            Anything with `vertices` (n, 3) and `faces` (m, 3).
+
+        Returns
+        -------
+        Mesh
+        """
+        ...
+    @property
+    def hash(self) -> str:
+        """str: the mesh's name, ``blake3:`` and 64 digits over counts, positions and triangles."""
+        ...
+    @property
+    def n_faces(self) -> int:
+        """int: number of triangles m."""
+        ...
+    @property
+    def n_vertices(self) -> int:
+        """int: number of vertices n."""
+        ...
+    @staticmethod
+    def read(path: _Path) -> Mesh:
+        """Reads an OBJ, PLY, STL, OFF, glTF or GLB file; polygons are cut to triangles.
+
+        Parameters
+        ----------
+        path : path
+            The file; its format is told by the extension, else by the first bytes.
+
+        Returns
+        -------
+        Mesh
+
+        See Also
+        --------
+        read_mesh : the same with the colours of the file.
+        """
+        ...
+    def report(self) -> dict[str, Any]:
+        """What is regular and what is not: edges, components, boundaries, manifoldness.
+
+        Returns
+        -------
+        dict
+            Counts and flags by name, as `semfm-cli info --json` has them.
+
+        Examples
+        --------
+        >>> import semfm.zoo
+        >>> semfm.zoo.icosphere(2).report()["watertight"]
+        True
+        """
+        ...
+    def vertex_areas(self) -> NDArray[numpy.float64]:
+        """A third of the area of the triangles around each vertex.
+
+        Returns
+        -------
+        (n,) float64 array
+        """
+        ...
+    @property
+    def vertices(self) -> NDArray[numpy.float64]:
+        """(n, 3) float64 array: positions, a read-only view."""
+        ...
+    def write(self, path: _Path, *, colors: Optional[ArrayLike] = None, scalars: Optional[Mapping[str, Any]] = None) -> None:
+        """Writes an OBJ, OFF, PLY, STL or GLB file, whole or not at all.
+
+        OBJ, OFF and PLY keep coordinates exactly. GLB and STL have 32 bits a number.
+
+        Parameters
+        ----------
+        path : path
+            The file; its extension names the format.
+        colors : (n, 4) array_like, optional
+            RGBA bytes of each vertex, in sRGB (uint8). Not for STL.
+        scalars : dict, optional
+            Names of numbers, (n,) each, kept at the vertices in 32 bits. PLY and GLB only.
+        """
+        ...
+
+class MeshFile:
+    """A mesh file: the mesh and what the file says about its colours."""
+    @property
+    def format(self) -> str:
+        """str: the format, such as ``"ply"``."""
+        ...
+    @property
+    def has_colors(self) -> bool:
+        """bool: whether the file has vertex colours, materials or images."""
+        ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the geometry."""
+        ...
+    @property
+    def notes(self) -> list[str]:
+        """list of str: what could not be read of the colours, and why."""
+        ...
+    @property
+    def vertex_colors(self) -> Optional[NDArray[numpy.uint8]]:
+        """(n, 4) uint8 array, optional: RGBA of each vertex in sRGB; None where the file has none."""
+        ...
+
+class PatchEmbeddings:
+    """What an encoder says about a view: one vector per image patch.
+
+    Parameters
+    ----------
+    data : (rows, cols, d) array_like
+        Vectors, top-left patch first; finite in valid patches.
+    rect : (4,) array_like
+        The grid's rectangle in pixels, edges not centres: left, top, right, bottom.
+    coverage : (rows, cols) array_like, optional
+        Share of each patch covered by the object, 0 to 255 (uint8); 255 where none is given.
+    valid : (rows, cols) array_like, optional
+        False where the patch is to be ignored (bool).
+    """
+    def __init__(self, data: ArrayLike, rect: ArrayLike, *, coverage: Optional[ArrayLike] = None, valid: Optional[ArrayLike] = None) -> None: ...
+    @property
+    def coverage(self) -> NDArray[numpy.uint8]:
+        """(rows, cols) uint8 array: share of each patch covered by the object, a read-only view."""
+        ...
+    @property
+    def data(self) -> NDArray[numpy.float32]:
+        """(rows, cols, d) float32 array: the vectors, a read-only view."""
+        ...
+    @property
+    def dim(self) -> int:
+        """int: dimension d of each vector."""
+        ...
+    @property
+    def rect(self) -> NDArray[numpy.float32]:
+        """(4,) float32 array: left, top, right, bottom of the grid in pixels."""
+        ...
+    @property
+    def valid(self) -> NDArray[numpy.bool_]:
+        """(rows, cols) bool array: False where the patch is to be ignored, a read-only view."""
+        ...
+
+class PointMap:
+    """A map target → source: ``source_of[j]`` is the source vertex matched to target vertex ``j``.
+
+    Functions and regions therefore travel source → target, by being looked up.
+
+    Parameters
+    ----------
+    source_of : (n_target,) array_like
+        Vertex ids of the source.
+    n_source : int
+        Number of source vertices.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> to_source = semfm.PointMap([2, 0, 2], n_source=3)
+    >>> to_source.pull_back([10.0, 20.0, 30.0]).tolist()
+    [30.0, 10.0, 30.0]
+    """
+    def __init__(self, source_of: ArrayLike, n_source: int) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __len__(self) -> int: ...
+    @staticmethod
+    def from_npz(path: _Path) -> PointMap:
+        """Reads what `to_npz` wrote.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        PointMap
+        """
+        ...
+    @property
+    def n_source(self) -> int:
+        """int: number of source vertices."""
+        ...
+    @property
+    def n_target(self) -> int:
+        """int: number of target vertices."""
+        ...
+    def pull_back(self, function: ArrayLike) -> NDArray[Any]:
+        """A function on the source, looked up from the target: ``function[source_of]``.
+
+        Parameters
+        ----------
+        function : (n_source, ...) array_like
+            Of any dtype, one entry (or row) per source vertex.
+
+        Returns
+        -------
+        (n_target, ...) array
+        """
+        ...
+    @property
+    def source_of(self) -> NDArray[numpy.uint32]:
+        """(n_target,) uint32 array: the source vertex of each target vertex, a read-only view."""
+        ...
+    def to_npz(self, path: _Path) -> None:
+        """Writes `source_of` and `n_source` to an .npz file.
+
+        Parameters
+        ----------
+        path : path
+        """
+        ...
+
+class PreparedObject:
+    """An object ready to be matched: its shape and its semantic cloud.
+
+    Made by `prepare`. Semantic parts are cut at the first matching and kept.
+    """
+    @property
+    def cloud(self) -> SemanticCloud:
+        """SemanticCloud: surface points with features."""
+        ...
+    @property
+    def from_cache(self) -> bool:
+        """bool: whether the shape was read from the cache."""
+        ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the mesh as given."""
+        ...
+    @property
+    def shape(self) -> Shape:
+        """Shape: working mesh and eigenbasis."""
+        ...
+    @property
+    def stages_ms(self) -> dict[str, Any]:
+        """dict: milliseconds by stage."""
+        ...
+
+class Region:
+    """A region (an affordance): a weight in [0, 1] for each vertex of a mesh.
+
+    A vertex counts where its weight is at least one half. The vertex ids are those of the mesh as
+    read.
+
+    Parameters
+    ----------
+    weights : (n,) array_like
+
+    Examples
+    --------
+    >>> import semfm
+    >>> grip = semfm.Region.from_vertices(5, [3, 1])
+    >>> grip.vertices.tolist()
+    [1, 3]
+    >>> grip.mask.tolist()
+    [False, True, False, True, False]
+    """
+    def __init__(self, weights: ArrayLike) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __len__(self) -> int: ...
+    @staticmethod
+    def from_mask(inside: ArrayLike) -> Region:
+        """A region of full weight where a mask is true.
+
+        Parameters
+        ----------
+        inside : (n,) array_like
+            Of dtype bool.
+
+        Returns
+        -------
+        Region
+        """
+        ...
+    @staticmethod
+    def from_vertices(n_vertices: int, vertices: ArrayLike) -> Region:
+        """A region of full weight on some vertices.
+
+        Parameters
+        ----------
+        n_vertices : int
+            Vertices of the mesh.
+        vertices : (v,) array_like
+            Ids, which may repeat.
+
+        Returns
+        -------
+        Region
+        """
+        ...
+    def iou(self, truth: Region, areas: Optional[ArrayLike] = None) -> float:
+        """Intersection over union with the true region, in vertices or in areas.
+
+        Parameters
+        ----------
+        truth : Region
+            Of the same mesh.
+        areas : (n,) array_like, optional
+            Area of each vertex (`Mesh.vertex_areas`); vertices are counted where none are given.
+
+        Returns
+        -------
+        float
+            0 where both are empty.
+        """
+        ...
+    @property
+    def is_empty(self) -> bool:
+        """bool: whether no vertex counts."""
+        ...
+    @property
+    def mask(self) -> NDArray[numpy.bool_]:
+        """(n,) bool array: whether each vertex counts."""
+        ...
+    @staticmethod
+    def masked(mesh: _MeshLike, camera: Camera, mask: ArrayLike) -> Region:
+        """All vertices that a camera sees inside a mask.
+
+        Parameters
+        ----------
+        mesh : mesh_like
+        camera : Camera
+        mask : (height, width) array_like
+            Of dtype bool, of the camera's size.
+
+        Returns
+        -------
+        Region
+        """
+        ...
+    @property
+    def n_vertices(self) -> int:
+        """int: vertices of the mesh, inside or not."""
+        ...
+    @staticmethod
+    def near(mesh: _MeshLike, contact: ArrayLike, radius: float) -> Region:
+        """All vertices within a geodesic radius of the surface point nearest to a contact.
+
+        Parameters
+        ----------
+        mesh : mesh_like
+        contact : (3,) array_like
+            In the mesh's frame and units.
+        radius : float
+            In the mesh's units.
+
+        Returns
+        -------
+        Region
+
+        Examples
+        --------
+        >>> import semfm, semfm.zoo
+        >>> cap = semfm.Region.near(semfm.zoo.icosphere(3), [0, 0, 2], radius=0.5)
+        >>> 30 < len(cap.vertices) < 50
+        True
+        """
+        ...
+    @staticmethod
+    def painted(file: MeshFile, paint: Optional[tuple[int, int, int]] = None) -> Region:
+        """All vertices painted red, or in the paint given.
+
+        Parameters
+        ----------
+        file : MeshFile
+            A mesh with vertex colours, from `read_mesh`.
+        paint : tuple of int, int, int, optional
+            sRGB, each 0 to 255.
+
+        Returns
+        -------
+        Region
+        """
+        ...
+    @staticmethod
+    def read(path: _Path, mesh: _MeshLike) -> Region:
+        """Reads a region file of a mesh.
+
+        Parameters
+        ----------
+        path : path
+            JSON: ``{"vertices": […], "weights": […]}``, bare or under ``"region"``.
+        mesh : mesh_like
+            The mesh it belongs to; where the file names another one, that is an error.
+
+        Returns
+        -------
+        Region
+        """
+        ...
+    def to_json(self, mesh: _MeshLike) -> str:
+        """The region file's content as text.
+
+        Parameters
+        ----------
+        mesh : mesh_like
+            The mesh it belongs to.
+
+        Returns
+        -------
+        str
+        """
+        ...
+    @property
+    def vertices(self) -> NDArray[numpy.uint32]:
+        """(v,) uint32 array: ids of the vertices that count, ascending."""
+        ...
+    @property
+    def weights(self) -> NDArray[numpy.float64]:
+        """(n,) float64 array: weight of each vertex, a read-only view."""
+        ...
+    def write(self, path: _Path, mesh: _MeshLike) -> None:
+        """Writes a region file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        mesh : mesh_like
+            The mesh it belongs to.
+        """
+        ...
+
+class SemanticCloud:
+    """Points on an object's surface, each with a feature vector.
+
+    Parameters
+    ----------
+    points : (m, 3) array_like
+        In the frame and units of the mesh as read.
+    features : (m, d) array_like
+        From anybody's network; kept as float32.
+    n_views : (m,) array_like, optional
+        How many views saw each point; 1 where none are given.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> cloud = semfm.SemanticCloud([[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [0, 1, 0]])
+    >>> cloud
+    SemanticCloud(2 points, dim 3)
+    """
+    def __init__(self, points: ArrayLike, features: ArrayLike, n_views: Optional[ArrayLike] = None) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def dim(self) -> int:
+        """int: feature dimension d."""
+        ...
+    @property
+    def features(self) -> NDArray[numpy.float32]:
+        """(m, d) float32 array: features, a read-only view."""
+        ...
+    @property
+    def n_points(self) -> int:
+        """int: number of points m."""
+        ...
+    @property
+    def n_views(self) -> NDArray[numpy.uint32]:
+        """(m,) uint32 array: how many views saw each point, 0 where a neighbour lent its features; a read-only view."""
+        ...
+    @property
+    def points(self) -> NDArray[numpy.float64]:
+        """(m, 3) float64 array: positions, a read-only view."""
+        ...
+
+class Shape:
+    """A mesh made ready for maps: cleaned, simplified, with its Laplacian and eigenbasis.
+
+    The basis is that of the working mesh scaled to area 1, so eigenvalues and diffusion times are
+    relative; positions keep the units of the original.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    k : int, default 60
+        Eigenpairs.
+    clip_k : bool, default True
+        Whether `k` may be clipped to the number of working vertices; else more is an error.
+    working_vertices : int, default 10000
+        Simplify above this many vertices; 0 keeps them all.
+    dust_share : float, default 1e-6
+        Components below this share of the area are dropped; 0 keeps them all.
+    laplacian : str, default "tufted"
+        ``"tufted"`` or ``"cotan"``.
+    bridges : bool, default True
+        Whether components are joined by weak edges.
+    tolerance : float, default 1e-8
+        Largest relative residual of an eigenpair.
+    cache : cache, optional
+        Where prepared shapes are kept: a folder, or True for the user's own.
+    progress : progress, optional
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> shape = semfm.Shape(semfm.zoo.torus(40, 20), k=20)
+    >>> shape
+    Shape(800 vertices, 800 working, 20 eigenpairs)
+    >>> shape.basis.functions.shape
+    (800, 20)
+    """
+    def __init__(self, mesh: _MeshLike, *, k: int = 60, clip_k: bool = True, working_vertices: int = 10000, dust_share: float = 1e-06, laplacian: str = 'tufted', bridges: bool = True, tolerance: float = 1e-08, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> None: ...
+    @property
+    def basis(self) -> Eigenbasis:
+        """Eigenbasis: that of the working mesh at area 1 (n_working × k)."""
+        ...
+    @property
+    def laplacian(self) -> Laplacian:
+        """Laplacian: that of the working mesh at area 1, bridges included."""
+        ...
+    def onto_original(self, values: ArrayLike) -> NDArray[numpy.float64]:
+        """Values on the working vertices, carried onto the original's.
+
+        Parameters
+        ----------
+        values : (n_working,) array_like
+
+        Returns
+        -------
+        (n,) float64 array
+            Exact where a vertex was kept, linear on the nearest working triangle elsewhere.
+        """
+        ...
+    def onto_working(self, values: ArrayLike) -> NDArray[numpy.float64]:
+        """Values on the original's vertices, read off at the working ones.
+
+        Parameters
+        ----------
+        values : (n,) array_like
+
+        Returns
+        -------
+        (n_working,) float64 array
+        """
+        ...
+    @property
+    def original(self) -> Mesh:
+        """Mesh: the mesh as given."""
+        ...
+    @property
+    def original_of_working(self) -> NDArray[numpy.uint32]:
+        """(n_working,) uint32 array: the original vertex that each working one is, a read-only view."""
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: what cleaning, simplification and the solver did, with milliseconds by stage."""
+        ...
+    def smooth(self, function: ArrayLike, t: float) -> NDArray[numpy.float64]:
+        """One implicit step of heat diffusion, ``(M + t L) u = M f``, on the working vertices.
+
+        Parameters
+        ----------
+        function : (n_working,) array_like
+        t : float
+            Time at area 1.
+
+        Returns
+        -------
+        (n_working,) float64 array
+        """
+        ...
+    @property
+    def unit(self) -> float:
+        """float: √area of the working mesh, the length that becomes 1."""
+        ...
+    @property
+    def working(self) -> Mesh:
+        """Mesh: the mesh that maps are computed on, in the units of the original."""
+        ...
+    @property
+    def working_of_original(self) -> NDArray[numpy.uint32]:
+        """(n,) uint32 array: the working vertex that stands for each original one, a read-only view."""
+        ...
+
+class SurfaceIndex:
+    """A tree over the triangles of a mesh: built once, asked often.
+
+    Triangles without area are left out. Both sides of a triangle count, whatever its winding.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mesh = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> points, distances, faces, barycentric = semfm.SurfaceIndex(mesh).closest([[0.25, 0.25, 3]])
+    >>> float(distances[0]), barycentric.tolist()
+    (3.0, [[0.5, 0.25, 0.25]])
+    """
+    def __init__(self, mesh: _MeshLike) -> None: ...
+    def closest(self, queries: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32], NDArray[numpy.float64]]:
+        """The point of the surface nearest to each query.
+
+        Parameters
+        ----------
+        queries : (q, 3) array_like
+
+        Returns
+        -------
+        points : (q, 3) float64 array
+        distances : (q,) float64 array
+        faces : (q,) uint32 array
+        barycentric : (q, 3) float64 array
+        """
+        ...
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.int32]]:
+        """The first triangle that each ray meets.
+
+        Parameters
+        ----------
+        origins : (q, 3) array_like
+        directions : (q, 3) array_like
+            Of any length but zero.
+
+        Returns
+        -------
+        t : (q,) float64 array
+            The hit is at ``origin + t * direction``; infinite for a miss.
+        faces : (q,) int32 array
+            Triangle, −1 for a miss.
+        """
+        ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the mesh that was indexed."""
+        ...
+
+class Transfer:
+    """A carried region and everything known about it.
+
+    Vertices are those of the meshes as given. Made by `transfer` and `Matching.transfer`.
+    """
+    @property
+    def confidence(self) -> float:
+        """float: agreement with an independent opinion, in [0, 1]."""
+        ...
+    @property
+    def hypotheses(self) -> list[Hypothesis]:
+        """list of Hypothesis: where the region may belong, by falling probability."""
+        ...
+    @property
+    def other_rule(self) -> Optional[Region]:
+        """Region, optional: the region under the other rule, where the method computes both (``semfm``)."""
+        ...
+    @property
+    def point_map(self) -> PointMap:
+        """PointMap: one source vertex for each target vertex."""
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the region on the target."""
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: how the answer came about: settings, stages, anchors, fit, quality of the map."""
+        ...
+    @property
+    def settings(self) -> TransferSettings:
+        """TransferSettings: the settings it was made with, map sizes clipped to the bases."""
+        ...
+    @property
+    def source(self) -> PreparedObject:
+        """PreparedObject: the demonstrated object."""
+        ...
+    @property
+    def source_region(self) -> Region:
+        """Region: the demonstrated region."""
+        ...
+    @property
+    def target(self) -> PreparedObject:
+        """PreparedObject: the one to act on."""
+        ...
+    @property
+    def verdict(self) -> str:
+        """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
+        ...
+    @property
+    def weights(self) -> NDArray[numpy.float64]:
+        """(n_target,) float64 array: weight of each target vertex, a read-only view."""
+        ...
+    def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, progress: Optional[_Progress] = None) -> list[str]:
+        """Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
+        meshes, picture and scene.
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there.
+        about : dict, optional
+            Put into the report as it is.
+        progress : progress, optional
+
+        Returns
+        -------
+        list of str
+            The files.
+        """
+        ...
+
+class TransferSettings:
+    """Everything that can be set about a transfer: a method's own constants, and what differs.
+
+    Parameters
+    ----------
+    method : str, default "fused"
+        ``fused``, ``semfm`` (the paper to the letter), ``anchored``, ``sinkhorn``, ``nearest`` or
+        ``wks``.
+    **changes : object
+        Settings by their names in `to_dict`, groups as dicts: ``zoomout={"k_final": 40}``.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> settings = semfm.TransferSettings("fused", zoomout={"k_final": 40}, n_anchors=3)
+    >>> settings.zoomout["k_final"], settings.zoomout["step"], settings.n_anchors
+    (40, 5, 3)
+    """
+    def __init__(self, method: str = 'fused', **changes: Any) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def to_dict(self) -> dict[str, Any]:
+        """All settings by name, groups as dicts.
+
+        Returns
+        -------
+        dict
+        """
+        ...
+
+class View:
+    """One rendered view of an object.
+
+    See Also
+    --------
+    render, read_views
+    """
+    @property
+    def camera(self) -> Camera:
+        """Camera: the one the picture was taken with."""
+        ...
+    @property
+    def depth(self) -> NDArray[numpy.float32]:
+        """(height, width) float32 array: depth along the camera's axis in mesh units, infinite on the background, a read-only view."""
+        ...
+    @property
+    def rgb(self) -> NDArray[numpy.uint8]:
+        """(height, width, 3) uint8 array: sRGB, a read-only view."""
+        ...
+    @property
+    def triangles(self) -> NDArray[numpy.int32]:
+        """(height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view."""
+        ...
+
+def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Camera:
+    """One camera that looks along ``-direction`` at the whole object: for pictures of results.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    direction : (3,) array_like
+        From the object towards the camera, in the mesh's frame.
+    up : (3,) array_like
+        Upwards in the image, in the mesh's frame.
+    size : int, default 224
+        Side of the square image, in pixels.
+    fill : float, default 0.8
+        Share of the image's side that the silhouette fills.
+
+    Returns
+    -------
+    Camera
+    """
+    ...
+
+def cotan_laplacian(mesh: _MeshLike) -> Laplacian:
+    """The cotangent Laplacian of the triangles as they are.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+
+    Returns
+    -------
+    Laplacian
+    """
+    ...
+
+def demo_object(category: str = 'containers', seed: int = 0, *, instance: int = 0, n_vertices: int = 3000, holes: int = 0, floaters: int = 0) -> DemoObject:
+    """Makes a procedural object of one of the paper's six categories.
+
+    Parameters
+    ----------
+    category : str, default "containers"
+        ``tools``, ``shoes``, ``cutting``, ``containers``, ``controllers`` or ``scissors``.
+    seed : int, default 0
+        Of the proportions, the damage and the pose.
+    instance : int, default 0
+        Number within the category; six kinds take turns.
+    n_vertices : int, default 3000
+        Vertices aimed at, 50 to 1000000; the count reached is close to it.
+    holes : int, default 0
+        Holes torn into the surface.
+    floaters : int, default 0
+        Detached blobs near the surface.
+
+    Returns
+    -------
+    DemoObject
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mug = semfm.demo_object("containers", n_vertices=500)
+    >>> mug.kind, mug.part_names
+    ('mug', ['body', 'handle'])
+    """
+    ...
+
+def diffused_indicators(basis: Eigenbasis, labels: ArrayLike, chosen: ArrayLike, *, t: float = 0.005, norm: str = 'surface') -> NDArray[numpy.float64]:
+    """Coefficients of the indicator functions of labels, diffused by heat and scaled to unit norm.
+
+    Parameters
+    ----------
+    basis : Eigenbasis
+    labels : (n,) array_like
+        A label (an id) per vertex.
+    chosen : (c,) array_like
+        The labels whose indicators are wanted.
+    t : float, default 0.005
+        Heat time, relative to area 1.
+    norm : str, default "surface"
+        ``"surface"`` (∫ f² = 1) or ``"vertices"`` (Σ f² = 1, the letter of the paper).
+
+    Returns
+    -------
+    (k, c) float64 array
+        One column per chosen label; zeros for a label that no vertex bears.
+    """
+    ...
+
+def eigenbasis(laplacian: Laplacian, k: int, *, tolerance: float = 1e-08, seed: int = 0, progress: Optional[_Progress] = None) -> Eigenbasis:
+    """The first k eigenpairs of a Laplacian.
+
+    Residuals, orthonormality and (by an inertia count) completeness are verified before a basis is
+    returned. Signs are fixed; the same settings give the same bytes at every thread count.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    k : int
+        Number of pairs, at most n.
+    tolerance : float, default 1e-8
+        Largest relative residual accepted.
+    seed : int, default 0
+        Of the starting block.
+    progress : progress, optional
+
+    Returns
+    -------
+    Eigenbasis
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> basis = semfm.eigenbasis(semfm.laplacian(semfm.zoo.icosphere(3)), 9)
+    >>> basis.values.round(1).tolist()  # l (l + 1) on the unit sphere
+    [0.0, 2.0, 2.0, 2.0, 6.0, 6.0, 6.0, 6.0, 6.0]
+    """
+    ...
+
+def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
+    """Ids of points, each the farthest from those before it, starting with point 0.
+
+    Parameters
+    ----------
+    points : (m, 3) array_like
+    n : int
+        How many; all of them where there are fewer.
+
+    Returns
+    -------
+    (n,) uint32 array
+    """
+    ...
+
+def geodesic_distances(mesh: _MeshLike, sources: Union[int, ArrayLike], *, kind: str = 'tufted', time: float = 1.0) -> NDArray[numpy.float64]:
+    """Distance of every vertex from the nearest source: `HeatGeodesics` for a single question.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    sources : int or (s,) array_like
+        Vertex ids.
+    kind : str, default "tufted"
+        The Laplacian: ``"tufted"`` or ``"cotan"``.
+    time : float, default 1.0
+        Diffusion time in squared mean edge lengths.
+
+    Returns
+    -------
+    (n,) float64 array
+    """
+    ...
+
+def get_num_threads() -> int:
+    """The number of worker threads.
+
+    Returns
+    -------
+    int
+    """
+    ...
+
+def hks(basis: Eigenbasis, *, n_times: int = 100) -> NDArray[numpy.float64]:
+    """Heat kernel signature (Sun, Ovsjanikov & Guibas 2009): heat left at each vertex after each time.
+
+    Parameters
+    ----------
+    basis : Eigenbasis
+    n_times : int, default 100
+        Times, spread evenly in logarithm over the range that the basis resolves.
+
+    Returns
+    -------
+    (n, n_times) float64 array
+    """
+    ...
+
+def icosphere(subdivisions: int) -> Mesh:
+    """A sphere of radius 1, from a subdivided icosahedron.
+
+    Parameters
+    ----------
+    subdivisions : int
+        0 to 7; each multiplies the triangles by four, from 20.
+
+    Returns
+    -------
+    Mesh
+    """
+    ...
+
+def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
+    """The Laplacian of a mesh.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    kind : str, default "tufted"
+        ``"tufted"`` (intrinsic Delaunay on the tufted cover, holds on any mesh) or ``"cotan"``.
+
+    Returns
+    -------
+    Laplacian
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> laplacian = semfm.laplacian(semfm.zoo.icosphere(2))
+    >>> abs(laplacian.stiffness.sum()) < 1e-9
+    True
+    """
+    ...
+
+def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = 'pull', n_samples: int = 1200, depth_tolerance: float = 0.01, radius: float = 0.06, seed: int = 0, progress: Optional[_Progress] = None) -> SemanticCloud:
+    """Carries the embeddings of views onto samples of the surface.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        The mesh that the views show.
+    embeddings : Embeddings or path
+    rule : str, default "pull"
+        ``"pull"`` (samples take their features out of every view that sees them) or ``"unproject"``
+        (patch centres are cast onto the surface, the paper's rule).
+    n_samples : int, default 1200
+        Points of the cloud; the paper's rule was measured with 400.
+    depth_tolerance : float, default 0.01
+        For ``"pull"``: how far behind the visible surface a sample may lie and still be seen, as a
+        share of the bounding-sphere radius.
+    radius : float, default 0.06
+        For ``"unproject"``: the reach of a sample, as a share of the bounding box's diagonal.
+    seed : int, default 0
+        Of the samples.
+    progress : progress, optional
+
+    Returns
+    -------
+    SemanticCloud
+    """
+    ...
+
+def point_cloud_laplacian(points: ArrayLike, *, n_neighbors: int = 30, mollify_factor: float = 1e-05) -> Laplacian:
+    """The Laplacian of points sampled from a surface, without triangles (Sharp & Crane 2020).
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+    n_neighbors : int, default 30
+        Neighbours of each point that define its tangent plane and its triangles.
+    mollify_factor : float, default 1e-5
+        As in `tufted_laplacian`.
+
+    Returns
+    -------
+    Laplacian
+    """
+    ...
+
+def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, n_samples: Optional[int] = None, seed: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> PreparedObject:
+    """Makes an object ready to be matched with any number of others.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    features : (n, d) array_like, optional
+        A feature vector per vertex, from anybody's network.
+    embeddings : Embeddings or path, optional
+        Patch embeddings of rendered views of this very mesh.
+    cloud : SemanticCloud, optional
+        Surface points with features, made by the caller.
+    method : str, optional
+        Lift as this method does: ``"fused"`` where neither this nor `settings` is given.
+    settings : TransferSettings, optional
+        Lift as the method of these settings does.
+    k : int, optional
+        Eigenpairs; 60, or what the mesh allows, where none is given.
+    working_vertices : int, optional
+        Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
+    n_samples : int, optional
+        Points of the cloud; the method's own number where none is given.
+    seed : int, optional
+        Of everything drawn by chance; 0 where none is given.
+    cache : cache, optional
+        Where prepared shapes are kept: a folder, or True for the user's own.
+    progress : progress, optional
+
+    Returns
+    -------
+    PreparedObject
+
+    Examples
+    --------
+    >>> import semfm
+    >>> demo = semfm.demo_object("tools", n_vertices=400)
+    >>> prepared = semfm.prepare(demo.mesh, features=demo.part_features(), k=20)
+    >>> prepared.cloud.dim == len(demo.part_names)
+    True
+    """
+    ...
+
+def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
+    """Reads a mesh file with its colours.
+
+    Parameters
+    ----------
+    path : path
+        OBJ, PLY, STL, OFF, glTF or GLB.
+    texture : path, optional
+        An image for a mesh with texture coordinates (OBJ, PLY).
+
+    Returns
+    -------
+    MeshFile
+    """
+    ...
+
+def read_views(path: _Path) -> list[View]:
+    """Reads the views of a ``NAME.views.mcap``.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    list of View
+    """
+    ...
+
+def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> list[View]:
+    """One picture per camera, with depth and triangle of every pixel.
+
+    Parameters
+    ----------
+    mesh : mesh_like or MeshFile
+        A `MeshFile` is drawn in its own colours.
+    cameras : list of Camera, optional
+        As `rig` makes them where none are given.
+    colors : (n, 3) array_like, optional
+        sRGB of each vertex, 0 to 1.
+    supersampling : int, default 2
+        Colour samples along each side of a pixel, 1 to 8.
+    background : (3,) array_like, optional
+        sRGB, 0 to 1; white where none is given.
+    progress : progress, optional
+
+    Returns
+    -------
+    list of View
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> mesh = semfm.zoo.torus(40, 20)
+    >>> views = semfm.render(mesh, semfm.rig(mesh, count=3, size=64))
+    >>> len(views), views[0].rgb.shape
+    (3, (64, 64, 3))
+    """
+    ...
+
+def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True) -> list[Camera]:
+    """Cameras all around an object, each zoomed and centred on its silhouette.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    count : int, default 14
+        Number of views.
+    size : int, default 224
+        Side of the square images, in pixels.
+    field_of_view : float, default 0.5235987755982988
+        Full angle that the bounding sphere would fill, in radians.
+    fill : float, default 0.8
+        Share of the image's side that the silhouette fills.
+    max_zoom : float, default 1.5
+        Largest zoom beyond the fit of the bounding sphere.
+    principal_frame : bool, default True
+        Pose the cameras in the object's principal frame, else in the file's with z up.
+
+    Returns
+    -------
+    list of Camera
+    """
+    ...
+
+def run_cli(arguments: Iterable[str]) -> int:
+    """Runs the command line of `semfm-cli`.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Without the program's name.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    ...
+
+def sample_even(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+    """Points as far from each other as they can be, out of six times as many uniform ones.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    n : int
+    seed : int, default 0
+
+    Returns
+    -------
+    points : (n, 3) float64 array
+    normals : (n, 3) float64 array
+        Unit normals of the triangles.
+    faces : (n,) uint32 array
+        Triangle of each point.
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> points, normals, faces = semfm.sample_even(semfm.zoo.icosphere(2), 50)
+    >>> points.shape
+    (50, 3)
+    """
+    ...
+
+def sample_uniform(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+    """Independent points, uniform by area.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    n : int
+    seed : int, default 0
+
+    Returns
+    -------
+    points : (n, 3) float64 array
+    normals : (n, 3) float64 array
+        Unit normals of the triangles.
+    faces : (n,) uint32 array
+        Triangle of each point.
+    """
+    ...
+
+def set_num_threads(n_threads: int) -> None:
+    """Sets the number of worker threads of later calls. Results do not depend on it.
+
+    Parameters
+    ----------
+    n_threads : int
+        Threads; 0 takes one for each core (or `RAYON_NUM_THREADS`).
+
+    Examples
+    --------
+    >>> import semfm
+    >>> semfm.set_num_threads(2)
+    >>> semfm.get_num_threads()
+    2
+    >>> semfm.set_num_threads(0)
+    """
+    ...
+
+def spectral_clusters(cloud: SemanticCloud, *, n_clusters: int = 5, neighbours: int = 10, starts: int = 10, seed: int = 0, progress: Optional[_Progress] = None) -> Clusters:
+    """Cuts a cloud into parts: spectral clustering on its neighbour graph, weighed by features.
+
+    Parameters
+    ----------
+    cloud : SemanticCloud
+    n_clusters : int, default 5
+        Parts.
+    neighbours : int, default 10
+        Neighbours of each point in space.
+    starts : int, default 10
+        Seedings of k-means, the best of which is kept.
+    seed : int, default 0
+    progress : progress, optional
+
+    Returns
+    -------
+    Clusters
+    """
+    ...
+
+def torus(n_around: int, n_across: int) -> Mesh:
+    """A torus.
+
+    Parameters
+    ----------
+    n_around : int
+        Vertices around the axis, 3 to 2000.
+    n_across : int
+        Vertices around the tube, 3 to 2000.
+
+    Returns
+    -------
+    Mesh
+    """
+    ...
+
+def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
+    """Carries a demonstrated region from one object to another.
+
+    Parameters
+    ----------
+    source : mesh_like or PreparedObject
+        The demonstrated object.
+    target : mesh_like or PreparedObject
+        The one to act on.
+    region : Region or path
+        Where the demonstration touched the source.
+    source_features : (n_source, d) array_like, optional
+        A feature vector per vertex, from anybody's network.
+    target_features : (n_target, d) array_like, optional
+    source_embeddings : Embeddings or path, optional
+        Patch embeddings of rendered views.
+    target_embeddings : Embeddings or path, optional
+    source_cloud : SemanticCloud, optional
+        Surface points with features, made by the caller.
+    target_cloud : SemanticCloud, optional
+    method : str, optional
+        ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
+        ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
+    rule : str, optional
+        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+    seed : int, optional
+        Of everything drawn by chance; 0 where none is given.
+    settings : TransferSettings, optional
+        Everything that can be set, in place of `method` and `rule`.
+    k : int, optional
+        Eigenpairs of each shape; 60, or what the mesh allows, where none is given.
+    working_vertices : int, optional
+        Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
+    cache : cache, optional
+        Where prepared shapes are kept: a folder, or True for the user's own.
+    progress : progress, optional
+
+    Returns
+    -------
+    Transfer
+        A region that lands nowhere is no error but the verdict ``"refuse"``.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
+    >>> carried = semfm.transfer(
+    ...     mug.mesh, kettle.mesh, mug.region,
+    ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
+    >>> carried.region.n_vertices == kettle.mesh.n_vertices
+    True
+    """
+    ...
+
+def tufted_laplacian(mesh: _MeshLike, *, mollify_factor: float = 1e-05) -> Laplacian:
+    """The intrinsic Delaunay Laplacian of the tufted cover (Sharp & Crane 2020).
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    mollify_factor : float, default 1e-5
+        By how much edges of degenerate triangles are made longer, relative to the mean edge.
+
+    Returns
+    -------
+    Laplacian
+    """
+    ...
+
+def wks(basis: Eigenbasis, *, n_energies: int = 100) -> NDArray[numpy.float64]:
+    """Wave kernel signature (Aubry, Schlickewei & Cremers 2011), with pyFM's energies and width.
+
+    Parameters
+    ----------
+    basis : Eigenbasis
+    n_energies : int, default 100
+        Energies, spread evenly over the logarithms of the eigenvalues.
+
+    Returns
+    -------
+    (n, n_energies) float64 array
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> shape = semfm.Shape(semfm.zoo.torus(20, 10), k=15)
+    >>> semfm.wks(shape.basis, n_energies=30).shape
+    (200, 30)
+    """
+    ...
+
+def write_views(path: _Path, views: Iterable[View], mesh: _MeshLike) -> None:
+    """Writes views of a mesh as ``NAME.views.mcap``, whole or not at all: for `semfm-embed`.
+
+    Parameters
+    ----------
+    path : path
+    views : list of View
+        All of one size.
+    mesh : mesh_like
+        The mesh that was rendered.
+    """
+    ...
