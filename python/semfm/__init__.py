@@ -23,6 +23,7 @@ units of the mesh, angles in radians.
 
 from . import errors
 from ._semfm import (
+    Alignment,
     Anchors,
     Camera,
     Clusters,
@@ -30,6 +31,9 @@ from ._semfm import (
     Eigenbasis,
     Embeddings,
     FunctionalMap,
+    Grasp,
+    Grasps,
+    Gripper,
     HeatGeodesics,
     Hypothesis,
     Laplacian,
@@ -47,12 +51,14 @@ from ._semfm import (
     TransferSettings,
     View,
     __version__,
+    align,
     camera_towards,
     cotan_laplacian,
     demo_object,
     diffused_indicators,
     eigenbasis,
     farthest_points,
+    find_grasps,
     geodesic_distances,
     get_num_threads,
     hks,

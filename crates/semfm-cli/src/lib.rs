@@ -12,7 +12,9 @@ use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, align, completions, demo, grasp, info, region, show, transfer, views};
+use commands::{
+    Outcome, align, completions, demo, eval, grasp, info, region, show, transfer, views,
+};
 use options::Common;
 
 /// Carry a demonstrated region from one object to another.
@@ -37,6 +39,7 @@ enum Command {
     Grasp(Box<grasp::FindGrasps>),
     Show(show::Show),
     Align(Box<align::FindPose>),
+    Eval(Box<eval::Evaluate>),
     Info(info::Info),
     Completions(completions::Completions),
 }
@@ -60,6 +63,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Grasp(command) => command.run(&common),
         Command::Show(command) => command.run(&common),
         Command::Align(command) => command.run(&common),
+        Command::Eval(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     };

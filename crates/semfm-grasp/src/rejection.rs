@@ -142,6 +142,16 @@ impl Rejected {
     }
 }
 
+impl FromIterator<(Reason, usize)> for Rejected {
+    fn from_iter<I: IntoIterator<Item = (Reason, usize)>>(counted: I) -> Self {
+        let mut rejected = Self::default();
+        for (reason, count) in counted {
+            rejected.counts[reason as usize] += count;
+        }
+        rejected
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,6 +10,7 @@
 
 use pyo3::prelude::*;
 
+mod align;
 mod anchors;
 mod arrays;
 mod camera;
@@ -20,6 +21,8 @@ mod embeddings;
 mod errors;
 mod functional_map;
 mod geodesic;
+mod grasps;
+mod gripper;
 mod held;
 mod json;
 mod laplacian;
@@ -27,6 +30,7 @@ mod lend;
 mod matching;
 mod mesh;
 mod one_call;
+mod plain_grasps;
 mod point_map;
 mod prepared;
 mod region;
@@ -44,6 +48,8 @@ mod _semfm {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::align::{Alignment, align_};
+    #[pymodule_export]
     use crate::anchors::{_restore_anchors, Anchors, Clusters, spectral_clusters};
     #[pymodule_export]
     use crate::camera::{Camera, camera_towards, rig};
@@ -59,6 +65,10 @@ mod _semfm {
     use crate::functional_map::FunctionalMap;
     #[pymodule_export]
     use crate::geodesic::{HeatGeodesics, geodesic_distances};
+    #[pymodule_export]
+    use crate::grasps::{_restore_grasps, Grasp, Grasps, find_grasps};
+    #[pymodule_export]
+    use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]
     use crate::laplacian::{
         Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,

@@ -5,6 +5,7 @@ pub mod completions;
 pub mod demo;
 pub mod embed;
 pub mod grasp;
+pub mod eval;
 pub mod info;
 pub mod region;
 pub mod show;

@@ -1,0 +1,165 @@
+//! `align`: the pose and scale of an object in what a camera sees.
+
+use pyo3::prelude::*;
+use semfm::grasp::align::{self, AlignSettings, Observation, Sim3};
+use semfm::grasp::align::Alignment as Found;
+
+use crate::arrays::{self, Axis};
+use crate::held::Held;
+use crate::mesh::from_any;
+use crate::work::run;
+use crate::{errors, lend};
+
+/// Pose and scale of an object before a camera, and how far to trust them: see `align`.
+#[pyclass(frozen, module = "semfm")]
+pub struct Alignment {
+    found: Held<Found>,
+}
+
+#[pymethods]
+impl Alignment {
+    /// (4, 4) float64 array: from the mesh's frame and units to the camera's frame in metres; the
+    /// scale is included.
+    #[getter]
+    fn camera_from_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.found.camera_from_object.to_rows();
+        lend::owned_rows(py, rows.as_flattened().to_vec(), 4)
+    }
+
+    /// (4, 4) float64 array: the same once the object is measured in metres, for `find_grasps`.
+    #[getter]
+    fn rigid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        crate::gripper::matrix(py, self.found.camera_from_object.rigid())
+    }
+
+    /// float: metres per unit of the mesh.
+    #[getter]
+    fn scale(&self) -> f64 {
+        self.found.camera_from_object.scale
+    }
+
+    /// float: standard deviation of the scale.
+    #[getter]
+    fn scale_std(&self) -> f64 {
+        self.found.scale_std
+    }
+
+    /// float: standard deviation of the rotation about its least certain axis, radians.
+    #[getter]
+    fn rotation_std(&self) -> f64 {
+        self.found.rotation_std
+    }
+
+    /// float: standard deviation of the position in its least certain direction, metres.
+    #[getter]
+    fn position_std(&self) -> f64 {
+        self.found.position_std
+    }
+
+    /// float: root mean square distance of the points that lie on the model, metres.
+    #[getter]
+    fn residual_m(&self) -> f64 {
+        self.found.residual_m
+    }
+
+    /// float: share of the observed points that lie on the model.
+    #[getter]
+    fn inlier_share(&self) -> f64 {
+        self.found.inlier_share
+    }
+
+    /// float: of the model's side that faces the camera, the share that was seen where it is.
+    #[getter]
+    fn visibility(&self) -> f64 {
+        self.found.visibility
+    }
+
+    /// str: ``"accept"``, ``"check"`` or ``"refuse"``.
+    #[getter]
+    fn verdict(&self) -> String {
+        serde_json::to_value(self.found.verdict)
+            .ok()
+            .and_then(|value| value.as_str().map(str::to_owned))
+            .unwrap_or_default()
+    }
+
+    /// list of str: what speaks against accepting the pose.
+    #[getter]
+    fn reasons(&self) -> Vec<String> {
+        self.found.reasons.clone()
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
+    fn __repr__(&self) -> String {
+        let (scale, residual) = (self.scale(), self.found.residual_m);
+        format!("Alignment({}, scale {scale:.4}, residual {residual:.4} m)", self.verdict())
+    }
+}
+
+/// Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+///     In any units.
+/// points : (n, 3) array_like
+///     What the camera saw of the object, metres, in the camera's frame.
+/// viewpoint : (3,) array_like or None, optional
+///     Where the camera stands; None for a cloud merged from many views, of which nothing can be
+///     said about what should have been seen.
+/// init : (4, 4) array_like, optional
+///     A guess of `Alignment.camera_from_object`.
+/// scale_range : tuple of float, float, optional
+///     Least and greatest scale, metres per unit.
+/// n_starts : int, optional
+///     Rotations to start from where there is no guess.
+/// seed : int, optional
+/// progress : bool or callable, optional
+///
+/// Returns
+/// -------
+/// Alignment
+///     A pose that cannot be trusted has the verdict ``"refuse"``; it is no error.
+#[pyfunction]
+#[pyo3(name = "align", signature = (mesh, points, *, viewpoint=(0.0, 0.0, 0.0), init=None,
+    scale_range=None, n_starts=400, seed=0, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub fn align_(
+    py: Python<'_>,
+    mesh: &Bound<'_, PyAny>,
+    points: &Bound<'_, PyAny>,
+    viewpoint: Option<(f64, f64, f64)>,
+    init: Option<&Bound<'_, PyAny>>,
+    scale_range: Option<(f64, f64)>,
+    n_starts: usize,
+    seed: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Alignment> {
+    let mesh = from_any(mesh, "mesh")?;
+    let points = arrays::points(points, "points")?;
+    let init = match init {
+        Some(init) => {
+            let (numbers, _) = arrays::floats(init, "init", &[Axis::Is(4), Axis::Is(4)])?;
+            let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
+            Some(Sim3::from_rows(rows).map_err(|error| errors::raise(py, &error.into()))?)
+        }
+        None => None,
+    };
+    let scale_range = scale_range.map(|(low, high)| [low, high]);
+    let settings = AlignSettings { init, scale_range, n_starts, seed };
+    let found = run(py, progress, move |task| {
+        let observed = match viewpoint {
+            Some((x, y, z)) => Observation::from_view(&points, [x, y, z].into())?,
+            None => Observation::from_many_views(&points)?,
+        };
+        Ok(align::align(&mesh, &observed, &settings, task)?)
+    })?;
+    Ok(Alignment { found: Held::new(found) })
+}

@@ -1,0 +1,426 @@
+//! `Grasps`: ranked, collision-free hand poses in a region.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use semfm::geom::math::{DMat4, DVec3};
+use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
+use semfm::grasps::{GraspAnswer, grasps_json, write_grasps, write_isaac, write_ros2};
+
+use crate::arrays::{self, Axis};
+use crate::gripper::{Gripper, matrix};
+use crate::held::Held;
+use crate::mesh::from_any;
+use crate::plain_grasps::PlainGrasps;
+use crate::region::Region;
+use crate::work::run;
+use crate::{errors, json, lend};
+
+/// One parallel-jaw grasp, in the frame of the object scaled to metres.
+#[pyclass(frozen, module = "semfm", skip_from_py_object)]
+#[derive(Clone)]
+pub struct Grasp {
+    pub grasp: grasp::Grasp,
+}
+
+#[pymethods]
+impl Grasp {
+    /// (4, 4) float64 array: the hand's TCP frame in the object's frame.
+    #[getter]
+    fn object_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        matrix(py, self.grasp.object_from_tcp)
+    }
+
+    /// float: distance between the closed pads, metres.
+    #[getter]
+    fn width(&self) -> f64 {
+        self.grasp.width
+    }
+
+    /// float: distance between the pads on the way in, metres.
+    #[getter]
+    fn opening(&self) -> f64 {
+        self.grasp.opening
+    }
+
+    /// (2, 3) float64 array: one contact for each pad, metres.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        rows(py, self.grasp.contacts)
+    }
+
+    /// (2, 3) float64 array: the object's unit normal at each contact.
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        rows(py, self.grasp.normals)
+    }
+
+    /// float: Ferrari and Canny's ε.
+    #[getter]
+    fn epsilon(&self) -> f64 {
+        self.grasp.epsilon
+    }
+
+    /// float: weighted mean of the terms, 0 to 1.
+    #[getter]
+    fn score(&self) -> f64 {
+        self.grasp.score
+    }
+
+    /// dict of str to float: the terms of the score, each 0 to 1.
+    #[getter]
+    fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let terms = PyDict::new(py);
+        for (name, value) in &self.grasp.terms {
+            terms.set_item(name, value)?;
+        }
+        Ok(terms)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Grasp(score {:.2}, width {:.4} m)", self.grasp.score, self.grasp.width)
+    }
+}
+
+fn rows(py: Python<'_>, points: [DVec3; 2]) -> PyResult<Bound<'_, PyAny>> {
+    lend::owned_rows(py, points.iter().flat_map(|p| p.to_array()).collect(), 3)
+}
+
+/// Grasps of an object, best first, and what became of the other candidates: see `find_grasps`.
+///
+/// A sequence of `Grasp`.
+#[pyclass(frozen, module = "semfm", sequence)]
+pub struct Grasps {
+    found: Held<grasp::Grasps>,
+    mesh: Held<semfm::Mesh>,
+    gripper: Py<Gripper>,
+    scale: f64,
+    camera_from_object: Option<Pose>,
+}
+
+impl Grasps {
+    /// Runs `write` with all that gives the grasps meaning, away from the interpreter.
+    fn with_answer<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        write: impl FnOnce(&GraspAnswer<'_>) -> semfm::Result<T> + Send + 'static,
+    ) -> PyResult<T> {
+        let (found, mesh) = (self.found.clone(), self.mesh.clone());
+        let gripper = self.gripper.get().held.clone();
+        let (object_scale, camera_from_object) = (self.scale, self.camera_from_object);
+        run(py, None, move |_| {
+            let (mesh, gripper, found) = (&*mesh, &*gripper, &*found);
+            write(&GraspAnswer { mesh, object_scale, camera_from_object, gripper, found })
+        })
+    }
+}
+
+#[pymethods]
+impl Grasps {
+    fn __len__(&self) -> usize {
+        self.found.grasps.len()
+    }
+
+    fn __getitem__(&self, index: isize) -> PyResult<Grasp> {
+        let n = self.found.grasps.len();
+        let at = if index < 0 { index + n as isize } else { index };
+        let grasp = usize::try_from(at).ok().and_then(|at| self.found.grasps.get(at));
+        grasp.map(|grasp| Grasp { grasp: grasp.clone() }).ok_or_else(|| {
+            pyo3::exceptions::PyIndexError::new_err(format!("grasp {index} of {n}"))
+        })
+    }
+
+    /// (g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres.
+    #[getter]
+    fn object_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        stack(py, self.found.grasps.iter().map(|grasp| grasp.object_from_tcp))
+    }
+
+    /// (g, 4, 4) float64 array or None: the same in the camera's frame, where one is known.
+    #[getter]
+    fn camera_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let poses = |camera: Pose| {
+            stack(py, self.found.grasps.iter().map(|grasp| camera * grasp.object_from_tcp))
+        };
+        self.camera_from_object.map(poses).transpose()
+    }
+
+    /// (g,) float64 array: scores, falling.
+    #[getter]
+    fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.found.grasps.iter().map(|grasp| grasp.score).collect())
+    }
+
+    /// (g,) float64 array: distances between the closed pads, metres.
+    #[getter]
+    fn widths<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        lend::owned(py, self.found.grasps.iter().map(|grasp| grasp.width).collect())
+    }
+
+    /// Gripper: the hand.
+    #[getter]
+    fn gripper(&self, py: Python<'_>) -> Py<Gripper> {
+        self.gripper.clone_ref(py)
+    }
+
+    /// int: hand poses examined.
+    #[getter]
+    fn n_candidates(&self) -> usize {
+        self.found.n_candidates
+    }
+
+    /// dict of str to int: candidates refused, by the first thing that each failed.
+    #[getter]
+    fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rejected = PyDict::new(py);
+        for (reason, count) in self.found.rejected.iter() {
+            rejected.set_item(reason.name(), count)?;
+        }
+        Ok(rejected)
+    }
+
+    /// tuple of str, float, str or None: what the nearest miss failed, by how much, and the unit.
+    #[getter]
+    fn nearest_miss(&self) -> Option<(&'static str, f64, &'static str)> {
+        let miss = self.found.nearest_miss.as_ref()?;
+        Some((miss.reason.name(), miss.by, miss.reason.unit()))
+    }
+
+    /// The content of `grasps.json`.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let value = self.with_answer(py, |answer| Ok(grasps_json(answer)))?;
+        json::to_python(py, &value)
+    }
+
+    /// Writes the grasps, whole or not at all.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    /// format : {"json", "ros2", "isaac"}, optional
+    ///     `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
+    #[pyo3(signature = (path, *, format="json"))]
+    fn write(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<()> {
+        match format {
+            "json" => self.with_answer(py, move |a| write_grasps(&path, a, Default::default())),
+            "ros2" => self.with_answer(py, move |answer| write_ros2(&path, answer)),
+            "isaac" => self.with_answer(py, move |answer| write_isaac(&path, answer)),
+            other => Err(errors::invalid(py, "format", "json, ros2 or isaac", other)),
+        }
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyAny>,
+        (String, crate::mesh::Mesh, Py<Gripper>, f64, Option<[f64; 16]>),
+    )> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_grasps")?;
+        let plain = serde_json::to_string(&PlainGrasps::of(&self.found))
+            .map_err(|error| errors::internal(py, &error.to_string()))?;
+        let camera = self.camera_from_object.map(|pose| pose.to_mat4().to_cols_array());
+        let mesh = crate::mesh::Mesh { held: self.mesh.clone() };
+        Ok((restore, (plain, mesh, self.gripper.clone_ref(py), self.scale, camera)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Grasps({} of {} candidates)", self.found.grasps.len(), self.found.n_candidates)
+    }
+}
+
+fn stack(py: Python<'_>, poses: impl Iterator<Item = Pose>) -> PyResult<Bound<'_, PyAny>> {
+    let numbers = poses.flat_map(|pose| pose.to_mat4().transpose().to_cols_array());
+    lend::owned(py, numbers.collect()).call_method1("reshape", (-1, 4, 4))
+}
+
+/// Grasps out of a pickle.
+#[pyfunction]
+pub fn _restore_grasps(
+    py: Python<'_>,
+    plain: &str,
+    mesh: &Bound<'_, crate::mesh::Mesh>,
+    gripper: Py<Gripper>,
+    scale: f64,
+    camera_from_object: Option<[f64; 16]>,
+) -> PyResult<Grasps> {
+    let plain: PlainGrasps = serde_json::from_str(plain)
+        .map_err(|error| errors::invalid(py, "pickle", "grasps", &error.to_string()))?;
+    Ok(Grasps {
+        found: Held::new(plain.restore()),
+        mesh: mesh.get().held.clone(),
+        gripper,
+        scale,
+        camera_from_object: camera_from_object
+            .map(|columns| Pose::from_mat4(DMat4::from_cols_array(&columns))),
+    })
+}
+
+/// Parallel-jaw grasps whose pads close inside a region.
+///
+/// Every grasp that comes back was checked: the open hand on its way in and where it closes meets
+/// neither object nor scene, the contacts are in force closure, and the pads lie in the region.
+/// Nothing found is an answer: see `Grasps.rejected` and `Grasps.nearest_miss`.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+///     The object.
+/// region : Region
+///     Where the pads shall close; of the mesh.
+/// gripper : Gripper, str or path
+///     A hand, or what `Gripper` takes.
+/// scale : float
+///     Metres per unit of the mesh; 1 for a mesh in metres.
+/// camera_from_object : (4, 4) array_like, optional
+///     Rigid pose of the object, scaled to metres, before a camera. Scene, table and directions
+///     are then given in the camera's frame, else in the object's in metres.
+/// table : tuple of (3,) array_like and (3,) array_like, optional
+///     A point of a table top and its normal, away from the table.
+/// scene_meshes : list of mesh_like, optional
+///     What the hand must not touch, metres.
+/// scene_points : (p, 3) array_like, optional
+///     Points that it must keep `scene_margin` away from, metres.
+/// scene_margin : float, optional
+/// top : int, optional
+///     Grasps to return.
+/// n_samples : int, optional
+///     Points of the region from which candidates are grown.
+/// friction : float, optional
+///     Coulomb coefficient between pad and object.
+/// width_range : tuple of float, float, optional
+///     Least and largest distance between the closed pads, metres.
+/// approach : (3,) array_like, optional
+///     Middle of the allowed directions of approach.
+/// approach_cone : float, optional
+///     Half-angle of the allowed directions around `approach`, radians.
+/// demonstrated_approach : (3,) array_like, optional
+///     The direction in which the demonstrator's hand came; agreement raises the score.
+/// clearance : float, optional
+///     Least distance of the open hand to everything, metres.
+/// pad_in_region : float, optional
+///     Share of each pad's contact that must lie in the region.
+/// seed : int, optional
+/// progress : bool or callable, optional
+///
+/// Returns
+/// -------
+/// Grasps
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> import semfm.zoo
+/// >>> ball = semfm.zoo.icosphere(3)
+/// >>> everywhere = semfm.Region([1.0] * ball.n_vertices)
+/// >>> grasps = semfm.find_grasps(ball, everywhere, "franka", scale=0.03, n_samples=100)
+/// >>> bool(abs(grasps[0].width - 0.06) < 0.002)
+/// True
+#[pyfunction]
+#[pyo3(signature = (mesh, region, gripper, *, scale, camera_from_object=None, table=None,
+    scene_meshes=None, scene_points=None, scene_margin=0.005, top=20, n_samples=1000, friction=0.5,
+    width_range=None, approach=None, approach_cone=0.785_398_163_397_448_3,
+    demonstrated_approach=None, clearance=0.0, pad_in_region=0.5, seed=0, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub fn find_grasps(
+    py: Python<'_>,
+    mesh: &Bound<'_, PyAny>,
+    region: &Bound<'_, Region>,
+    gripper: &Bound<'_, PyAny>,
+    scale: f64,
+    camera_from_object: Option<&Bound<'_, PyAny>>,
+    table: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+    scene_meshes: Option<&Bound<'_, PyList>>,
+    scene_points: Option<&Bound<'_, PyAny>>,
+    scene_margin: f64,
+    top: usize,
+    n_samples: usize,
+    friction: f64,
+    width_range: Option<(f64, f64)>,
+    approach: Option<&Bound<'_, PyAny>>,
+    approach_cone: f64,
+    demonstrated_approach: Option<&Bound<'_, PyAny>>,
+    clearance: f64,
+    pad_in_region: f64,
+    seed: u64,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Grasps> {
+    let mesh = from_any(mesh, "mesh")?;
+    let gripper: Py<Gripper> = match gripper.cast::<Gripper>() {
+        Ok(gripper) => gripper.clone().unbind(),
+        Err(_) => py.get_type::<Gripper>().call1((gripper,))?.cast_into::<Gripper>()?.unbind(),
+    };
+    let camera_from_object = camera_from_object.map(|pose| rigid(pose)).transpose()?;
+    let object_from_answer = camera_from_object.map_or(Pose::IDENTITY, |pose| pose.inverse());
+    let direction = |value: Option<&Bound<'_, PyAny>>, name: &str| -> PyResult<Option<DVec3>> {
+        let vector = value.map(|value| arrays::point(value, name)).transpose()?;
+        Ok(vector.map(|vector| object_from_answer.rotation * vector))
+    };
+    let mut settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
+    settings.demonstrated_approach = direction(demonstrated_approach, "demonstrated_approach")?;
+    settings.limits.approach = direction(approach, "approach")?
+        .map(|axis| ApproachCone { axis, half_angle: approach_cone });
+    settings.limits.width = width_range.map(|(least, most)| least..=most);
+    settings.limits.clearance = clearance;
+    settings.limits.pad_in_region = pad_in_region;
+    let table = match &table {
+        Some((point, normal)) => {
+            let normal = direction(Some(normal), "normal of the table")?.unwrap_or_default();
+            Some((object_from_answer * arrays::point(point, "point of the table")?, normal))
+        }
+        None => None,
+    };
+    let mut meshes = Vec::new();
+    for item in scene_meshes.into_iter().flatten() {
+        meshes.push(from_any(&item, "scene_meshes")?);
+    }
+    let points = match scene_points {
+        Some(points) => arrays::points(points, "scene_points")?,
+        None => Vec::new(),
+    };
+    let (weights, object) = (region.get().held.clone(), mesh.clone());
+    let hand = gripper.get().held.clone();
+    let found = run(py, progress, move |task| {
+        let placed = |p: &DVec3| object_from_answer * *p;
+        let mut scene = Scene::new();
+        if let Some((point, normal)) = table {
+            scene = scene.with_table(point, normal)?;
+        }
+        for mesh in &meshes {
+            let vertices = mesh.vertices().iter().map(placed).collect();
+            scene = scene.with_mesh(&semfm::Mesh::new(vertices, mesh.faces().to_vec())?);
+        }
+        let points: Vec<DVec3> = points.iter().map(placed).collect();
+        scene = scene.with_cloud(&points, scene_margin)?;
+        let object = GraspObject::from_mesh(&object, scale)?;
+        Ok(grasp::find_grasps(&object, weights.weights(), &hand, &scene, &settings, task)?)
+    })?;
+    Ok(Grasps { found: Held::new(found), mesh, gripper, scale, camera_from_object })
+}
+
+/// A rigid motion from a homogeneous matrix.
+fn rigid(value: &Bound<'_, PyAny>) -> PyResult<Pose> {
+    let name = "camera_from_object";
+    let (numbers, _) = arrays::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
+    let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
+    let sim3 = grasp::align::Sim3::from_rows(rows)
+        .map_err(|error| errors::raise(value.py(), &error.into()))?;
+    if (sim3.scale - 1.0).abs() > 1e-3 {
+        let found = format!("a scale of {}", sim3.scale);
+        return Err(errors::invalid(value.py(), name, "a rigid motion (scale 1)", &found));
+    }
+    Ok(sim3.rigid())
+}

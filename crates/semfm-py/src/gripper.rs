@@ -1,0 +1,159 @@
+//! `Gripper`: a two-finger hand.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use semfm::grasp::{self, Pose, gripper::GripperSettings};
+
+use crate::held::Held;
+use crate::lend;
+use crate::work::run;
+
+/// A parallel-jaw gripper: +z along the approach, y along the closing direction, origin between the
+/// finger pads (TCP), metres.
+///
+/// Parameters
+/// ----------
+/// name_or_path : str or path
+///     ``"franka"``, ``"robotiq-2f85"``, ``"robotiq-2f140"``, or a URDF file.
+/// packages : dict of str to path, optional
+///     Folders of the packages that a URDF names (``package://NAME/…``).
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> hand = semfm.Gripper("franka")
+/// >>> hand.opening
+/// (0.0, 0.08)
+/// >>> hand.joints_at(0.04)
+/// {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
+#[pyclass(frozen, module = "semfm")]
+pub struct Gripper {
+    pub held: Held<grasp::Gripper>,
+    source: PathBuf,
+    packages: Vec<(String, PathBuf)>,
+}
+
+#[pymethods]
+impl Gripper {
+    #[new]
+    #[pyo3(signature = (name_or_path, *, packages=None))]
+    fn new(
+        py: Python<'_>,
+        name_or_path: PathBuf,
+        packages: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let packages: Vec<(String, PathBuf)> = match packages {
+            Some(packages) => packages
+                .iter()
+                .map(|(name, folder)| Ok((name.extract()?, folder.extract()?)))
+                .collect::<PyResult<_>>()?,
+            None => Vec::new(),
+        };
+        let (source, folders) = (name_or_path.clone(), packages.iter().cloned().collect());
+        let gripper = run(py, None, move |_| {
+            let settings = GripperSettings { packages: folders, ..Default::default() };
+            Ok(grasp::Gripper::open(&name_or_path.to_string_lossy(), &settings)?)
+        })?;
+        Ok(Self { held: Held::new(gripper), source, packages })
+    }
+
+    /// str: as in the URDF, or of the built-in set.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.held.name
+    }
+
+    /// tuple of float, float: distances between the pads that the joints can reach, metres.
+    #[getter]
+    fn opening(&self) -> (f64, f64) {
+        (*self.held.opening.start(), *self.held.opening.end())
+    }
+
+    /// tuple of float, float: the pads' sides across (x) and along (z) the approach, metres.
+    #[getter]
+    fn pad(&self) -> (f64, f64) {
+        (self.held.pad[0], self.held.pad[1])
+    }
+
+    /// list of str: what was replaced or left out when the URDF was read.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.held.notes.clone()
+    }
+
+    /// The TCP in the flange's frame.
+    ///
+    /// Parameters
+    /// ----------
+    /// width : float
+    ///     Distance between the pads, metres; outside of the opening, the nearest inside.
+    ///
+    /// Returns
+    /// -------
+    /// (4, 4) float64 array
+    fn flange_from_tcp<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyAny>> {
+        matrix(py, self.held.flange_from_tcp_at(width))
+    }
+
+    /// Positions of the joints that open and close the hand.
+    ///
+    /// Parameters
+    /// ----------
+    /// width : float
+    ///     Distance between the pads, metres.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to float
+    ///     Metres or radians; empty where the joints are not known by name.
+    fn joints_at<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyDict>> {
+        let joints = PyDict::new(py);
+        for (name, position) in self.held.joints_at(width) {
+            joints.set_item(name, position)?;
+        }
+        Ok(joints)
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (PathBuf, Vec<(String, PathBuf)>))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_gripper")?;
+        Ok((restore, (self.source.clone(), self.packages.clone())))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
+    fn __repr__(&self) -> String {
+        let (closed, open) = self.opening();
+        format!("Gripper({}, {closed} to {open:.3} m)", self.held.name)
+    }
+}
+
+/// A hand that was pickled: read again from where it came.
+#[pyfunction]
+pub fn _restore_gripper(
+    py: Python<'_>,
+    source: PathBuf,
+    packages: Vec<(String, PathBuf)>,
+) -> PyResult<Gripper> {
+    let folders = PyDict::new(py);
+    for (name, folder) in packages {
+        folders.set_item(name, folder)?;
+    }
+    Gripper::new(py, source, Some(&folders))
+}
+
+/// A pose as a homogeneous matrix.
+pub fn matrix(py: Python<'_>, pose: Pose) -> PyResult<Bound<'_, PyAny>> {
+    let rows = pose.to_mat4().transpose().to_cols_array();
+    lend::owned_rows(py, rows.to_vec(), 4)
+}

@@ -1,0 +1,94 @@
+//! Grasps as plain numbers and names, for pickles.
+
+use semfm::geom::math::{DQuat, DVec3};
+use semfm::grasp::settings::TERMS;
+use semfm::grasp::{Grasp, Grasps, Miss, Pose, Reason};
+use serde::{Deserialize, Serialize};
+
+#[derive(Serialize, Deserialize)]
+pub struct PlainGrasps {
+    grasps: Vec<PlainGrasp>,
+    rejected: Vec<(String, usize)>,
+    nearest_miss: Option<(String, f64, PlainGrasp)>,
+    n_candidates: usize,
+    n_survivors: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PlainGrasp {
+    position: [f64; 3],
+    rotation: [f64; 4],
+    width: f64,
+    opening: f64,
+    contacts: [[f64; 3]; 2],
+    normals: [[f64; 3]; 2],
+    epsilon: f64,
+    score: f64,
+    terms: Vec<(String, f64)>,
+}
+
+impl PlainGrasps {
+    pub fn of(found: &Grasps) -> Self {
+        let name = |reason: Reason| reason.name().to_owned();
+        Self {
+            grasps: found.grasps.iter().map(PlainGrasp::of).collect(),
+            rejected: found.rejected.iter().map(|(reason, n)| (name(reason), n)).collect(),
+            nearest_miss: found
+                .nearest_miss
+                .as_ref()
+                .map(|miss| (name(miss.reason), miss.by, PlainGrasp::of(&miss.grasp))),
+            n_candidates: found.n_candidates,
+            n_survivors: found.n_survivors,
+        }
+    }
+
+    /// The grasps again, without the times that they took. Names that nobody knows are left out.
+    pub fn restore(self) -> Grasps {
+        let reason = |name: &str| Reason::ALL.into_iter().find(|reason| reason.name() == name);
+        Grasps {
+            grasps: self.grasps.into_iter().map(PlainGrasp::restore).collect(),
+            rejected: self
+                .rejected
+                .iter()
+                .filter_map(|(name, count)| Some((reason(name)?, *count)))
+                .collect(),
+            nearest_miss: self.nearest_miss.and_then(|(name, by, grasp)| {
+                Some(Miss { reason: reason(&name)?, by, grasp: grasp.restore() })
+            }),
+            n_candidates: self.n_candidates,
+            n_survivors: self.n_survivors,
+            stages_ms: Vec::new(),
+        }
+    }
+}
+
+impl PlainGrasp {
+    fn of(grasp: &Grasp) -> Self {
+        Self {
+            position: grasp.object_from_tcp.translation.to_array(),
+            rotation: grasp.object_from_tcp.rotation.to_array(),
+            width: grasp.width,
+            opening: grasp.opening,
+            contacts: grasp.contacts.map(|p| p.to_array()),
+            normals: grasp.normals.map(|n| n.to_array()),
+            epsilon: grasp.epsilon,
+            score: grasp.score,
+            terms: grasp.terms.iter().map(|&(name, x)| (name.to_owned(), x)).collect(),
+        }
+    }
+
+    fn restore(self) -> Grasp {
+        let rotation = DQuat::from_array(self.rotation);
+        let known = |name: &str| TERMS.into_iter().find(|term| *term == name);
+        Grasp {
+            object_from_tcp: Pose::from_parts(DVec3::from_array(self.position), rotation),
+            width: self.width,
+            opening: self.opening,
+            contacts: self.contacts.map(DVec3::from_array),
+            normals: self.normals.map(DVec3::from_array),
+            epsilon: self.epsilon,
+            score: self.score,
+            terms: self.terms.iter().filter_map(|(name, x)| Some((known(name)?, *x))).collect(),
+        }
+    }
+}
