@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use parry3d_f64::math::Pose;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -123,6 +124,34 @@ pub fn find_grasps_with(
     })
 }
 
+/// Examines hand poses from elsewhere as [`find_grasps`] does its own: for each pose a grasp, or the
+/// first thing that it failed.
+///
+/// Each pose is object_from_tcp, metres; what the open hand has between its pads is what it is to
+/// hold, and the hand is moved along its closing axis until both pads touch at once. Only those
+/// errors that concern all poses are errors.
+///
+/// # Errors
+/// As [`find_grasps`].
+pub fn examine_poses(
+    object: &GraspObject,
+    region: &[f64],
+    hand: &Hand,
+    scene: &Scene,
+    settings: &GraspSettings,
+    poses: &[Pose],
+) -> Result<Vec<std::result::Result<Grasp, Miss>>> {
+    settings.check()?;
+    let region = Region::new(object, region)?;
+    let search = Search::new(object, &region, hand, scene, settings);
+    let half = hand.opening().end() / 2.0;
+    let examine = |tcp: &Pose| {
+        let candidate = Candidate { tcp: *tcp, seed: [-half, half] };
+        search.examine(&candidate).map_err(|near| search.miss(near))
+    };
+    Ok(poses.par_iter().map(examine).collect())
+}
+
 /// What one seed, or all of them, gave.
 #[derive(Default)]
 struct Sampled {
@@ -170,7 +199,10 @@ impl<'a> Search<'a> {
         let parts: Vec<Sampled> = (0..n_samples)
             .into_par_iter()
             .map_init(
-                || (Gpg::new(self.object, self.hand), Vec::new()),
+                || {
+                    let gpg = Gpg::new(self.object, self.hand, self.settings.friction);
+                    (gpg, Vec::new())
+                },
                 |(gpg, candidates), i| {
                     candidates.clear();
                     let sampled = self.sample(i as u64, gpg, candidates);
@@ -190,22 +222,25 @@ impl<'a> Search<'a> {
         rng.set_stream(i + 1);
         let seed = self.region.draw(self.object, &mut rng);
         let on_mesh = matches!(self.object.surface(), Surface::Mesh { .. });
-        let grown = if on_mesh && i % 2 == 0 {
+        let mut sampled = Sampled::default();
+        if on_mesh && i % 2 == 0 {
             let friction = self.settings.friction;
-            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates)
+            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates);
         } else {
-            gpg.grow(&seed, candidates)
-        };
-        let mut sampled = Sampled { n_candidates: candidates.len(), ..Sampled::default() };
-        if !grown {
-            sampled.rejected.add(Reason::NoContact);
-            sampled.n_candidates += 1;
+            let refused = gpg.grow(&seed, candidates);
+            sampled.n_candidates += refused;
+            sampled.rejected.add(Reason::ForceClosure, refused);
         }
+        if candidates.is_empty() && sampled.n_candidates == 0 {
+            sampled.n_candidates = 1;
+            sampled.rejected.add(Reason::NoContact, 1);
+        }
+        sampled.n_candidates += candidates.len();
         for candidate in candidates.iter() {
             match self.examine(candidate) {
                 Ok(grasp) => sampled.grasps.push(grasp),
                 Err(near) => {
-                    sampled.rejected.add(near.reason);
+                    sampled.rejected.add(near.reason, 1);
                     sampled.consider(near);
                 }
             }
@@ -221,13 +256,14 @@ impl<'a> Search<'a> {
         };
         self.approach(candidate).map_err(near(None))?;
         let compliance = self.settings.compliance;
-        let closing =
-            close(self.object, self.region, self.hand, &candidate.tcp, candidate.seed, compliance)
-                .map_err(near(None))?;
+        let Candidate { tcp, seed } = candidate;
+        let closing = close(self.object, self.region, self.hand, tcp, *seed, compliance)
+            .ok_or((Reason::NoContact, 0.0))
+            .map_err(near(None))?;
         let some = || near(Some(&closing));
+        let angle = self.contacts(&closing).map_err(some())?;
         self.width(&closing).map_err(some())?;
         self.collision.above_table(&closing).map_err(some())?;
-        let angle = self.contacts(&closing).map_err(some())?;
         let fit = self.collision.fit(&closing).map_err(some())?;
         Ok(self.grasp(&closing, &fit, angle))
     }
@@ -247,21 +283,21 @@ impl<'a> Search<'a> {
         if beyond > 0.0 { Err((Reason::Width, beyond)) } else { Ok(()) }
     }
 
-    /// Region, patches and force closure; returns the widest contact angle.
+    /// Patches, force closure and region; returns the widest contact angle.
     fn contacts(&self, closing: &Closing) -> std::result::Result<f64, (Reason, f64)> {
         let limits = &self.settings.limits;
-        let [left, right] = &closing.patches;
-        let outside = limits.pad_in_region - left.region.min(right.region);
-        if outside > 1e-9 {
-            return Err((Reason::Region, outside));
-        }
         let bare = limits.pad_in_contact - self.scorer.pad_share(closing);
         if bare > 0.0 {
             return Err((Reason::Contact, bare));
         }
         let angle = widest_angle(&closing.patches, closing.tcp.rotation * DVec3::Y);
         let beyond = angle - CONE_SHARE * self.settings.friction.atan();
-        if beyond > 0.0 { Err((Reason::ForceClosure, beyond)) } else { Ok(angle) }
+        if beyond > 0.0 {
+            return Err((Reason::ForceClosure, beyond));
+        }
+        let [left, right] = &closing.patches;
+        let outside = limits.pad_in_region - left.region.min(right.region);
+        if outside > 1e-9 { Err((Reason::Region, outside)) } else { Ok(angle) }
     }
 
     fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
