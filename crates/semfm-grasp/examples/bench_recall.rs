@@ -1,6 +1,6 @@
 //! How many of the grasps that are there the search finds, against dense sampling.
 //!
-//! `bench_recall [--samples N] [--points N] MESH…` reads meshes in metres. The reference knows
+//! `bench_recall [--samples N] [--spread N] [--near SHARE] [--points N] MESH…` reads meshes in metres. The reference knows
 //! nothing of the sampler: points uniform on the surface, hands that close along the normal or 15°
 //! beside it, 24 approaches, 3 depths; each pose is examined like any other, and those that pass are
 //! the grasps that are there. One counts as found where a grasp of the search lies within 1 cm and
@@ -14,7 +14,7 @@ use parry3d_f64::math::{Pose, Rotation};
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::{DMat3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, SurfaceIndex, Task};
 use semfm_grasp::select::hand_distance;
 use semfm_grasp::{
     BoxHand, Grasp, GraspObject, GraspSettings, Hand, Scene, Separation, examine_poses,
@@ -33,6 +33,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut value = || arguments.next().ok_or("an option lacks its value");
         match argument.as_str() {
             "--samples" => settings.n_samples = value()?.parse()?,
+            "--spread" => settings.spread_rounds = value()?.parse()?,
+            "--near" => {
+                settings.separation = Separation {
+                    translation: NEAR.0 * value()?.parse::<f64>()?,
+                    rotation: settings.separation.rotation,
+                };
+                settings.separation.rotation *= settings.separation.translation / NEAR.0;
+            }
             "--points" => points = value()?.parse()?,
             mesh => meshes.push(mesh.into()),
         }
@@ -55,10 +63,13 @@ fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Bo
         .into_iter()
         .filter_map(Result::ok)
         .collect();
+    // Merging nothing leaves neighbours without a distance: survivors are those of the samples.
     let merge_nothing = Separation { translation: 0.0, rotation: 0.0 };
     let mut found = Vec::new();
     for separation in [merge_nothing, settings.separation] {
-        let all = GraspSettings { separation, top: usize::MAX, ..settings.clone() };
+        let spread_rounds = if separation == merge_nothing { 0 } else { settings.spread_rounds };
+        let top = usize::MAX;
+        let all = GraspSettings { separation, spread_rounds, top, ..settings.clone() };
         let task = Task::default();
         found.push(find_grasps_with(&object, &region, &hand, &scene, &all, &task)?.grasps);
     }
@@ -85,22 +96,32 @@ fn share(good: &[Grasp], found: &[Grasp]) -> f64 {
     good.iter().filter(hit).count() as f64 / good.len().max(1) as f64
 }
 
-/// Hands whose pad at -y is 2 mm outside of a surface point, the rest of the opening behind it.
-fn dense_poses(mesh: &Mesh, hand: &Hand, points: usize) -> Result<Vec<Pose>, Box<dyn Error>> {
-    let half = hand.opening().end() / 2.0;
+/// Hands whose pads lie at a surface point and at the next surface behind it.
+fn dense_poses(
+    mesh: &Mesh,
+    hand: &Hand,
+    points: usize,
+) -> Result<Vec<(Pose, f64)>, Box<dyn Error>> {
+    let surface = SurfaceIndex::new(mesh)?;
     let mut poses = Vec::new();
     for (i, sample) in sample_uniform(mesh, points, 4711)?.iter().enumerate() {
         let beside = sample.normal.any_orthonormal_vector();
         for tilt in [0.0, 15f64.to_radians()] {
             let about = DQuat::from_axis_angle(sample.normal, i as f64);
             let closing = DQuat::from_axis_angle(about * beside, tilt) * -sample.normal;
+            let Some(hit) = surface.first_hit(sample.point + 1e-5 * closing, closing) else {
+                continue;
+            };
+            if hit.t > *hand.opening().end() {
+                continue;
+            }
             for k in 0..APPROACHES {
                 let turn = DQuat::from_axis_angle(closing, TAU * k as f64 / APPROACHES as f64);
                 let approach = turn * closing.any_orthonormal_vector();
                 let axes = DMat3::from_cols(closing.cross(approach), closing, approach);
                 for depth in [-0.006, 0.0, 0.006] {
-                    let place: DVec3 = sample.point + closing * (half - 0.002) + approach * depth;
-                    poses.push(Pose::from_parts(place, Rotation::from_mat3(&axes)));
+                    let place: DVec3 = sample.point + closing * (hit.t / 2.0) + approach * depth;
+                    poses.push((Pose::from_parts(place, Rotation::from_mat3(&axes)), hit.t));
                 }
             }
         }

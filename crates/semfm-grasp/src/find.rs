@@ -26,6 +26,7 @@ use crate::scene::Scene;
 use crate::score::Scorer;
 use crate::select::{diverse, suppress};
 use crate::settings::GraspSettings;
+use crate::spread::neighbours;
 
 /// Contacts must lie inside the friction cone by this share of its half-angle: another program
 /// computes other normals.
@@ -106,8 +107,9 @@ pub fn find_grasps_with(
     let prepared = start.elapsed();
     let sampled = search.run(task)?;
     let examined = start.elapsed();
-    let n_survivors = sampled.grasps.len();
-    let kept = suppress(sampled.grasps, settings.separation);
+    let found = search.spread(sampled, task)?;
+    let spread = start.elapsed();
+    let Found { kept, n_survivors, sampled } = found;
     let grasps = diverse(kept, settings.top, settings.diversity, object.radius());
     let ms = |from: std::time::Duration, to: std::time::Duration| (to - from).as_secs_f64() * 1e3;
     Ok(Grasps {
@@ -119,7 +121,8 @@ pub fn find_grasps_with(
         stages_ms: vec![
             ("prepare", prepared.as_secs_f64() * 1e3),
             ("examine", ms(prepared, examined)),
-            ("select", ms(examined, start.elapsed())),
+            ("spread", ms(examined, spread)),
+            ("select", ms(spread, start.elapsed())),
         ],
     })
 }
@@ -127,8 +130,8 @@ pub fn find_grasps_with(
 /// Examines hand poses from elsewhere as [`find_grasps`] does its own: for each pose a grasp, or the
 /// first thing that it failed.
 ///
-/// Each pose is object_from_tcp, metres; what the open hand has between its pads is what it is to
-/// hold, and the hand is moved along its closing axis until both pads touch at once. Only those
+/// Each is object_from_tcp with the width that the hand is to hold there, metres; the hand is moved
+/// along its closing axis until both pads touch at once. Only those
 /// errors that concern all poses are errors.
 ///
 /// # Errors
@@ -139,14 +142,13 @@ pub fn examine_poses(
     hand: &Hand,
     scene: &Scene,
     settings: &GraspSettings,
-    poses: &[Pose],
+    poses: &[(Pose, f64)],
 ) -> Result<Vec<std::result::Result<Grasp, Miss>>> {
     settings.check()?;
     let region = Region::new(object, region)?;
     let search = Search::new(object, &region, hand, scene, settings);
-    let half = hand.opening().end() / 2.0;
-    let examine = |tcp: &Pose| {
-        let candidate = Candidate { tcp: *tcp, seed: [-half, half] };
+    let examine = |(tcp, width): &(Pose, f64)| {
+        let candidate = Candidate { tcp: *tcp, seed: [-width / 2.0, width / 2.0] };
         search.examine(&candidate).map_err(|near| search.miss(near))
     };
     Ok(poses.par_iter().map(examine).collect())
@@ -159,6 +161,13 @@ struct Sampled {
     rejected: Rejected,
     nearest: Option<Near>,
     n_candidates: usize,
+}
+
+/// What stays of the candidates: grasps apart from each other, best first.
+struct Found {
+    kept: Vec<Grasp>,
+    n_survivors: usize,
+    sampled: Sampled,
 }
 
 /// A refused candidate, as far as it came.
@@ -237,15 +246,36 @@ impl<'a> Search<'a> {
         }
         sampled.n_candidates += candidates.len();
         for candidate in candidates.iter() {
-            match self.examine(candidate) {
-                Ok(grasp) => sampled.grasps.push(grasp),
-                Err(near) => {
-                    sampled.rejected.add(near.reason, 1);
-                    sampled.consider(near);
-                }
-            }
+            sampled.settle(self.examine(candidate));
         }
         sampled
+    }
+
+    /// Merges near grasps and tries the neighbours of those that stay, and theirs again.
+    fn spread(&self, mut sampled: Sampled, task: &Task) -> Result<Found> {
+        let separation = self.settings.separation;
+        let mut n_survivors = sampled.grasps.len();
+        let mut kept = suppress(std::mem::take(&mut sampled.grasps), separation);
+        let mut frontier = kept.clone();
+        let rounds = self.settings.spread_rounds;
+        for round in 0..rounds {
+            task.step("spread", round, rounds)?;
+            let mut part = Sampled::default();
+            let candidates = neighbours(&frontier, &kept, separation);
+            part.n_candidates = candidates.len();
+            let results: Vec<_> = candidates
+                .par_iter()
+                .map(|candidate| task.check().map(|()| self.examine(candidate)))
+                .collect::<std::result::Result<_, _>>()?;
+            results.into_iter().for_each(|result| part.settle(result));
+            n_survivors += part.grasps.len();
+            let before = kept.clone();
+            kept.append(&mut part.grasps);
+            kept = suppress(kept, separation);
+            frontier = kept.iter().filter(|grasp| !before.contains(grasp)).cloned().collect();
+            sampled.absorb(part);
+        }
+        Ok(Found { kept, n_survivors, sampled })
     }
 
     /// The stages, cheap ones first.
@@ -354,6 +384,16 @@ impl<'a> Search<'a> {
 }
 
 impl Sampled {
+    fn settle(&mut self, result: std::result::Result<Grasp, Near>) {
+        match result {
+            Ok(grasp) => self.grasps.push(grasp),
+            Err(near) => {
+                self.rejected.add(near.reason, 1);
+                self.consider(near);
+            }
+        }
+    }
+
     fn absorb(&mut self, part: Self) {
         self.grasps.extend(part.grasps);
         self.rejected.merge(&part.rejected);

@@ -205,14 +205,15 @@ proptest! {
         let object = GraspObject::from_mesh(&bar(), 1.0).unwrap();
         let turned = GraspObject::from_mesh(&moved(&bar(), |p| motion * p), 1.0).unwrap();
         let region = vec![1.0; object.n_weights()];
-        let poses: Vec<Pose> = (0..40)
+        let poses: Vec<(Pose, f64)> = (0..40)
             .map(|i| {
                 let t = f64::from(i);
                 let about = random_rotation(0.4 * t.sin(), 0.1 * t.cos(), 0.2 * (2.0 * t).sin());
-                Pose::from_parts(DVec3::new(0.08 * t.cos(), 0.003 * t.sin(), 0.02 * (3.0 * t).cos()), about)
+                (Pose::from_parts(DVec3::new(0.08 * t.cos(), 0.003 * t.sin(), 0.02 * (3.0 * t).cos()), about), 0.08)
             })
             .collect();
-        let moved_poses: Vec<Pose> = poses.iter().map(|pose| motion * *pose).collect();
+        let moved_poses: Vec<(Pose, f64)> =
+            poses.iter().map(|(pose, width)| (motion * *pose, *width)).collect();
         let (settings, hand, scene) = (GraspSettings::default(), hand(), Scene::new());
         let here = examine_poses(&object, &region, &hand, &scene, &settings, &poses).unwrap();
         let there = examine_poses(&turned, &region, &hand, &scene, &settings, &moved_poses).unwrap();

@@ -28,6 +28,7 @@ mod score;
 pub mod select;
 pub mod settings;
 mod solid;
+mod spread;
 #[cfg(test)]
 mod test_shapes;
 pub mod urdf;
