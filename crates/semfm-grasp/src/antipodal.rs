@@ -32,9 +32,8 @@ const OFF_CENTRE: f64 = 0.7;
 /// Points nearer than this (metres) are one surface.
 const SAME_SURFACE: f64 = 1e-5;
 
-/// Candidates whose pads meet the surface at `seed` and at a point opposite to it.
-///
-/// Returns whether any opposite surface was found; only meshes have them.
+/// Adds candidates whose pads meet the surface at `seed` and at a point opposite to it; on a mesh
+/// only, for a cloud has no surface for a ray to hit.
 pub(crate) fn antipodal(
     object: &GraspObject,
     hand: &Hand,
@@ -42,14 +41,17 @@ pub(crate) fn antipodal(
     friction: f64,
     rng: &mut impl Rng,
     out: &mut Vec<Candidate>,
-) -> bool {
-    let Surface::Mesh { normals, .. } = object.surface() else { return false };
+) {
+    let Surface::Mesh { normals, .. } = object.surface() else { return };
     if seed.normal == DVec3::ZERO {
-        return false;
+        return;
     }
     let least_cosine = friction.atan().cos();
     let widest = *hand.opening().end();
-    let mut found = false;
+    if !object.is_signed() {
+        // An open sheet has no opposite surface: its own other side is.
+        pair(hand, seed.point, seed.normal, 0.0, rng, out);
+    }
     for ray in 0..RAYS {
         let tilted = if ray == 0 { -seed.normal } else { in_cone(-seed.normal, friction, rng) };
         // Known inside: into it. Otherwise the face may be wound either way.
@@ -61,7 +63,6 @@ pub(crate) fn antipodal(
             .filter(|(_, face)| *face != seed.item)
             .filter(|(_, face)| opposes(normals[*face as usize], direction, object, least_cosine));
         for &(t, _) in opposite.take(MOST_PAIRS) {
-            found = true;
             pair(hand, seed.point, direction, t, rng, out);
             // Wider pairs only tell that the object is too thick: one is enough.
             if t > widest {
@@ -69,7 +70,6 @@ pub(crate) fn antipodal(
             }
         }
     }
-    found
 }
 
 /// Whether a surface can take the push along `direction` from its other side.

@@ -18,21 +18,26 @@ pub(crate) struct SoftContact {
     pub(crate) arm: DVec3,
     /// Unit normal, into the object.
     pub(crate) inward: DVec3,
+    /// A direction from which the edges of the friction pyramid are counted, so that they turn with
+    /// the hand; not along the normal.
+    pub(crate) tangent: DVec3,
     /// Torque about the normal that friction can hold, metres (per unit of force).
     pub(crate) torsion: f64,
 }
 
 impl SoftContact {
     /// A round patch of `area` (m²) under even pressure holds 2/3 μ r about its normal.
-    pub(crate) fn new(arm: DVec3, inward: DVec3, area: f64, friction: f64) -> Self {
-        Self { arm, inward, torsion: 2.0 / 3.0 * friction * (area / PI).sqrt() }
+    pub(crate) fn new(arm: DVec3, inward: DVec3, tangent: DVec3, area: f64, friction: f64) -> Self {
+        Self { arm, inward, tangent, torsion: 2.0 / 3.0 * friction * (area / PI).sqrt() }
     }
 
     /// Forces on the edge of the friction cone, without torsion, and torsion both ways without
     /// tangential force: the corners of the soft finger's limit surface (Howe & Cutkosky 1996),
     /// whose hull lies inside it.
     fn wrenches(&self, friction: f64, length: f64) -> impl Iterator<Item = Wrench> + '_ {
-        let (u, v) = self.inward.any_orthonormal_pair();
+        let flat = self.tangent.reject_from_normalized(self.inward).try_normalize();
+        let u = flat.unwrap_or_else(|| self.inward.any_orthonormal_vector());
+        let v = self.inward.cross(u);
         let edges = (0..CONE_EDGES).map(move |k| {
             let (sin, cos) = (TAU * k as f64 / CONE_EDGES as f64).sin_cos();
             let force = self.inward + friction * (cos * u + sin * v);
@@ -82,8 +87,9 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn pair(half: f64, area: f64, friction: f64) -> [SoftContact; 2] {
-        [-1.0, 1.0]
-            .map(|side| SoftContact::new(side * half * DVec3::Y, -side * DVec3::Y, area, friction))
+        [-1.0, 1.0].map(|side| {
+            SoftContact::new(side * half * DVec3::Y, -side * DVec3::Y, DVec3::Z, area, friction)
+        })
     }
 
     /// Support function of the wrenches of two contacts at ±r y on a ball of radius r, torques over
@@ -150,7 +156,8 @@ mod tests {
         assert!(at(3e-5, 0.5, DVec3::ZERO) < good);
         assert!(at(3e-4, 0.2, DVec3::ZERO) < good);
         assert!(at(3e-4, 0.5, 0.1 * DVec3::Z) < good);
-        let sideways = [DVec3::NEG_Y, DVec3::X].map(|arm| SoftContact::new(arm, -arm, 1e-4, 0.5));
+        let sideways =
+            [DVec3::NEG_Y, DVec3::X].map(|arm| SoftContact::new(arm, -arm, DVec3::Z, 1e-4, 0.5));
         assert_eq!(ferrari_canny(&sideways, 0.5, 1.0), 0.0, "normals at a right angle");
         assert_eq!(ferrari_canny(&pair(0.02, 0.0, 0.5), 0.5, 0.1), 0.0, "points hold no torsion");
     }

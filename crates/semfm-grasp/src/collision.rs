@@ -267,7 +267,7 @@ mod tests {
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
         let closing =
-            crate::contact::close(&object, &region, &hand, tcp, [-0.001, 0.001], 1.5e-3).unwrap();
+            crate::contact::close(&object, &region, &hand, tcp, [-0.015, 0.015], 1.5e-3).unwrap();
         let collision = Collision::new(&object, scene, &hand, &settings);
         collision.above_table(&closing).map_err(|(reason, _)| reason)?;
         collision.fit(&closing).map_err(|(reason, _)| reason)
@@ -301,7 +301,7 @@ mod tests {
         let narrow = fit(&beside, &Scene::new(), &from_above).unwrap();
         assert!(narrow.opening < 0.06);
         // Nearer still, and no opening helps.
-        let close_by = joined(&bar, &box_at(knob, DVec3::new(0.0, 0.033, -0.02)));
+        let close_by = joined(&bar, &box_at(knob, DVec3::new(0.0, 0.033, 0.02)));
         let refused = fit(&close_by, &Scene::new(), &from_above).unwrap_err();
         assert!(matches!(refused, Reason::Collision | Reason::Closing), "{refused:?}");
         // Above the palm: on the way in.

@@ -8,7 +8,6 @@ use semfm_geom::math::{DMat3, DVec3};
 use crate::clip::Polygon;
 use crate::hand::Hand;
 use crate::object::{GraspObject, Region, Surface};
-use crate::rejection::Reason;
 use crate::solid::Solid;
 
 /// Each pad stops this far before the object's first point (metres), and the rest of the hand stays
@@ -44,24 +43,23 @@ pub(crate) struct Patch {
     pub(crate) depth: [f64; 2],
 }
 
-/// A piece of the surface inside the prism between the pads, in the TCP frame.
+/// A piece of the surface inside the prism between the pads, in the prism's frame.
 struct Piece {
-    shape: PieceShape,
+    /// A triangle, or a point three times.
+    corners: [DVec3; 3],
+    /// Triangle or point id.
+    item: u32,
+    /// Whether it reaches beyond the prism, so that only a part of it counts.
+    cut: bool,
     low: f64,
     high: f64,
-    /// Outward unit normal in the TCP frame, zero for a degenerate triangle.
-    normal: DVec3,
-}
-
-enum PieceShape {
-    Polygon(Polygon),
-    Point { at: DVec3, area: f64, weight: f64 },
 }
 
 /// Closes the pads on what lies between them.
 ///
 /// `tcp` is object_from_tcp; `seed` an interval along its y axis that the grasp is to hold. The held
-/// part grows from the seed over every gap too narrow for a finger.
+/// part grows from the seed over every gap too narrow for a finger, and may be wider than the hand
+/// opens. `None` where there is nothing to hold.
 pub(crate) fn close(
     object: &GraspObject,
     region: &Region,
@@ -69,95 +67,159 @@ pub(crate) fn close(
     tcp: &Pose,
     seed: [f64; 2],
     compliance: f64,
-) -> Result<Closing, (Reason, f64)> {
+) -> Option<Closing> {
     let widest = *hand.opening().end();
     let seeded =
         Pose::from_parts(*tcp * DVec3::new(0.0, (seed[0] + seed[1]) / 2.0, 0.0), tcp.rotation);
-    let pieces = pieces_between(object, region, hand, &seeded);
     let half = (seed[1] - seed[0]).abs() / 2.0;
-    let [low, high] = held_interval(&pieces, half, hand.reach().finger_thickness)
-        .ok_or((Reason::NoContact, 0.0))?;
-    let width = high - low;
-    if width > widest - 2.0 * TOUCH_GAP {
-        return Err((Reason::Width, width + 2.0 * TOUCH_GAP - widest));
-    }
+    let gap = hand.reach().finger_thickness + 2.0 * TOUCH_GAP;
+    let [x, z] = hand.pad().map(|extent| extent / 2.0);
+    // First as far as a finger needs beside the seed; all the way where something is there.
+    let (mut reach, far) = (half + 1.01 * gap, half.max(widest));
+    let (prism, pieces, [low, high]) = loop {
+        let prism = Prism::new(&seeded, DVec3::new(x, reach, z));
+        let pieces = prism.pieces(object);
+        let held = held_interval(&pieces, half, gap)?;
+        if reach >= far || held[1].max(-held[0]) <= reach - gap {
+            break (prism, pieces, held);
+        }
+        reach = far;
+    };
     let centred = Pose::from_parts(seeded * DVec3::new(0.0, (low + high) / 2.0, 0.0), tcp.rotation);
     let shift = (low + high) / 2.0;
     let depth = match object.surface() {
         Surface::Mesh { .. } => compliance,
         Surface::Cloud { spacing, .. } => compliance.max(*spacing),
     };
-    let gather =
-        |side: f64| gather(&pieces, side, if side < 0.0 { low } else { high }, depth, object);
-    let (Some(left), Some(right)) = (gather(-1.0), gather(1.0)) else {
-        return Err((Reason::NoContact, 0.0));
-    };
+    let gather = |side: f64, end: f64| prism.gather(&pieces, [side, end], depth, object, region);
+    let (left, right) = (gather(-1.0, low)?, gather(1.0, high)?);
     let aim = (left.centre + right.centre) / 2.0;
     let patches = [left, right].map(|patch| patch.settle(aim, shift, &centred));
-    Ok(Closing { tcp: centred, width, patches })
+    Some(Closing { tcp: centred, width: high - low, patches })
 }
 
-fn pieces_between(object: &GraspObject, region: &Region, hand: &Hand, seeded: &Pose) -> Vec<Piece> {
-    let [x, z] = hand.pad().map(|extent| extent / 2.0);
-    let y = *hand.opening().end();
-    let prism = Solid::oriented_box(*seeded, DVec3::new(x, y, z));
-    let turn = DMat3::from_quat(seeded.rotation).transpose();
-    let mut pieces = Vec::with_capacity(128);
-    for item in object.obstacle().near(&prism, 0.0) {
-        match object.surface() {
-            Surface::Mesh { mesh, normals } => {
-                let ids = mesh.faces()[item as usize];
-                let corners = ids.map(|id| prism.local(mesh.vertices()[id as usize]));
-                let [a, b, c] = corners;
-                let half = DVec3::new(x, y, z);
-                let outside = a.min(b).min(c).cmpgt(half) | a.max(b).max(c).cmplt(-half);
-                if outside.any() {
-                    continue;
-                }
-                let weights = ids.map(|id| region.weight(id as usize));
-                let mut polygon = Polygon::triangle(corners, weights);
-                for (axis, bound) in [(0, x), (2, z), (1, y)] {
-                    polygon.clip(axis, 1.0, bound);
-                    polygon.clip(axis, -1.0, bound);
-                }
-                let extent = polygon.corners().iter().map(|c| c.0.y);
-                let (low, high) = extent
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
-                if low <= high {
-                    let normal = turn * normals[item as usize];
-                    pieces.push(Piece { shape: PieceShape::Polygon(polygon), low, high, normal });
-                }
+/// The space that the pads sweep, around the seed.
+struct Prism {
+    solid: Solid,
+    half: DVec3,
+    /// prism_from_object.
+    turn: DMat3,
+}
+
+impl Prism {
+    fn new(frame: &Pose, half: DVec3) -> Self {
+        let turn = DMat3::from_quat(frame.rotation).transpose();
+        Self { solid: Solid::oriented_box(*frame, half), half, turn }
+    }
+
+    fn pieces(&self, object: &GraspObject) -> Vec<Piece> {
+        let mut pieces = Vec::with_capacity(128);
+        for item in object.obstacle().near(&self.solid, 0.0) {
+            let corners = object.obstacle().corners(item);
+            let corners @ [a, b, c] = corners.map(|p| self.solid.local(p));
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            if (low.cmpgt(self.half) | high.cmplt(-self.half)).any() {
+                continue;
             }
-            Surface::Cloud { points, normals, area, .. } => {
-                let at = prism.local(points[item as usize]);
-                if at.abs().cmple(DVec3::new(x, y, z)).all() {
-                    let weight = region.weight(item as usize);
-                    let shape = PieceShape::Point { at, area: *area, weight };
-                    let normal = turn * normals[item as usize];
-                    pieces.push(Piece { shape, low: at.y, high: at.y, normal });
+            let cut = (high.cmpgt(self.half) | low.cmplt(-self.half)).any();
+            let [low, high] =
+                if cut { self.extent(corners, [low.y, high.y]) } else { [low.y, high.y] };
+            if low <= high {
+                pieces.push(Piece { corners, item, cut, low, high });
+            }
+        }
+        pieces
+    }
+
+    /// Extent along y of the triangle's part inside; empty (low above high) where there is none.
+    fn extent(&self, corners: [DVec3; 3], whole: [f64; 2]) -> [f64; 2] {
+        let beyond = |axis: usize| corners.iter().any(|p| p[axis].abs() > self.half[axis]);
+        if !beyond(0) && !beyond(2) {
+            return [whole[0].max(-self.half.y), whole[1].min(self.half.y)];
+        }
+        let inside = self.inside(corners, [0.0; 3]);
+        inside
+            .corners()
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], c| [l.min(c.0.y), h.max(c.0.y)])
+    }
+
+    fn inside(&self, corners: [DVec3; 3], weights: [f64; 3]) -> Polygon {
+        let mut polygon = Polygon::triangle(corners, weights);
+        for axis in [0, 2, 1] {
+            polygon.clip(axis, 1.0, self.half[axis]);
+            polygon.clip(axis, -1.0, self.half[axis]);
+        }
+        polygon
+    }
+
+    /// What lies within `compliance` of the pad at `end`; `side` is -1 or +1. `None` where nothing
+    /// shows the pad any area.
+    fn gather(
+        &self,
+        pieces: &[Piece],
+        [side, end]: [f64; 2],
+        compliance: f64,
+        object: &GraspObject,
+        region: &Region,
+    ) -> Option<Gathered> {
+        let mut sum = Gathered::new(side);
+        for piece in pieces {
+            let nearest = if side < 0.0 { piece.low - end } else { end - piece.high };
+            if nearest > compliance || nearest < -1e-9 {
+                continue;
+            }
+            let item = piece.item as usize;
+            let normal = self.turn * object.surface().normal(item);
+            let faces = normal.y * side;
+            if faces == 0.0 || (object.is_signed() && faces < 0.0) {
+                continue;
+            }
+            let normal = normal * faces.signum();
+            match object.surface() {
+                Surface::Mesh { mesh, .. } => {
+                    let weights = mesh.faces()[item].map(|id| region.weight(id as usize));
+                    let mut polygon = if piece.cut {
+                        self.inside(piece.corners, weights)
+                    } else {
+                        Polygon::triangle(piece.corners, weights)
+                    };
+                    polygon.clip(1, -side, compliance - side * end);
+                    for [a, b, c] in polygon.fan() {
+                        let across = (b.0 - a.0).cross(c.0 - a.0).y.abs() / 2.0;
+                        sum.add([a.0, b.0, c.0], across, normal, (a.1 + b.1 + c.1) / 3.0);
+                    }
+                }
+                Surface::Cloud { area, .. } => {
+                    sum.add(piece.corners, area * faces.abs(), normal, region.weight(item));
                 }
             }
         }
+        sum.means()
     }
-    pieces
 }
 
-/// The stretch of surface around [-half, half] that no gap of `finger` or more interrupts.
-fn held_interval(pieces: &[Piece], half: f64, finger: f64) -> Option<[f64; 2]> {
-    // A seed may lie a rounding error beside its own surface.
-    let slack = 1e-6;
-    let mut stretches: Vec<[f64; 2]> = pieces.iter().map(|piece| [piece.low, piece.high]).collect();
-    stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut merged: Vec<[f64; 2]> = Vec::new();
-    for [low, high] in stretches {
-        match merged.last_mut() {
-            Some(last) if low - last[1] <= finger + 2.0 * TOUCH_GAP => last[1] = last[1].max(high),
-            _ => merged.push([low, high]),
+/// The stretch of surface around [-half, half] that no gap wider than `gap` interrupts.
+fn held_interval(pieces: &[Piece], half: f64, gap: f64) -> Option<[f64; 2]> {
+    let touched = |slack: f64| {
+        let near = |piece: &&Piece| piece.low <= half + slack && piece.high >= -half - slack;
+        let extend = |[l, h]: [f64; 2], piece: &Piece| [l.min(piece.low), h.max(piece.high)];
+        let held = pieces.iter().filter(near).fold([f64::INFINITY, f64::NEG_INFINITY], extend);
+        (held[0] <= held[1]).then_some(held)
+    };
+    // A seed may lie a rounding error beside its own surface, or wholly inside of something solid.
+    let mut held = touched(1e-6).or_else(|| touched(gap))?;
+    loop {
+        let before = held;
+        for piece in pieces {
+            if piece.low <= held[1] + gap && piece.high >= held[0] - gap {
+                held = [held[0].min(piece.low), held[1].max(piece.high)];
+            }
+        }
+        if held == before {
+            return Some(held);
         }
     }
-    let held: Vec<[f64; 2]> =
-        merged.into_iter().filter(|s| s[0] <= half + slack && s[1] >= -half - slack).collect();
-    Some([held.first()?[0], held.last()?[1]])
 }
 
 /// Sums over a patch, in the frame of the seed.
@@ -172,57 +234,29 @@ struct Gathered {
     side: f64,
 }
 
-/// What lies within `compliance` of the pad at `end`; `side` is -1 or +1. `None` where nothing
-/// shows the pad any area.
-fn gather(
-    pieces: &[Piece],
-    side: f64,
-    end: f64,
-    compliance: f64,
-    object: &GraspObject,
-) -> Option<Gathered> {
-    let mut sum = Gathered {
-        area: 0.0,
-        centre: DVec3::ZERO,
-        normal: DVec3::ZERO,
-        region: 0.0,
-        depth: [f64::INFINITY, f64::NEG_INFINITY],
-        facets: Vec::new(),
-        side,
-    };
-    for piece in pieces {
-        let nearest = if side < 0.0 { piece.low - end } else { end - piece.high };
-        let faces = piece.normal.y * side;
-        if nearest > compliance
-            || nearest < -1e-9
-            || faces == 0.0
-            || (object.is_signed() && faces < 0.0)
-        {
-            continue;
-        }
-        let normal = piece.normal * faces.signum();
-        match piece.shape {
-            PieceShape::Polygon(mut polygon) => {
-                polygon.clip(1, -side, compliance - side * end);
-                for [a, b, c] in polygon.fan() {
-                    let across = (b.0 - a.0).cross(c.0 - a.0).y.abs() / 2.0;
-                    let corners = [a.0, b.0, c.0];
-                    sum.add(corners, across, normal, (a.1 + b.1 + c.1) / 3.0);
-                }
-            }
-            PieceShape::Point { at, area, weight } => {
-                sum.add([at; 3], area * faces.abs(), normal, weight);
-            }
+impl Gathered {
+    fn new(side: f64) -> Self {
+        Self {
+            area: 0.0,
+            centre: DVec3::ZERO,
+            normal: DVec3::ZERO,
+            region: 0.0,
+            depth: [f64::INFINITY, f64::NEG_INFINITY],
+            facets: Vec::new(),
+            side,
         }
     }
-    (sum.area > 0.0).then(|| {
-        sum.centre /= sum.area;
-        sum.region /= sum.area;
-        sum
-    })
-}
 
-impl Gathered {
+    /// Sums to means; `None` where there is no area.
+    fn means(mut self) -> Option<Self> {
+        if self.area <= 0.0 {
+            return None;
+        }
+        self.centre /= self.area;
+        self.region /= self.area;
+        Some(self)
+    }
+
     fn add(&mut self, corners: [DVec3; 3], area: f64, normal: DVec3, weight: f64) {
         if area <= 0.0 {
             return;
@@ -276,17 +310,17 @@ mod tests {
     use crate::hand::BoxHand;
     use crate::test_shapes::{cuboid, cylinder, joined, moved};
 
-    fn closing(object: &GraspObject, tcp: &Pose) -> Result<Closing, (Reason, f64)> {
+    fn closing(object: &GraspObject, tcp: &Pose, half: f64) -> Option<Closing> {
         let region = Region::new(object, &vec![1.0; object.n_weights()]).unwrap();
         let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
-        close(object, &region, &hand, tcp, [-0.001, 0.001], 1.5e-3)
+        close(object, &region, &hand, tcp, [-half, half], 1.5e-3)
     }
 
     #[test]
     fn a_box_is_as_wide_as_it_is_and_fills_the_pads() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::new(0.1, 0.04, 0.1)), 1.0).unwrap();
         let tcp = Pose::from_translation(DVec3::new(0.01, 0.007, 0.0));
-        let closing = closing(&object, &tcp).unwrap();
+        let closing = closing(&object, &tcp, 0.03).unwrap();
         assert!((closing.width - 0.04).abs() < 1e-12);
         assert!(closing.tcp.translation.distance(DVec3::new(0.01, 0.0, 0.0)) < 1e-12, "recentred");
         for (patch, side) in closing.patches.iter().zip([-1.0, 1.0]) {
@@ -301,7 +335,7 @@ mod tests {
     fn a_cylinder_touches_along_a_strip_as_wide_as_the_pads_give_way() {
         let (radius, compliance) = (0.02, 1.5e-3f64);
         let object = GraspObject::from_mesh(&cylinder(radius, 0.1, 256), 1.0).unwrap();
-        let closing = closing(&object, &Pose::IDENTITY).unwrap();
+        let closing = closing(&object, &Pose::IDENTITY, 0.02).unwrap();
         let half_chord = (radius * radius - (radius - compliance).powi(2)).sqrt();
         for patch in closing.patches {
             // The cylinder's axis is z: the strip runs along z and is a chord across x.
@@ -311,11 +345,11 @@ mod tests {
     }
 
     #[test]
-    fn a_plate_wider_than_the_hand_is_refused_by_what_is_missing() {
+    fn a_block_wider_than_the_hand_is_measured_and_nothing_is_nothing() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::splat(0.1)), 1.0).unwrap();
-        let (reason, by) = closing(&object, &Pose::IDENTITY).unwrap_err();
-        assert_eq!(reason, Reason::Width);
-        assert!((by - 0.0202).abs() < 1e-9, "{by}");
+        let block = closing(&object, &Pose::IDENTITY, 0.05).unwrap();
+        assert!((block.width - 0.1).abs() < 1e-12);
+        assert!(closing(&object, &Pose::from_translation(DVec3::Z), 0.05).is_none());
     }
 
     #[test]
@@ -328,7 +362,7 @@ mod tests {
         for (gap, expected) in [(0.010, 0.018), (0.030, 0.004)] {
             let object = GraspObject::from_mesh(&walls(gap), 1.0).unwrap();
             let tcp = Pose::from_translation(DVec3::Y * (gap + 0.004) / 2.0);
-            assert!((closing(&object, &tcp).unwrap().width - expected).abs() < 1e-9);
+            assert!((closing(&object, &tcp, 0.001).unwrap().width - expected).abs() < 1e-9);
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use parry3d_f64::math::Pose;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -25,6 +26,7 @@ use crate::scene::Scene;
 use crate::score::Scorer;
 use crate::select::{diverse, suppress};
 use crate::settings::GraspSettings;
+use crate::spread::neighbours;
 
 /// Contacts must lie inside the friction cone by this share of its half-angle: another program
 /// computes other normals.
@@ -105,8 +107,9 @@ pub fn find_grasps_with(
     let prepared = start.elapsed();
     let sampled = search.run(task)?;
     let examined = start.elapsed();
-    let n_survivors = sampled.grasps.len();
-    let kept = suppress(sampled.grasps, settings.separation);
+    let found = search.spread(sampled, task)?;
+    let spread = start.elapsed();
+    let Found { kept, n_survivors, sampled } = found;
     let grasps = diverse(kept, settings.top, settings.diversity, object.radius());
     let ms = |from: std::time::Duration, to: std::time::Duration| (to - from).as_secs_f64() * 1e3;
     Ok(Grasps {
@@ -118,9 +121,37 @@ pub fn find_grasps_with(
         stages_ms: vec![
             ("prepare", prepared.as_secs_f64() * 1e3),
             ("examine", ms(prepared, examined)),
-            ("select", ms(examined, start.elapsed())),
+            ("spread", ms(examined, spread)),
+            ("select", ms(spread, start.elapsed())),
         ],
     })
+}
+
+/// Examines hand poses from elsewhere as [`find_grasps`] does its own: for each pose a grasp, or the
+/// first thing that it failed.
+///
+/// Each is object_from_tcp with the width that the hand is to hold there, metres; the hand is moved
+/// along its closing axis until both pads touch at once. Only those
+/// errors that concern all poses are errors.
+///
+/// # Errors
+/// As [`find_grasps`].
+pub fn examine_poses(
+    object: &GraspObject,
+    region: &[f64],
+    hand: &Hand,
+    scene: &Scene,
+    settings: &GraspSettings,
+    poses: &[(Pose, f64)],
+) -> Result<Vec<std::result::Result<Grasp, Miss>>> {
+    settings.check()?;
+    let region = Region::new(object, region)?;
+    let search = Search::new(object, &region, hand, scene, settings);
+    let examine = |(tcp, width): &(Pose, f64)| {
+        let candidate = Candidate { tcp: *tcp, seed: [-width / 2.0, width / 2.0] };
+        search.examine(&candidate).map_err(|near| search.miss(near))
+    };
+    Ok(poses.par_iter().map(examine).collect())
 }
 
 /// What one seed, or all of them, gave.
@@ -130,6 +161,13 @@ struct Sampled {
     rejected: Rejected,
     nearest: Option<Near>,
     n_candidates: usize,
+}
+
+/// What stays of the candidates: grasps apart from each other, best first.
+struct Found {
+    kept: Vec<Grasp>,
+    n_survivors: usize,
+    sampled: Sampled,
 }
 
 /// A refused candidate, as far as it came.
@@ -170,7 +208,10 @@ impl<'a> Search<'a> {
         let parts: Vec<Sampled> = (0..n_samples)
             .into_par_iter()
             .map_init(
-                || (Gpg::new(self.object, self.hand), Vec::new()),
+                || {
+                    let gpg = Gpg::new(self.object, self.hand, self.settings.friction);
+                    (gpg, Vec::new())
+                },
                 |(gpg, candidates), i| {
                     candidates.clear();
                     let sampled = self.sample(i as u64, gpg, candidates);
@@ -190,27 +231,51 @@ impl<'a> Search<'a> {
         rng.set_stream(i + 1);
         let seed = self.region.draw(self.object, &mut rng);
         let on_mesh = matches!(self.object.surface(), Surface::Mesh { .. });
-        let grown = if on_mesh && i % 2 == 0 {
+        let mut sampled = Sampled::default();
+        if on_mesh && i % 2 == 0 {
             let friction = self.settings.friction;
-            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates)
+            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates);
         } else {
-            gpg.grow(&seed, candidates)
-        };
-        let mut sampled = Sampled { n_candidates: candidates.len(), ..Sampled::default() };
-        if !grown {
-            sampled.rejected.add(Reason::NoContact);
-            sampled.n_candidates += 1;
+            let refused = gpg.grow(&seed, candidates);
+            sampled.n_candidates += refused;
+            sampled.rejected.add(Reason::ForceClosure, refused);
         }
+        if candidates.is_empty() && sampled.n_candidates == 0 {
+            sampled.n_candidates = 1;
+            sampled.rejected.add(Reason::NoContact, 1);
+        }
+        sampled.n_candidates += candidates.len();
         for candidate in candidates.iter() {
-            match self.examine(candidate) {
-                Ok(grasp) => sampled.grasps.push(grasp),
-                Err(near) => {
-                    sampled.rejected.add(near.reason);
-                    sampled.consider(near);
-                }
-            }
+            sampled.settle(self.examine(candidate));
         }
         sampled
+    }
+
+    /// Merges near grasps and tries the neighbours of those that stay, and theirs again.
+    fn spread(&self, mut sampled: Sampled, task: &Task) -> Result<Found> {
+        let separation = self.settings.separation;
+        let mut n_survivors = sampled.grasps.len();
+        let mut kept = suppress(std::mem::take(&mut sampled.grasps), separation);
+        let mut frontier = kept.clone();
+        let rounds = self.settings.spread_rounds;
+        for round in 0..rounds {
+            task.step("spread", round, rounds)?;
+            let mut part = Sampled::default();
+            let candidates = neighbours(&frontier, &kept, separation);
+            part.n_candidates = candidates.len();
+            let results: Vec<_> = candidates
+                .par_iter()
+                .map(|candidate| task.check().map(|()| self.examine(candidate)))
+                .collect::<std::result::Result<_, _>>()?;
+            results.into_iter().for_each(|result| part.settle(result));
+            n_survivors += part.grasps.len();
+            let before = kept.clone();
+            kept.append(&mut part.grasps);
+            kept = suppress(kept, separation);
+            frontier = kept.iter().filter(|grasp| !before.contains(grasp)).cloned().collect();
+            sampled.absorb(part);
+        }
+        Ok(Found { kept, n_survivors, sampled })
     }
 
     /// The stages, cheap ones first.
@@ -221,13 +286,14 @@ impl<'a> Search<'a> {
         };
         self.approach(candidate).map_err(near(None))?;
         let compliance = self.settings.compliance;
-        let closing =
-            close(self.object, self.region, self.hand, &candidate.tcp, candidate.seed, compliance)
-                .map_err(near(None))?;
+        let Candidate { tcp, seed } = candidate;
+        let closing = close(self.object, self.region, self.hand, tcp, *seed, compliance)
+            .ok_or((Reason::NoContact, 0.0))
+            .map_err(near(None))?;
         let some = || near(Some(&closing));
+        let angle = self.contacts(&closing).map_err(some())?;
         self.width(&closing).map_err(some())?;
         self.collision.above_table(&closing).map_err(some())?;
-        let angle = self.contacts(&closing).map_err(some())?;
         let fit = self.collision.fit(&closing).map_err(some())?;
         Ok(self.grasp(&closing, &fit, angle))
     }
@@ -247,21 +313,21 @@ impl<'a> Search<'a> {
         if beyond > 0.0 { Err((Reason::Width, beyond)) } else { Ok(()) }
     }
 
-    /// Region, patches and force closure; returns the widest contact angle.
+    /// Patches, force closure and region; returns the widest contact angle.
     fn contacts(&self, closing: &Closing) -> std::result::Result<f64, (Reason, f64)> {
         let limits = &self.settings.limits;
-        let [left, right] = &closing.patches;
-        let outside = limits.pad_in_region - left.region.min(right.region);
-        if outside > 1e-9 {
-            return Err((Reason::Region, outside));
-        }
         let bare = limits.pad_in_contact - self.scorer.pad_share(closing);
         if bare > 0.0 {
             return Err((Reason::Contact, bare));
         }
         let angle = widest_angle(&closing.patches, closing.tcp.rotation * DVec3::Y);
         let beyond = angle - CONE_SHARE * self.settings.friction.atan();
-        if beyond > 0.0 { Err((Reason::ForceClosure, beyond)) } else { Ok(angle) }
+        if beyond > 0.0 {
+            return Err((Reason::ForceClosure, beyond));
+        }
+        let [left, right] = &closing.patches;
+        let outside = limits.pad_in_region - left.region.min(right.region);
+        if outside > 1e-9 { Err((Reason::Region, outside)) } else { Ok(angle) }
     }
 
     fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
@@ -318,6 +384,16 @@ impl<'a> Search<'a> {
 }
 
 impl Sampled {
+    fn settle(&mut self, result: std::result::Result<Grasp, Near>) {
+        match result {
+            Ok(grasp) => self.grasps.push(grasp),
+            Err(near) => {
+                self.rejected.add(near.reason, 1);
+                self.consider(near);
+            }
+        }
+    }
+
     fn absorb(&mut self, part: Self) {
         self.grasps.extend(part.grasps);
         self.rejected.merge(&part.rejected);

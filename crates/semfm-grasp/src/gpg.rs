@@ -33,6 +33,14 @@ const PLACEMENTS: usize = 9;
 /// stay empty at the samples' spacing of 2.5 mm.
 const BIN: f64 = 1.5e-3;
 
+/// Samples within this of the outermost one count as the end of what is held (metres): the pads'
+/// compliance and half the samples' spacing.
+const END: f64 = 2.5e-3;
+
+/// Samples whose normals leave the friction cone by up to this angle may stand for a surface inside
+/// it (radians).
+const NORMAL_SLACK: f64 = 0.15;
+
 /// The push stops this far from contact (metres): the samples may miss what stands out between them.
 const PUSH_GAP: f64 = 2e-3;
 
@@ -40,19 +48,27 @@ const PUSH_GAP: f64 = 2e-3;
 pub(crate) struct Gpg<'a> {
     object: &'a GraspObject,
     hand: &'a Hand,
-    points: Vec<DVec3>,
+    /// Cosine of the widest angle that sampled normals and closing axis may have.
+    least_cosine: f64,
+    /// Samples near the seed, from the seed, with their normals.
+    points: Vec<(DVec3, DVec3)>,
+    /// Those that the fingers meet, in the hand's frame, each with its normal's part along y.
+    slab: Vec<(DVec3, f64)>,
     /// For each bin along the closing axis, the least z of the surface in it.
     first: Vec<f64>,
 }
 
 impl<'a> Gpg<'a> {
-    pub(crate) fn new(object: &'a GraspObject, hand: &'a Hand) -> Self {
-        Self { object, hand, points: Vec::new(), first: Vec::new() }
+    pub(crate) fn new(object: &'a GraspObject, hand: &'a Hand, friction: f64) -> Self {
+        let least_cosine = (friction.atan() + NORMAL_SLACK).cos();
+        let (points, slab, first) = (Vec::new(), Vec::new(), Vec::new());
+        Self { object, hand, least_cosine, points, slab, first }
     }
 
-    /// Adds the placements around `seed`; returns whether there were any.
-    pub(crate) fn grow(&mut self, seed: &Seed, out: &mut Vec<Candidate>) -> bool {
-        let before = out.len();
+    /// Adds the placements around `seed` whose ends can oppose each other, and returns how many
+    /// others there were.
+    pub(crate) fn grow(&mut self, seed: &Seed, out: &mut Vec<Candidate>) -> usize {
+        let mut refused = 0;
         let reach = self.hand.reach();
         let depth = reach.tip - reach.palm;
         let samples = self.object.samples();
@@ -62,9 +78,9 @@ impl<'a> Gpg<'a> {
             samples
                 .tree
                 .points_within(seed.point, radius)
-                .map(|i| samples.points[i as usize] - seed.point),
+                .map(|i| (samples.points[i as usize] - seed.point, samples.normals[i as usize])),
         );
-        let Some((normal, axis)) = self.darboux(seed) else { return false };
+        let Some((normal, axis)) = self.darboux(seed) else { return 0 };
         let sides: &[f64] = if self.object.is_signed() { &[1.0] } else { &[1.0, -1.0] };
         for side in sides {
             let approach = -normal * side;
@@ -73,11 +89,11 @@ impl<'a> Gpg<'a> {
                 let closing = about * approach.cross(axis).normalize();
                 for tilt in TILTS {
                     let tilted = DQuat::from_axis_angle(closing, tilt) * approach;
-                    self.place(seed, &rotation(closing, tilted), out);
+                    refused += self.place(seed, &rotation(closing, tilted), out);
                 }
             }
         }
-        out.len() > before
+        refused
     }
 
     /// The normal at the seed and the direction in which normals around it change least (the axis of
@@ -105,7 +121,7 @@ impl<'a> Gpg<'a> {
     }
 
     /// Slides the open hand along its closing axis and pushes it forward at each place.
-    fn place(&mut self, seed: &Seed, turn: &Rotation, out: &mut Vec<Candidate>) {
+    fn place(&mut self, seed: &Seed, turn: &Rotation, out: &mut Vec<Candidate>) -> usize {
         let reach = self.hand.reach();
         let opening = *self.hand.opening().end();
         let span = opening / 2.0 + reach.outer; // the farthest a finger gets
@@ -115,7 +131,7 @@ impl<'a> Gpg<'a> {
             self.first[bin(from)..=bin(to)].iter().copied().fold(f64::INFINITY, f64::min)
         };
         let bite = INITIAL_BITE * self.hand.pad()[1];
-        let mut last = None;
+        let (mut last, mut refused) = (None, 0);
         for k in 0..PLACEMENTS {
             let offset = opening * ((k as f64 + 0.5) / PLACEMENTS as f64 - 0.5);
             let (left, right) = (offset - opening / 2.0, offset + opening / 2.0);
@@ -127,43 +143,65 @@ impl<'a> Gpg<'a> {
             if !(front.is_finite() && tip - front >= bite) {
                 continue;
             }
-            let inside: Vec<usize> =
-                (bin(left)..=bin(right)).filter(|&i| self.first[i] < tip).collect();
-            let (Some(&low), Some(&high)) = (inside.first(), inside.last()) else { continue };
-            if last.replace((low, high)) == Some((low, high)) {
-                continue;
-            }
-            let held = [low as f64 * BIN - span, (high + 1) as f64 * BIN - span];
             // Deepest, and with the pads just filled.
             let shallow = (front + (reach.tip + self.hand.pad()[1] / 2.0)).min(tip);
-            for tip in [Some(tip), (tip - shallow > bite).then_some(shallow)].into_iter().flatten()
-            {
-                let place = seed.point + *turn * (DVec3::Z * (tip - reach.tip));
-                out.push(Candidate { tcp: Pose::from_parts(place, *turn), seed: shrunk(held) });
+            let deeper = tip - shallow > bite;
+            for tip in [Some(tip), deeper.then_some(shallow)].into_iter().flatten() {
+                let middle = tip - reach.tip;
+                let Some((held, opposed)) = self.held([left, right], middle) else { continue };
+                let key = (bin(held[0]), bin(held[1]), bin(middle.max(-span)));
+                if last.replace(key) == Some(key) {
+                    continue;
+                }
+                if !opposed {
+                    refused += 1;
+                    continue;
+                }
+                let place = seed.point + *turn * (DVec3::Z * middle);
+                out.push(Candidate { tcp: Pose::from_parts(place, *turn), seed: held });
             }
         }
+        refused
+    }
+
+    /// What lies between pads whose middle is at `middle` along the approach: its extent along the
+    /// closing axis, and whether at both ends some normal is within reach of the friction cone.
+    fn held(&self, [left, right]: [f64; 2], middle: f64) -> Option<([f64; 2], bool)> {
+        let half = self.hand.pad()[1] / 2.0;
+        let between = || {
+            self.slab
+                .iter()
+                .filter(move |(p, _)| (p.z - middle).abs() <= half && p.y > left && p.y < right)
+        };
+        let (low, high) = between()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (p, _)| (l.min(p.y), h.max(p.y)));
+        if low > high {
+            return None;
+        }
+        let faces = |end: f64| {
+            between().any(|(p, along)| (p.y - end).abs() <= END && along.abs() >= self.least_cosine)
+        };
+        Some(([low, high], faces(low) && faces(high)))
     }
 
     fn gather(&mut self, turn: &Rotation, span: f64, reach: HandReach) {
+        self.slab.clear();
         self.first.clear();
         self.first.resize((2.0 * span / BIN) as usize + 2, f64::INFINITY);
         let back = DMat3::from_quat(turn.inverse());
         let half_width = reach.finger_width / 2.0;
         let (across, along, ahead) = (back.row(0), back.row(1), back.row(2));
-        for p in &self.points {
+        for (p, n) in &self.points {
             let y = along.dot(*p);
-            if across.dot(*p).abs() <= half_width && y.abs() < span {
+            let x = across.dot(*p);
+            if x.abs() <= half_width && y.abs() < span {
                 let i = ((y + span) / BIN) as usize;
-                self.first[i] = self.first[i].min(ahead.dot(*p));
+                let z = ahead.dot(*p);
+                self.first[i] = self.first[i].min(z);
+                self.slab.push((DVec3::new(x, y, z), along.dot(*n)));
             }
         }
     }
-}
-
-/// An interval of bins says more than it knows: the seed is the part that is surely held.
-fn shrunk([low, high]: [f64; 2]) -> [f64; 2] {
-    let middle = (low + high) / 2.0;
-    [(low + BIN).min(middle), (high - BIN).max(middle)]
 }
 
 #[cfg(test)]
@@ -179,7 +217,7 @@ mod tests {
     fn the_frame_on_a_cylinder_knows_normal_and_axis() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
         let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
-        let gpg = Gpg::new(&object, &hand);
+        let gpg = Gpg::new(&object, &hand, 0.5);
         let seed = Seed { point: DVec3::X * 0.02, normal: DVec3::X, item: 0 };
         let (normal, axis) = gpg.darboux(&seed).unwrap();
         assert!(normal.x > 0.99 && axis.z.abs() > 0.99, "{normal} {axis}");
@@ -192,10 +230,10 @@ mod tests {
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut candidates = Vec::new();
-        let mut gpg = Gpg::new(&object, &hand);
-        let grown =
-            (0..20).filter(|_| gpg.grow(&region.draw(&object, &mut rng), &mut candidates)).count();
-        assert!(grown > 15, "{grown} of 20 seeds grew");
+        let mut gpg = Gpg::new(&object, &hand, 0.5);
+        for _ in 0..20 {
+            gpg.grow(&region.draw(&object, &mut rng), &mut candidates);
+        }
         let across = candidates.iter().filter(|c| {
             let axis = c.tcp.rotation * DVec3::Y;
             axis.z.abs() < 0.2 && (c.seed[1] - c.seed[0] - 0.04).abs() < 0.008

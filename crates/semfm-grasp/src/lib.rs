@@ -14,6 +14,8 @@ mod collision;
 mod contact;
 mod error;
 pub mod find;
+#[cfg(test)]
+mod find_tests;
 mod gpg;
 pub mod grasp;
 pub mod gripper;
@@ -26,13 +28,14 @@ mod score;
 pub mod select;
 pub mod settings;
 mod solid;
+mod spread;
 #[cfg(test)]
 mod test_shapes;
 pub mod urdf;
 mod wrench_hull;
 
 pub use error::{Error, Result};
-pub use find::{Grasps, find_grasps, find_grasps_with};
+pub use find::{Grasps, examine_poses, find_grasps, find_grasps_with};
 pub use grasp::Grasp;
 pub use gripper::Gripper;
 pub use hand::{BoxHand, Hand};

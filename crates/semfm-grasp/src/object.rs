@@ -46,6 +46,15 @@ pub(crate) enum Surface {
     Cloud { points: Vec<DVec3>, normals: Vec<DVec3>, area: f64, spacing: f64 },
 }
 
+impl Surface {
+    /// Unit normal of a triangle (zero where it has none) or a point.
+    pub(crate) fn normal(&self, item: usize) -> DVec3 {
+        match self {
+            Self::Mesh { normals, .. } | Self::Cloud { normals, .. } => normals[item],
+        }
+    }
+}
+
 /// Points spread over the surface, with normals, for the growth of candidates.
 pub(crate) struct Samples {
     pub(crate) points: Vec<DVec3>,

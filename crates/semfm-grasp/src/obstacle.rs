@@ -67,7 +67,8 @@ impl Obstacle {
             Items::Triangles(triangles) => {
                 for i in self.near(solid, cap) {
                     let corners = &triangles[i as usize];
-                    if solid.meets_triangle_box(corners, least) {
+                    let [a, b, c] = *corners;
+                    if solid.grown(least).overlaps(a.min(b).min(c), a.max(b).max(c)) {
                         least = solid.distance(corners, least).min(least);
                     }
                 }
@@ -85,10 +86,19 @@ impl Obstacle {
     /// Ids of the items whose boxes come near the box of `solid` grown by `margin`.
     pub(crate) fn near<'a>(
         &'a self,
-        solid: &'a Solid,
+        solid: &Solid,
         margin: f64,
-    ) -> impl Iterator<Item = u32> + 'a {
-        self.tree.leaves(move |node: &BvhNode| solid.near_box(node.mins(), node.maxs(), margin))
+    ) -> impl Iterator<Item = u32> + use<'a> {
+        let grown = solid.grown(margin);
+        self.tree.leaves(move |node: &BvhNode| grown.overlaps(node.mins(), node.maxs()))
+    }
+
+    /// Corners of a triangle, or a point three times.
+    pub(crate) fn corners(&self, item: u32) -> [DVec3; 3] {
+        match &self.items {
+            Items::Triangles(triangles) => triangles[item as usize],
+            Items::Points { points, .. } => [points[item as usize]; 3],
+        }
     }
 
     /// Ids of the points within `radius` of `centre`, in the order of the tree.
@@ -145,13 +155,6 @@ impl Obstacle {
         }
         let odd = |ray: &&DVec3| self.crossings(point, **ray, 0.0, f64::MAX).len() % 2 == 1;
         INSIDE_RAYS.iter().filter(odd).count() >= 2
-    }
-}
-
-impl Solid {
-    fn meets_triangle_box(&self, corners: &[DVec3; 3], margin: f64) -> bool {
-        let [a, b, c] = *corners;
-        self.near_box(a.min(b).min(c), a.max(b).max(c), margin)
     }
 }
 

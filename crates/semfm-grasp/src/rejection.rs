@@ -10,16 +10,16 @@ pub enum Reason {
     NoContact,
     /// The approach lies outside the asked cone (radians beyond it).
     Approach,
+    /// Too little of a pad touches (share missing).
+    Contact,
+    /// The line between the contacts leaves a friction cone (radians beyond it).
+    ForceClosure,
+    /// Too little of a pad lies in the region (share missing).
+    Region,
     /// Wider or narrower than the hand or the limit allows (metres beyond it).
     Width,
     /// The hand would be in the table, or nearer to it than asked (metres too near).
     Table,
-    /// Too little of a pad touches the region (share missing).
-    Region,
-    /// Too little of a pad touches at all (share missing).
-    Contact,
-    /// The line between the contacts leaves a friction cone (radians beyond it).
-    ForceClosure,
     /// The hand runs into the object where it grasps (metres to back off until it is free).
     Collision,
     /// The open hand hits the object or the scene on its way in (metres to back off).
@@ -39,11 +39,11 @@ impl Reason {
     pub const ALL: [Self; 13] = [
         Self::NoContact,
         Self::Approach,
-        Self::Width,
-        Self::Table,
-        Self::Region,
         Self::Contact,
         Self::ForceClosure,
+        Self::Region,
+        Self::Width,
+        Self::Table,
         Self::Collision,
         Self::ApproachPath,
         Self::Closing,
@@ -133,8 +133,8 @@ impl Rejected {
         Reason::ALL.into_iter().map(|reason| (reason, self.count(reason))).filter(|row| row.1 > 0)
     }
 
-    pub(crate) fn add(&mut self, reason: Reason) {
-        self.counts[reason as usize] += 1;
+    pub(crate) fn add(&mut self, reason: Reason, n: usize) {
+        self.counts[reason as usize] += n;
     }
 
     pub(crate) fn merge(&mut self, other: &Self) {
@@ -164,7 +164,7 @@ mod tests {
             assert!(names.insert(reason.name()));
         }
         let mut counts = Rejected::default();
-        counts.add(Reason::Width);
+        counts.add(Reason::Width, 1);
         counts.merge(&counts.clone());
         assert_eq!(counts.iter().collect::<Vec<_>>(), [(Reason::Width, 2)]);
         assert_eq!(counts.total(), 2);

@@ -54,7 +54,7 @@ impl<'a> Scorer<'a> {
         let half = (*hand.opening().end() / 2.0).min(object.radius());
         let ideal = [-1.0, 1.0].map(|side| {
             let y = side * DVec3::Y;
-            SoftContact::new(half * y, -y, pad[0] * pad[1], settings.friction)
+            SoftContact::new(half * y, -y, DVec3::Z, pad[0] * pad[1], settings.friction)
         });
         let best_epsilon = ferrari_canny(&ideal, settings.friction, object.radius());
         let down = settings.gravity.or(down).map(DVec3::normalize);
@@ -68,7 +68,8 @@ impl<'a> Scorer<'a> {
         let friction = self.settings.friction;
         let contacts = [left, right].map(|patch| {
             let area = patch.area.min(self.pad[0] * self.pad[1]);
-            SoftContact::new(patch.contact - com, -patch.normal, area, friction)
+            let approach = closing.tcp.rotation * DVec3::Z;
+            SoftContact::new(patch.contact - com, -patch.normal, approach, area, friction)
         });
         let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
         let arm = com - left.contact.midpoint(right.contact);
@@ -141,7 +142,7 @@ mod tests {
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 0.02 };
         let at = |x: f64, z: f64| {
             let tcp = Pose::new(DVec3::new(x, 0.0, z), DVec3::X * PI);
-            let closing = close(&object, &region, &hand, &tcp, [-0.001, 0.001], 1.5e-3).unwrap();
+            let closing = close(&object, &region, &hand, &tcp, [-0.015, 0.015], 1.5e-3).unwrap();
             scorer.score(&closing, &fit, 0.0)
         };
         let value = |score: &Score, name: &str| {
@@ -166,7 +167,7 @@ mod tests {
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
         let closing =
-            close(&object, &region, &hand, &Pose::IDENTITY, [-0.001, 0.001], 1.5e-3).unwrap();
+            close(&object, &region, &hand, &Pose::IDENTITY, [-0.015, 0.015], 1.5e-3).unwrap();
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 1.0 };
         let scores = [DVec3::Z, DVec3::X].map(|approach| {
             let demonstrated_approach = Some(approach);

@@ -12,6 +12,9 @@ use crate::{Error, Result};
 pub struct GraspSettings {
     /// Surface points from which candidates are grown; each gives some twenty.
     pub n_samples: usize,
+    /// Rounds in which neighbours of the grasps found are tried: each finds what the samples missed
+    /// one step farther out.
+    pub spread_rounds: usize,
     /// The same seed gives the same grasps at every thread count.
     pub seed: u64,
     /// Coulomb friction coefficient μ between pad and object.
@@ -99,6 +102,7 @@ impl Default for GraspSettings {
     fn default() -> Self {
         Self {
             n_samples: 1000,
+            spread_rounds: 2,
             seed: 0,
             friction: 0.5,
             compliance: 1.5e-3,

@@ -8,9 +8,10 @@ const TOLERANCE: f64 = 1e-9;
 
 /// Points are moved by this (relative to the largest) before the hull is built, each by another
 /// amount: wrenches of cones are full of coplanar groups, on which facets have no normal.
-const JOGGLE: f64 = 1e-7;
+const JOGGLE: f64 = 1e-5;
 
-/// Stops where rounding would let the hull grow for ever; hulls of two contacts take below 400.
+/// Stops where rounding would let the hull grow for ever, with a radius that is then too small;
+/// hulls of two contacts take below 400.
 const MOST_FACETS: usize = 4000;
 
 /// A facet of the hull: six corners, `normal · x ≤ offset` inside.
@@ -194,12 +195,13 @@ mod tests {
                 cross.push(p);
             }
         }
-        assert!((inner_radius(&cross) - 2.0 / 6f64.sqrt()).abs() < 1e-6);
+        assert!((inner_radius(&cross) - 2.0 / 6f64.sqrt()).abs() < 1e-4);
         let cube: Vec<Wrench> = (0..64)
             .map(|i| std::array::from_fn(|d| if i >> d & 1 == 0 { -1.0 } else { 1.0 }))
             .collect();
-        assert!((inner_radius(&cube) - 1.0).abs() < 1e-6);
-        assert_eq!(inner_radius(&cross[..11]), 0.0, "the origin is on the boundary");
+        let found = inner_radius(&cube);
+        assert!((found - 1.0).abs() < 1e-4, "{found}");
+        assert!(inner_radius(&cross[..11]) < 1e-4, "the origin is on the boundary");
         assert_eq!(inner_radius(&cross[..4]), 0.0, "flat");
         assert_eq!(inner_radius(&[]), 0.0);
     }
@@ -228,7 +230,7 @@ mod tests {
                     }
                 }
             }
-            assert!((found - least.max(0.0)).abs() < 1e-5, "{found} instead of {least}");
+            assert!((found - least.max(0.0)).abs() < 1e-4, "{found} instead of {least}");
         }
     }
 }

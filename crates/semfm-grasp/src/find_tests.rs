@@ -1,0 +1,255 @@
+//! Properties of the whole search on shapes with known grasps.
+
+use parry3d_f64::math::{Pose, Rotation};
+use proptest::prelude::*;
+use semfm_geom::math::{DQuat, DVec3};
+use semfm_geom::sampling::sample_uniform;
+use semfm_geom::{Mesh, Task, zoo};
+
+use crate::find::{Grasps, examine_poses, find_grasps_with};
+use crate::hand::{BoxHand, Hand};
+use crate::object::GraspObject;
+use crate::rejection::Reason;
+use crate::scene::Scene;
+use crate::select::hand_distance;
+use crate::settings::{ApproachCone, GraspSettings};
+use crate::test_shapes::{cuboid, cylinder, joined, moved};
+
+fn hand() -> Hand {
+    Hand::of_boxes(&BoxHand::default()).unwrap()
+}
+
+fn few(n_samples: usize) -> GraspSettings {
+    GraspSettings { n_samples, ..GraspSettings::default() }
+}
+
+fn search(mesh: &Mesh, scene: &Scene, settings: &GraspSettings) -> Grasps {
+    let object = GraspObject::from_mesh(mesh, 1.0).unwrap();
+    let region = vec![1.0; object.n_weights()];
+    find_grasps_with(&object, &region, &hand(), scene, settings, &Task::default()).unwrap()
+}
+
+fn bar() -> Mesh {
+    cuboid(DVec3::new(0.2, 0.03, 0.05))
+}
+
+#[test]
+fn grasps_of_a_bar_close_across_it() {
+    let found = search(&bar(), &Scene::new(), &few(200));
+    assert_eq!(found.grasps.len(), GraspSettings::default().top);
+    assert!(found.grasps.is_sorted_by(|a, b| a.score >= b.score));
+    assert_eq!(found.rejected.total() + found.n_survivors, found.n_candidates);
+    for grasp in &found.grasps {
+        let (y, z) = (grasp.closing().y.abs(), grasp.closing().z.abs());
+        let width = if y > z { 0.03 } else { 0.05 };
+        assert!(y.max(z) > 0.88, "closing along {}", grasp.closing());
+        // A tilted hand is wider by the pad's share of the tilt.
+        assert!(grasp.width >= width && grasp.width < width + 0.012, "{}", grasp.width);
+        assert!((0.0..=1.0).contains(&grasp.score) && grasp.epsilon > 0.0);
+        assert!(grasp.terms.iter().all(|(_, value)| (0.0..=1.0).contains(value)));
+        for (contact, normal) in grasp.contacts.iter().zip(&grasp.normals) {
+            let inside = contact.abs().cmple(DVec3::new(0.1, 0.015, 0.025) + 1e-9);
+            assert!(inside.all() && normal.is_normalized(), "{contact}");
+        }
+    }
+    let best = &found.grasps[0];
+    assert!(best.contacts[0].midpoint(best.contacts[1]).length() < 0.03, "near the middle");
+}
+
+#[test]
+fn grasps_of_a_ball_and_a_can_go_through_their_middles() {
+    let ball = moved(&zoo::icosphere(4), |p| 0.025 * p);
+    for grasp in search(&ball, &Scene::new(), &few(200)).grasps {
+        let line = (grasp.contacts[1] - grasp.contacts[0]).normalize();
+        let off = (-grasp.contacts[0]).reject_from_normalized(line).length();
+        assert!(off < 0.025 * 0.5f64.atan().sin(), "{off} beside the middle");
+        assert!((0.044..0.0503).contains(&grasp.width));
+    }
+    let can = search(&cylinder(0.033, 0.1, 96), &Scene::new(), &few(200));
+    assert!(!can.grasps.is_empty());
+    for grasp in can.grasps {
+        assert!(grasp.closing().z.abs() < 0.45, "100 mm do not fit");
+    }
+}
+
+#[test]
+fn a_block_too_large_is_refused_for_its_width() {
+    let found = search(&cuboid(DVec3::splat(0.1)), &Scene::new(), &few(100));
+    assert!(found.grasps.is_empty());
+    assert!(found.rejected.count(Reason::Width) > 100);
+    let miss = found.nearest_miss.unwrap();
+    assert_eq!(miss.reason, Reason::Width);
+    assert!((miss.by - 0.0202).abs() < 1e-3, "{} m too wide", miss.by);
+}
+
+#[test]
+fn a_table_removes_what_comes_from_below() {
+    let free = search(&bar(), &Scene::new(), &few(200));
+    assert!(free.grasps.iter().any(|g| g.approach().z > 0.5));
+    let table = Scene::new().with_table(DVec3::Z * -0.025, DVec3::Z).unwrap();
+    let found = search(&bar(), &table, &few(200));
+    assert!(!found.grasps.is_empty() && found.rejected.count(Reason::Table) > 50);
+    for grasp in &found.grasps {
+        assert!(grasp.approach().z < 0.1, "approach {}", grasp.approach());
+    }
+}
+
+#[test]
+fn limits_hold_for_every_grasp() {
+    let mut settings = few(300);
+    let axis = DVec3::new(0.0, 0.2, -1.0);
+    settings.limits.approach = Some(ApproachCone { axis, half_angle: 0.5 });
+    settings.limits.width = Some(0.02..=0.04);
+    settings.limits.clearance = 0.004;
+    let found = search(&bar(), &Scene::new(), &settings);
+    assert!(!found.grasps.is_empty());
+    for grasp in &found.grasps {
+        assert!(grasp.approach().angle_between(axis) <= 0.5);
+        assert!((0.02..=0.0403).contains(&grasp.width));
+        assert!(grasp.term("clearance").unwrap() >= 0.4 - 1e-9);
+    }
+    assert!(found.rejected.count(Reason::Approach) > 0);
+    settings.limits.clearance = 0.04;
+    let none = search(&bar(), &Scene::new(), &settings);
+    assert!(none.grasps.is_empty());
+    assert_eq!(none.nearest_miss.unwrap().reason, Reason::Clearance);
+}
+
+#[test]
+fn pads_stay_in_the_region_and_stop_at_its_border() {
+    // A bar of many triangles, so that a region has a border.
+    let long = cylinder(0.02, 0.2, 48);
+    let points: Vec<DVec3> =
+        sample_uniform(&long, 4000, 1).unwrap().iter().map(|s| s.point).collect();
+    let object = GraspObject::from_cloud(&points, None, None).unwrap();
+    let region: Vec<f64> = points.iter().map(|p| f64::from(u8::from(p.z > 0.05))).collect();
+    let mut settings = few(60);
+    settings.limits.pad_in_region = 0.9;
+    let task = Task::default();
+    let found =
+        find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task).unwrap();
+    assert!(!found.grasps.is_empty() && found.rejected.count(Reason::Region) > 0);
+    for grasp in &found.grasps {
+        assert!(grasp.contacts.iter().all(|p| p.z > 0.045), "{:?}", grasp.contacts);
+        assert!(grasp.term("region").unwrap() >= 0.9);
+    }
+}
+
+#[test]
+fn the_seed_decides_and_the_number_of_threads_does_not() {
+    let mesh = joined(&bar(), &moved(&cylinder(0.02, 0.1, 24), |p| p + 0.06 * DVec3::Z));
+    let run = |threads, seed| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = GraspSettings { seed, ..few(80) };
+        pool.install(|| search(&mesh, &Scene::new(), &settings))
+    };
+    let (one, three, other) = (run(1, 7), run(3, 7), run(1, 8));
+    assert_eq!(one.grasps, three.grasps);
+    assert_eq!(one.rejected, three.rejected);
+    assert!(one.grasps != other.grasps);
+}
+
+#[test]
+fn a_cancelled_search_stops() {
+    let object = GraspObject::from_mesh(&bar(), 1.0).unwrap();
+    let (region, task) = (vec![1.0; object.n_weights()], Task::default());
+    task.cancel();
+    let settings = GraspSettings::default();
+    let found = find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task);
+    assert!(matches!(found, Err(crate::Error::Geom(semfm_geom::Error::Cancelled))));
+}
+
+#[test]
+fn every_animal_of_the_zoo_is_searched_at_every_size() {
+    for (name, mesh) in zoo::all() {
+        for size in [1e-4, 0.03, 0.1, 100.0] {
+            let scale = size / mesh.diagonal();
+            let object = GraspObject::from_mesh(&mesh, scale).unwrap();
+            let region = vec![1.0; object.n_weights()];
+            let task = Task::default();
+            let found = find_grasps_with(&object, &region, &hand(), &Scene::new(), &few(20), &task)
+                .unwrap();
+            assert_eq!(
+                found.rejected.total() + found.n_survivors,
+                found.n_candidates,
+                "{name} at {size} m"
+            );
+            assert!(found.n_survivors > 0 || found.n_candidates > 0);
+        }
+    }
+}
+
+#[test]
+fn a_thin_open_sheet_is_held_by_its_border() {
+    // 9 × 7 points of the zoo's grid, some 8 cm wide: no thickness and no inside.
+    let grid = zoo::open_grid(9, 7);
+    let sheet = moved(&grid, |p| 0.08 / grid.diagonal() * DVec3::new(p.x, p.y, 0.0));
+    let found = search(&sheet, &Scene::new(), &few(200));
+    assert!(!found.grasps.is_empty(), "{:?}", found.rejected.iter().collect::<Vec<_>>());
+    assert!(found.grasps.iter().all(|g| g.closing().z.abs() > 0.88));
+}
+
+/// A rotation from three angles.
+fn random_rotation(a: f64, b: f64, c: f64) -> Rotation {
+    DQuat::from_euler(glam::EulerRot::XYZ, a, b, c)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4))]
+
+    #[test]
+    fn examined_grasps_move_with_the_object(
+        a in -3.0..3.0f64, b in -1.5..1.5f64, c in -3.0..3.0f64, shift in -0.5..0.5f64,
+    ) {
+        let motion = Pose::from_parts(DVec3::new(shift, -0.3, 0.2), random_rotation(a, b, c));
+        let object = GraspObject::from_mesh(&bar(), 1.0).unwrap();
+        let turned = GraspObject::from_mesh(&moved(&bar(), |p| motion * p), 1.0).unwrap();
+        let region = vec![1.0; object.n_weights()];
+        let poses: Vec<(Pose, f64)> = (0..40)
+            .map(|i| {
+                let t = f64::from(i);
+                let about = random_rotation(0.4 * t.sin(), 0.1 * t.cos(), 0.2 * (2.0 * t).sin());
+                (Pose::from_parts(DVec3::new(0.08 * t.cos(), 0.003 * t.sin(), 0.02 * (3.0 * t).cos()), about), 0.08)
+            })
+            .collect();
+        let moved_poses: Vec<(Pose, f64)> =
+            poses.iter().map(|(pose, width)| (motion * *pose, *width)).collect();
+        let (settings, hand, scene) = (GraspSettings::default(), hand(), Scene::new());
+        let here = examine_poses(&object, &region, &hand, &scene, &settings, &poses).unwrap();
+        let there = examine_poses(&turned, &region, &hand, &scene, &settings, &moved_poses).unwrap();
+        let mut good = 0;
+        for (here, there) in here.iter().zip(&there) {
+            prop_assert_eq!(here.is_ok(), there.is_ok());
+            if let (Ok(here), Ok(there)) = (here, there) {
+                good += 1;
+                let expected = motion * here.object_from_tcp;
+                let (translation, rotation) = hand_distance(&expected, &there.object_from_tcp);
+                prop_assert!(translation < 1e-7 && rotation < 1e-6);
+                prop_assert!((here.width - there.width).abs() < 1e-9);
+                prop_assert!((here.score - there.score).abs() < 1e-3);
+            }
+        }
+        prop_assert!(good >= 3, "{} of 40", good);
+    }
+
+    #[test]
+    fn a_turned_object_has_as_good_grasps(a in -3.0..3.0f64, b in -1.5..1.5f64, c in -3.0..3.0f64) {
+        let turn = random_rotation(a, b, c);
+        let here = search(&bar(), &Scene::new(), &few(60));
+        let there = search(&moved(&bar(), |p| turn * p), &Scene::new(), &few(60));
+        prop_assert!((here.grasps[0].score - there.grasps[0].score).abs() < 0.1);
+    }
+
+    #[test]
+    fn an_object_in_other_units_has_the_same_grasps(scale in 0.01..1000.0f64) {
+        let settings = few(30);
+        let in_metres = search(&bar(), &Scene::new(), &settings);
+        let object = GraspObject::from_mesh(&moved(&bar(), |p| p / scale), scale).unwrap();
+        let region = vec![1.0; object.n_weights()];
+        let task = Task::default();
+        let scaled =
+            find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task).unwrap();
+        prop_assert!((in_metres.grasps[0].score - scaled.grasps[0].score).abs() < 0.05);
+        prop_assert!((in_metres.n_candidates as f64 / scaled.n_candidates as f64 - 1.0).abs() < 0.1);
+    }
+}

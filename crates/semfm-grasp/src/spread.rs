@@ -1,0 +1,87 @@
+//! Neighbours of grasps: where one hand fits, one a little beside it often does.
+
+use parry3d_f64::math::{Pose, Rotation};
+use semfm_geom::math::{DQuat, DVec3};
+
+use crate::candidate::Candidate;
+use crate::grasp::Grasp;
+use crate::select::hand_distance;
+use crate::settings::Separation;
+
+/// Neighbours are this much farther away than two grasps must be, so that rounding does not merge
+/// them.
+const BEYOND: f64 = 1.02;
+
+/// Poses around each grasp of `frontier` that are nobody's neighbour in `kept` nor each other's: a
+/// step of the separation along both axes that closing leaves free, and about all three.
+pub(crate) fn neighbours(
+    frontier: &[Grasp],
+    kept: &[Grasp],
+    separation: Separation,
+) -> Vec<Candidate> {
+    let (step, turn) = (BEYOND * separation.translation, BEYOND * separation.rotation);
+    let moves: Vec<Pose> = [-1.0, 1.0]
+        .into_iter()
+        .flat_map(|sign| {
+            [
+                Pose::from_translation(sign * step * DVec3::X),
+                Pose::from_translation(sign * step * DVec3::Z),
+                turned(sign * turn, DVec3::Y),
+                turned(sign * turn, DVec3::X),
+                turned(sign * turn, DVec3::Z),
+            ]
+        })
+        .collect();
+    let mut proposed: Vec<Candidate> = Vec::new();
+    for grasp in frontier {
+        let seed = [-grasp.width / 2.0, grasp.width / 2.0];
+        for motion in &moves {
+            let tcp = grasp.object_from_tcp * *motion;
+            let taken = |other: &Pose| {
+                other.translation.distance_squared(tcp.translation) < separation.translation.powi(2)
+                    && hand_distance(other, &tcp).1 < separation.rotation
+            };
+            let known = kept.iter().any(|g| taken(&g.object_from_tcp));
+            if !known && !proposed.iter().any(|candidate| taken(&candidate.tcp)) {
+                proposed.push(Candidate { tcp, seed });
+            }
+        }
+    }
+    proposed
+}
+
+fn turned(angle: f64, axis: DVec3) -> Pose {
+    let rotation: Rotation = DQuat::from_axis_angle(axis, angle);
+    Pose::from_parts(DVec3::ZERO, rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_keep_their_distance_from_all() {
+        let grasp = |x: f64| Grasp {
+            object_from_tcp: Pose::from_translation(DVec3::X * x),
+            width: 0.02,
+            opening: 0.08,
+            contacts: [DVec3::ZERO; 2],
+            normals: [DVec3::NEG_Y, DVec3::Y],
+            epsilon: 0.0,
+            score: 1.0,
+            terms: Vec::new(),
+        };
+        let separation = Separation { translation: 0.01, rotation: 0.25 };
+        let alone = [grasp(0.0)];
+        assert_eq!(neighbours(&alone, &alone, separation).len(), 10);
+        let two = [grasp(0.0), grasp(0.0103)];
+        let found = neighbours(&two, &two, separation);
+        assert!(found.len() < 20);
+        for candidate in &found {
+            for other in &two {
+                let (translation, rotation) = hand_distance(&other.object_from_tcp, &candidate.tcp);
+                assert!(translation >= 0.01 || rotation >= 0.25);
+            }
+        }
+    }
+}
