@@ -121,12 +121,12 @@ fn is_urdf(path: &Path) -> bool {
     }
     MeshFormat::from_path(path).is_none() && {
         let mut start = Vec::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(64).read_to_end(&mut start))
-            .is_ok_and(|_| {
+        std::fs::File::open(path).and_then(|file| file.take(64).read_to_end(&mut start)).is_ok_and(
+            |_| {
                 let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
                 text.starts_with(b"<?xml") || text.starts_with(b"<robot")
-            })
+            },
+        )
     }
 }
 
@@ -148,9 +148,7 @@ fn is_mcap(path: &Path) -> bool {
     }
     let mut start = [0; 8];
     MeshFormat::from_path(path).is_none()
-        && std::fs::File::open(path)
-            .and_then(|mut file| file.read_exact(&mut start))
-            .is_ok()
+        && std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok()
         && start == *b"\x89MCAP0\r\n"
 }
 
