@@ -40,14 +40,14 @@ fn draw(hand: &Gripper) -> Result<String, std::fmt::Error> {
         height
     )?;
     let (closed, open) = (*hand.opening.start(), *hand.opening.end());
+    writeln!(svg, r##"<text x="14" y="{}">{}</text>"##, height - 14.0, escaped(&hand.name))?;
     let views = [(closed, true), (open, true), (closed, false), (open, false)];
     for (panel, (opening, front)) in views.into_iter().enumerate() {
         let across = if front { "y" } else { "x" };
         writeln!(
             svg,
-            r##"<g transform="translate({} 0)"><text x="14" y="26">{}: {:.1} mm ({across} right, z up)</text>"##,
+            r##"<g transform="translate({} 0)"><text x="14" y="26">{:.1} mm apart ({across} right, z up)</text>"##,
             panel as f64 * width,
-            hand.name,
             opening * 1e3
         )?;
         for (pose, part) in hand.parts_at(opening) {
@@ -57,6 +57,11 @@ fn draw(hand: &Gripper) -> Result<String, std::fmt::Error> {
         svg.push_str("</g>\n");
     }
     Ok(svg + "</svg>\n")
+}
+
+/// A name from a file, as text of an XML file.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 /// A part's silhouette: the hull of its projected corners.
