@@ -95,8 +95,13 @@ fn fault(expected: &str, disputed: bool, told: &Answer) -> Option<String> {
     }
     // Where one plain count is expected, it is this one.
     let plain = accepted && !expected.contains('[') && !expected.contains(" or ");
-    let counts = [("v=", "n_vertices"), ("f=", "n_faces"), ("tri=", "n_triangles"),
-        ("links=", "links"), ("joints=", "joints")];
+    let counts = [
+        ("v=", "n_vertices"),
+        ("f=", "n_faces"),
+        ("tri=", "n_triangles"),
+        ("links=", "links"),
+        ("joints=", "joints"),
+    ];
     let list = |field: &str| report[field].as_array().map_or(0, Vec::len);
     if expected.contains("tree check reports") && list("tree") == 0 {
         return Some(format!("the tree check reports nothing: {report}"));

@@ -163,11 +163,8 @@ fn what_is_no_gripper_says_so() {
     );
     // Both fingers move the same way: they never close.
     let same = two_fingers("").replace(r#"<axis xyz="0 -1 0"/>"#, r#"<axis xyz="0 1 0"/>"#);
-    let same = same.replace("</joint>", "</joint>").replacen(
-        r#"<limit lower="0" upper="0.03""#,
-        r#"<limit lower="0" upper="0.02""#,
-        1,
-    );
+    let same =
+        same.replacen(r#"<limit lower="0" upper="0.03""#, r#"<limit lower="0" upper="0.02""#, 1);
     // Pads that miss each other.
     let aside = two_fingers("").replacen("0 0.005 0.02", "0.05 0.005 0.02", 1);
     for text in [one, same, aside, "<robot name=\"none\"><link name=\"l\"/></robot>".into()] {
@@ -282,10 +279,12 @@ fn nothing_of_the_hand_reaches_between_open_pads() {
         let hand = load(&text).unwrap();
         for share in [0.1, 0.5, 1.0] {
             let width = share * hand.opening.end();
-            let half = DVec3::new(hand.pad[0], width - 1e-5, hand.pad[1]) / 2.0;
+            let half = (DVec3::new(hand.pad[0], width, hand.pad[1]) - DVec3::splat(1e-5)) / 2.0;
             for (pose, part) in hand.parts_at(width) {
                 let gap = Cuboid::new(half);
-                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap).unwrap();
+                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
+                    .unwrap()
+                    .intersecting;
                 assert!(!hit, "{} at {width}", part.link);
             }
         }

@@ -119,7 +119,9 @@ fn the_space_between_open_pads_is_free() {
             let half = DVec3::new(hand.pad[0], width - 1e-4, hand.pad[1]) / 2.0;
             let gap = Cuboid::new(half);
             for (pose, part) in hand.parts_at(width) {
-                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap).unwrap();
+                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
+                    .unwrap()
+                    .intersecting;
                 assert!(!hit, "{}: {} at {width}", published.builtin, part.link);
             }
         }

@@ -162,10 +162,9 @@ impl Parallelogram {
     fn finger(&self, role: Role) -> Vec<Part> {
         let [pad_x, pad_z] = self.pad.map(|side| side / 2.0);
         let foot = -self.rise;
-        // The pad, its carrier behind it, and the block at the finger's joints.
+        // The pad and the block at the finger's joints.
         let boxes = [
             ("pad", [-pad_x, 0.0, -pad_z], [pad_x, 0.008, pad_z]),
-            ("finger", [-0.0075, 0.008, foot + 0.012], [0.0075, 0.0145, pad_z * 0.6]),
             ("finger", [-0.0075, 0.002, foot - 0.006], [0.0075, self.inset + 0.006, foot + 0.012]),
         ];
         let mut parts: Vec<Part> = boxes
@@ -177,6 +176,15 @@ impl Parallelogram {
                 })
             })
             .collect();
+        // The finger leans from its joint to the back of the pad and keeps its direction.
+        let (shape, lean) = bar(
+            DVec2::new(self.inset - 0.003, foot),
+            DVec2::new(0.011, pad_z * 0.6),
+            [0.015, 0.012],
+        );
+        parts.push(mirrored("finger", role, shape, self.widths(), |width| {
+            Pose::from_translation(DVec3::Y * width / 2.0) * lean
+        }));
         let open = self.angle(self.stroke);
         let tip = DVec2::from_angle(std::f64::consts::FRAC_PI_2 - open) * self.length;
         let bars = [
@@ -184,22 +192,26 @@ impl Parallelogram {
             ("outer_finger", self.pivot, self.elbow, tip, [0.027, 0.014]),
             ("inner_knuckle", self.inner_pivot, DVec2::ZERO, tip, [0.039, 0.012]),
         ];
-        for (link, pivot, from, to, [across, thick]) in bars {
-            let along = to - from;
-            let shape = SharedShape::cuboid(across / 2.0, thick / 2.0, along.length() / 2.0);
-            let middle = (from + to) / 2.0;
-            // A turn about x by φ takes z towards −y.
-            let lie = DQuat::from_rotation_x(-along.x.atan2(along.y));
-            let bar = Pose::from_parts(DVec3::new(0.0, middle.x, middle.y), lie);
+        for (link, pivot, from, to, section) in bars {
+            let (shape, lie) = bar(from, to, section);
             parts.push(mirrored(link, role, shape, self.widths(), |width| {
                 let angle = self.angle(width);
                 let turn = DQuat::from_rotation_x(open - angle);
                 let at = DVec3::new(0.0, pivot.x, pivot.y - self.height(angle));
-                Pose::from_parts(at, turn) * bar
+                Pose::from_parts(at, turn) * lie
             }));
         }
         parts
     }
+}
+
+/// A bar between two points of the plane of y and z, so wide along x and so thick.
+fn bar(from: DVec2, to: DVec2, [wide, thick]: [f64; 2]) -> (SharedShape, Pose) {
+    let (along, middle) = (to - from, (from + to) / 2.0);
+    // A turn about x by φ takes z towards −y.
+    let lie = DQuat::from_rotation_x(-along.x.atan2(along.y));
+    let shape = SharedShape::cuboid(wide / 2.0, thick / 2.0, along.length() / 2.0);
+    (shape, Pose::from_parts(DVec3::new(0.0, middle.x, middle.y), lie))
 }
 
 /// A part of the right finger, or its mirror image for the left: boxes are their own mirror images,

@@ -197,7 +197,7 @@ mod tests {
         let mut least = f64::INFINITY;
         for (left, a) in of(Role::Left) {
             for (right, b) in of(Role::Right) {
-                least = least.min(distance(left, &*a.shape, right, &*b.shape).unwrap());
+                least = least.min(distance(left, &*a.shape, right, &*b.shape).unwrap().distance);
             }
         }
         least
@@ -260,7 +260,7 @@ mod tests {
             let half = Vector::new(hand.pad[0] / 2.0, width / 2.0 - 1e-5, hand.pad[1] / 2.0);
             let gap = Cuboid::new(half);
             for (pose, part) in hand.parts_at(width) {
-                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap).unwrap();
+                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap).unwrap().intersecting;
                 prop_assert!(!hit, "{}: {} at {width}", hand.name, part.link);
             }
         }

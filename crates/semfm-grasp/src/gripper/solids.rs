@@ -237,7 +237,7 @@ mod tests {
         for part in &parts {
             let hit =
                 parry3d_f64::query::intersection_test(&Pose::IDENTITY, &**part, &middle, &probe);
-            assert!(!hit.unwrap());
+            assert!(!hit.unwrap().intersecting);
         }
     }
 

@@ -1,6 +1,6 @@
 //! A robot as a kinematic tree: rigid links, joints with limits, and where each link is.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
 use glam::EulerRot;
 use parry3d_f64::math::Pose;
@@ -207,12 +207,12 @@ pub(crate) fn build(robot: &urdf_rs::Robot) -> Result<Robot, Fault> {
 
 /// Joints so that each comes after the one that leads to its parent.
 fn outwards(root: usize, ends: &[(usize, usize)]) -> Vec<usize> {
-    let (mut order, mut front) = (Vec::new(), vec![root]);
-    while let Some(link) = front.pop() {
+    let (mut order, mut front) = (Vec::new(), VecDeque::from([root]));
+    while let Some(link) = front.pop_front() {
         for (joint, &(parent, child)) in ends.iter().enumerate() {
             if parent == link {
                 order.push(joint);
-                front.push(child);
+                front.push_back(child);
             }
         }
     }
