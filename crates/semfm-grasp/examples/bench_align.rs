@@ -89,8 +89,10 @@ fn pose(text: &str) -> Result<Option<Sim3>> {
     if text == "-" {
         return Ok(None);
     }
-    let numbers: Vec<f64> = text.split_whitespace().map(str::parse).collect::<std::result::Result<_, _>>()?;
-    let rows: Vec<[f64; 4]> = numbers.chunks_exact(4).filter_map(|row| row.try_into().ok()).collect();
+    let numbers: Vec<f64> =
+        text.split_whitespace().map(str::parse).collect::<std::result::Result<_, _>>()?;
+    let rows: Vec<[f64; 4]> =
+        numbers.chunks_exact(4).filter_map(|row| row.try_into().ok()).collect();
     let rows = rows.try_into().map_err(|_| format!("expected sixteen numbers, found `{text}`"))?;
     Ok(Some(Sim3::from_rows(rows)?))
 }

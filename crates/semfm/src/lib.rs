@@ -33,7 +33,6 @@ pub use semfm_views as views;
 
 pub mod aligned;
 mod error;
-
 pub mod observed;
 pub mod output;
 pub mod picture;

@@ -123,7 +123,10 @@ impl MeshName {
     }
 
     /// Place, expected and found of the first disagreement.
-    pub(crate) fn check(&self, mesh: &Mesh) -> std::result::Result<(), (&'static str, String, String)> {
+    pub(crate) fn check(
+        &self,
+        mesh: &Mesh,
+    ) -> std::result::Result<(), (&'static str, String, String)> {
         let counts = [
             ("mesh.n_vertices", self.n_vertices, mesh.n_vertices(), "vertices"),
             ("mesh.n_triangles", self.n_triangles, mesh.n_faces(), "triangles"),

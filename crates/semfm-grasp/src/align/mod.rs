@@ -288,7 +288,11 @@ impl AlignSettings {
                 && init.translation.is_finite()
                 && init.rotation.is_normalized())
         {
-            return refuse("initial pose", "a positive scale and finite numbers", format!("{init:?}"));
+            return refuse(
+                "initial pose",
+                "a positive scale and finite numbers",
+                format!("{init:?}"),
+            );
         }
         if !(1..=100_000).contains(&self.n_starts) {
             return refuse("starts", "1 to 100000", self.n_starts.to_string());

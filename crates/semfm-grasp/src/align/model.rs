@@ -132,7 +132,9 @@ mod tests {
                 .collect();
             Mesh::new(sphere.vertices().to_vec(), faces).unwrap()
         };
-        for (mesh, both_sides) in [(turned(usize::MAX), false), (turned(1), false), (turned(2), true)] {
+        for (mesh, both_sides) in
+            [(turned(usize::MAX), false), (turned(1), false), (turned(2), true)]
+        {
             // `turned(usize::MAX)` turns the first triangle only.
             let model = AlignModel::new(&mesh, 0, &Task::default()).unwrap();
             assert_eq!(model.both_sides, both_sides);

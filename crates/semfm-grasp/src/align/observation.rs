@@ -92,8 +92,7 @@ impl Observation {
     ) -> Result<Self> {
         check(points)?;
         let thinned = thin(points, N_POINTS);
-        let middle: DVec3 =
-            thinned.iter().map(|p| p.point).sum::<DVec3>() / thinned.len() as f64;
+        let middle: DVec3 = thinned.iter().map(|p| p.point).sum::<DVec3>() / thinned.len() as f64;
         if !viewpoint.is_finite() || middle.distance(viewpoint) <= 0.0 {
             let expected = "a finite place apart from the points".into();
             let found = viewpoint.to_string();
@@ -151,7 +150,8 @@ fn check(points: &[DVec3]) -> Result<()> {
         return Err(Error::OutOfRange { what: "observed cloud", expected, found });
     }
     if let Some(id) = points.iter().position(|p| !p.is_finite()) {
-        let (expected, found) = ("finite coordinates".into(), format!("{} at point {id}", points[id]));
+        let (expected, found) =
+            ("finite coordinates".into(), format!("{} at point {id}", points[id]));
         return Err(Error::OutOfRange { what: "observed cloud", expected, found });
     }
     Ok(())

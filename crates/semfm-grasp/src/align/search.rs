@@ -155,9 +155,7 @@ impl Problem<'_> {
         match &self.observed.evidence {
             Evidence::Sight(sight) => sight.compare(self.model, pose, tolerance, every, exact),
             Evidence::AllAround { index, spacing } => {
-                let near = |point: DVec3| {
-                    index.nearest(pose.apply(point)).1 <= tolerance + spacing
-                };
+                let near = |point: DVec3| index.nearest(pose.apply(point)).1 <= tolerance + spacing;
                 let samples = self.model.samples.iter().step_by(3 * every);
                 let mut seen = Seen::default();
                 samples.for_each(|s| match near(s.point) {
@@ -187,7 +185,8 @@ impl Problem<'_> {
     /// about its axis is no rival.
     fn best_and_rival(&self, found: Vec<Candidate>) -> Option<(Candidate, Option<Candidate>)> {
         let best = *found.first()?;
-        let elsewhere = |other: &&Candidate| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0;
+        let elsewhere =
+            |other: &&Candidate| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0;
         Some((best, found.iter().skip(1).find(elsewhere).copied()))
     }
 

@@ -94,8 +94,10 @@ impl Sight {
         };
         let (low, high) = ([0, 1].map(|k| border(k, 0.002)), [0, 1].map(|k| border(k, 0.998)));
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1e-9));
-        let n_cells = (points.len() as f64 / POINTS_PER_CELL).clamp(SIDE[0].powi(2), SIDE[1].powi(2));
-        sight.per_unit = (n_cells / (size[0] * size[1])).sqrt().min(4.0 * SIDE[1] / size[0].max(size[1]));
+        let n_cells =
+            (points.len() as f64 / POINTS_PER_CELL).clamp(SIDE[0].powi(2), SIDE[1].powi(2));
+        sight.per_unit =
+            (n_cells / (size[0] * size[1])).sqrt().min(4.0 * SIDE[1] / size[0].max(size[1]));
         sight.low = [0, 1].map(|k| low[k] - 1.0 / sight.per_unit);
         sight.side = size.map(|size| (size * sight.per_unit).ceil() as usize + 2);
         sight.object = vec![NOTHING; sight.side[0] * sight.side[1]];
@@ -162,9 +164,9 @@ impl Sight {
             if !shown || self.window.is_some_and(|w| outside(w, place)) {
                 continue;
             }
-            let ([near, far], context) = self.cell(uv).map_or((NOTHING, f32::INFINITY), |cell| {
-                (self.object[cell], self.context[cell])
-            });
+            let ([near, far], context) = self
+                .cell(uv)
+                .map_or((NOTHING, f32::INFINITY), |cell| (self.object[cell], self.context[cell]));
             let (near, far, context) = (f64::from(near), f64::from(far), f64::from(context));
             if z >= near - tolerance && z <= far + tolerance {
                 seen.explained += 1;

@@ -29,7 +29,8 @@ pub(super) fn rotations(n: usize) -> impl Iterator<Item = DQuat> {
 
 /// Small rotations around a guess, the guess itself left out.
 pub(super) fn rotations_nearby() -> impl Iterator<Item = DQuat> {
-    let axes = (0..27i32).map(|i| DVec3::from_array([i % 3, i / 3 % 3, i / 9].map(|x| f64::from(x - 1))));
+    let axes =
+        (0..27i32).map(|i| DVec3::from_array([i % 3, i / 3 % 3, i / 9].map(|x| f64::from(x - 1))));
     axes.filter_map(|axis| {
         let angle = match axis.length_squared() as i32 {
             1 => AROUND_INIT[0],
@@ -66,8 +67,7 @@ pub(super) fn fit_extent(
     let size = |extent: Extent| extent.size[..across].iter().map(|x| x * x).sum::<f64>().sqrt();
     let scale = size(here) / size(there);
     let axes = [sight.right, sight.down, sight.forward];
-    let offset: DVec3 =
-        (0..3).map(|k| (here.centre[k] - scale * there.centre[k]) * axes[k]).sum();
+    let offset: DVec3 = (0..3).map(|k| (here.centre[k] - scale * there.centre[k]) * axes[k]).sum();
     (scale.is_finite() && scale > 0.0).then_some(Sim3 { scale, rotation, translation: offset })
 }
 

@@ -91,8 +91,11 @@ impl Grid {
     }
 
     fn new(points: &[DVec3], edge: f64) -> Self {
-        let mut grid =
-            Self { cells: Vec::new(), ids: HashMap::default(), cell_of: Vec::with_capacity(points.len()) };
+        let mut grid = Self {
+            cells: Vec::new(),
+            ids: HashMap::default(),
+            cell_of: Vec::with_capacity(points.len()),
+        };
         for &point in points {
             let place = place(point, edge);
             let id = *grid.ids.entry(key(place)).or_insert_with(|| {
@@ -225,8 +228,11 @@ mod tests {
 
     #[test]
     fn a_thinned_sphere_is_even_and_knows_its_normals() {
-        let cloud: Vec<DVec3> =
-            sample_uniform(&zoo::icosphere(4), 20_000, 1).unwrap().iter().map(|s| s.point).collect();
+        let cloud: Vec<DVec3> = sample_uniform(&zoo::icosphere(4), 20_000, 1)
+            .unwrap()
+            .iter()
+            .map(|s| s.point)
+            .collect();
         let thinned = thin(&cloud, 800);
         assert_eq!(thinned.len(), 800);
         for p in &thinned {
