@@ -1,6 +1,6 @@
 """Alignment of meshes to partial clouds, beside Open3D's scaled ICP and small_gicp in the same run.
 
-    pip install numpy open3d==0.19.0 small_gicp==1.0.0
+    pip install numpy open3d==0.20.0 small_gicp==1.0.1
     cargo build --release -p semfm-grasp --example bench_align
     python bench/align.py DATA target/release/examples/bench_align [--objects train|test|all]
 
@@ -26,6 +26,8 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS")
 import numpy as np
 import open3d as o3d
 import small_gicp
+
+o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
 
 # Constants were tuned on the first list; the second was only ever measured.
 TRAIN = [
@@ -87,12 +89,8 @@ class Object:
         self.scene.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(mesh))
         o3d.utility.random.seed(0)
         self.samples = mesh.sample_points_uniformly(MODEL_SAMPLES)
-        self.samples.normals = o3d.utility.Vector3dVector()
-        mesh.compute_triangle_normals()
-        o3d.utility.random.seed(0)
-        self.samples = mesh.sample_points_uniformly(MODEL_SAMPLES, use_triangle_normal=True)
 
-    def view(self, rng):
+    def view(self, rng, clutter):
         """A random pose (camera from object) and the cloud of its visible side."""
         turn = random_rotation(rng)
         extent = self.scale * np.linalg.norm(self.mesh.get_axis_aligned_bounding_box().get_extent())
@@ -106,7 +104,13 @@ class Object:
         depth = self.scene.cast_rays(o3d.core.Tensor(cast))["t_hit"].numpy().astype(float)
         hit = np.isfinite(depth)
         depth = depth[hit] + rng.normal(scale=NOISE, size=hit.sum())
-        return truth, depth[:, None] * rays[hit]
+        cloud = depth[:, None] * rays[hit]
+        if clutter > 0:
+            # Points anywhere in a box half as large again as the cloud.
+            low, high = cloud.min(0), cloud.max(0)
+            n = int(len(cloud) * clutter / (1 - clutter))
+            cloud = np.concatenate([cloud, rng.uniform(low - 0.25 * (high - low), high + 0.25 * (high - low), (n, 3))])
+        return truth, cloud
 
     def perturbed(self, truth, level, rng):
         angle, factor, shift = LEVELS[level]
@@ -126,21 +130,20 @@ class Object:
 
 
 def open3d_observed_to_model(obj, cloud, init):
-    return np.linalg.inv(open3d_icp(thinned(cloud), obj.samples, np.linalg.inv(init), 0.0, obj))
+    # Distances are in the mesh's units here.
+    return np.linalg.inv(open3d_icp(thinned(cloud), obj.samples, np.linalg.inv(init), 1 / obj.scale))
 
 
 def open3d_model_to_observed(obj, cloud, init):
-    return open3d_icp(obj.samples, thinned(cloud), init, 0.0, obj)
+    return open3d_icp(obj.samples, thinned(cloud), init, 1.0)
 
 
 def thinned(cloud):
     return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud)).voxel_down_sample(VOXEL)
 
 
-def open3d_icp(source, target, init, _, obj):
+def open3d_icp(source, target, init, unit):
     """Scaled point-to-point ICP with a shrinking correspondence distance."""
-    scale = np.cbrt(np.linalg.det(init[:3, :3]))
-    unit = 1.0 if scale * obj.scale > 0.5 * obj.scale and source is obj.samples else 1 / obj.scale
     estimate = o3d.pipelines.registration.TransformationEstimationPointToPoint(True)
     criteria = o3d.pipelines.registration.ICPConvergenceCriteria(max_iteration=50)
     for distance in (0.05, 0.02, 0.01):
@@ -197,6 +200,7 @@ def main():
     parser.add_argument("--objects", choices=["train", "test", "all"], default="all")
     parser.add_argument("--views", type=int, default=4, help="views of each object")
     parser.add_argument("--levels", default="5,15,25,none")
+    parser.add_argument("--clutter", type=float, default=0.0, help="share of points that belong to nothing")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-peers", action="store_true")
     parser.add_argument("--failures", action="store_true", help="name the cases that ours fails")
@@ -205,7 +209,7 @@ def main():
     names = {"train": TRAIN, "test": TEST, "all": TRAIN + TEST}[options.objects]
     objects = [Object(options.data, name) for name in names]
     rng = np.random.default_rng(options.seed)
-    views = [(obj, *obj.view(rng)) for obj in objects for _ in range(options.views)]
+    views = [(obj, *obj.view(rng, options.clutter)) for obj in objects for _ in range(options.views)]
     sizes = [len(cloud) for _, _, cloud in views]
     print(f"{len(views)} views of {len(objects)} objects, {min(sizes)} to {max(sizes)} points")
     for level in options.levels.split(","):

@@ -303,7 +303,11 @@ fn fields(
         if !known || kinds[k].len() != 1 || counts[k] > 1 << 17 || names.len() > 1 << 10 {
             let found = format!("{} of {} bytes × {}", quote(kinds[k]), sizes[k], counts[k]);
             let expected = "types F (4 or 8 bytes), I or U (1, 2, 4 or 8)";
-            return Err(input.error(format!("line {line}, field {}", quote(name)), expected, found));
+            return Err(input.error(
+                format!("line {line}, field {}", quote(name)),
+                expected,
+                found,
+            ));
         }
         let name = String::from_utf8_lossy(name).into_owned();
         fields.push(Field { name, size: sizes[k], kind, count: counts[k], offset, column });

@@ -1,9 +1,10 @@
 //! How well the points determine the pose: noise, standard deviations, and what is not determined.
 
 use nalgebra::SymmetricEigen;
+use semfm_geom::math::DVec3;
 
 use super::sim3::Sim3;
-use super::solve::{Matching, Matrix7, Problem, Pull, geman_mcclure};
+use super::solve::{Matching, Matrix7, Problem, Pull, Vector7, geman_mcclure};
 
 /// What is left over at a pose, and what that means for it.
 #[derive(Clone, Copy, Debug)]
@@ -38,18 +39,58 @@ impl Certainty {
         });
         let share = weights / ids.len().max(1) as f64;
         let covariance = sandwich(a, b);
-        let largest = |at: usize| {
-            let block = covariance.fixed_view::<3, 3>(at, at).into_owned();
-            SymmetricEigen::new(block).eigenvalues.max().max(0.0).sqrt()
-        };
+        let turns = SymmetricEigen::new(covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        let shifts = SymmetricEigen::new(covariance.fixed_view::<3, 3>(3, 3).into_owned());
+        let variance = turns.eigenvalues.max();
+        let mut rotation_std = variance.max(0.0).sqrt();
+        if rotation_std > DOUBTED {
+            let axis = turns.eigenvectors.column(turns.eigenvalues.imax()).into_owned();
+            // What else moves along when the rotation does, at the least cost.
+            let along = covariance.fixed_view::<7, 3>(0, 0) * axis / variance;
+            rotation_std = rotation_std.max(measured_std(problem, pose, ids, width, &along));
+        }
         Self {
             residual_m: if weights > 0.0 { (squares / weights).sqrt() } else { f64::INFINITY },
             inlier_share: share,
             growth_std: covariance[(6, 6)].max(0.0).sqrt(),
-            rotation_std: largest(0),
-            position_std: pose.scale * largest(3),
+            rotation_std,
+            position_std: pose.scale * shifts.eigenvalues.max().max(0.0).sqrt(),
         }
     }
+}
+
+/// A standard deviation of the rotation (radians) above which the quadratic model of the cost is put
+/// to the test.
+const DOUBTED: f64 = 0.01;
+
+/// The standard deviation that the cost itself shows when the pose is moved by 10° along a
+/// direction (per radian). The triangles of a ball hold a rotation as if it were determined, for a
+/// degree or two; turned by more, the ball costs no more than before.
+fn measured_std(
+    problem: &Problem<'_>,
+    pose: &Sim3,
+    ids: &[u32],
+    width: f64,
+    along: &Vector7,
+) -> f64 {
+    const TURN: f64 = 0.17;
+    // The kernel is that many standard deviations of the noise wide.
+    let variance = (width / super::NOISE_WIDTH).powi(2);
+    let cost = |step: Vector7| {
+        let turn = DVec3::new(step[0], step[1], step[2]);
+        let shift = DVec3::new(step[3], step[4], step[5]);
+        let pose = pose.then_within(turn, shift, step[6]);
+        // A point without a match costs what the kernel costs far away.
+        let mut cost = width * width * ids.len() as f64;
+        problem.pulls(&pose, ids, width, Matching::Exact, |_, pull| {
+            cost -= width * width / (1.0 + pull.squared / (width * width));
+        });
+        cost
+    };
+    let here = cost(Vector7::zeros());
+    let least = cost(along * TURN).min(cost(-along * TURN));
+    let increase = ((least - here) / variance).max(0.0);
+    (TURN / increase.sqrt()).min(std::f64::consts::PI)
 }
 
 /// A⁻¹BA⁻¹ by A's eigenvectors; a direction that A does not see has a variance of at least 1 (a
