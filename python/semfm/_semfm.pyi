@@ -1806,7 +1806,7 @@ def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
     --------
     >>> import semfm, semfm.zoo
     >>> laplacian = semfm.laplacian(semfm.zoo.icosphere(2))
-    >>> abs(laplacian.stiffness.sum()) < 1e-9
+    >>> bool(abs(laplacian.stiffness.sum()) < 1e-9)
     True
     """
     ...
