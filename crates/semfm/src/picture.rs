@@ -70,7 +70,7 @@ pub fn write_picture(
 
 /// The three pictures of one object.
 fn row(mesh: &Mesh, weights: &[f64], places: &[[f32; 3]], task: &Task) -> Result<Vec<View>> {
-    let [best, other] = viewpoints(mesh, weights, task)?;
+    let [best, other] = viewpoints(mesh, weights, SIDE, task)?;
     let marked = weight_colors(weights);
     let light = RenderSettings::default();
     let mut pictures = render(mesh, &Paint::Vertices(&marked), &[best, other], &light, task)?;
@@ -78,10 +78,14 @@ fn row(mesh: &Mesh, weights: &[f64], places: &[[f32; 3]], task: &Task) -> Result
     Ok(pictures)
 }
 
-/// From where the region shows the most pixels, and the best view from another side.
-fn viewpoints(mesh: &Mesh, weights: &[f64], task: &Task) -> Result<[Camera; 2]> {
+/// From where the region shows the most pixels, and the best view from another side; both for
+/// pictures of `side` pixels.
+///
+/// # Errors
+/// Whatever rendering reports.
+pub fn viewpoints(mesh: &Mesh, weights: &[f64], side: u32, task: &Task) -> Result<[Camera; 2]> {
     let scouts = rig(mesh, &RigSettings { size: SCOUT, count: 24, ..Default::default() })?;
-    let full = rig(mesh, &RigSettings { size: SIDE, count: 24, ..Default::default() })?;
+    let full = rig(mesh, &RigSettings { size: side, count: 24, ..Default::default() })?;
     let views = render(mesh, &Paint::default(), &scouts, &RenderSettings::default(), task)?;
     let shown: Vec<usize> = views
         .iter()
