@@ -138,8 +138,11 @@ impl<'a> Album<'a> {
 
     /// Source and target of a row.
     pub fn pair(&self, row: &Row) -> Option<(&Subject, &Subject)> {
-        let find = |name| self.subjects.get(&(&*row.category, name));
-        Some((find(&*row.source)?, find(&*row.target)?))
+        let find = |name: &str| {
+            let found = self.subjects.iter().find(|(key, _)| **key == (&*row.category, name));
+            found.map(|(_, subject)| subject)
+        };
+        Some((find(&row.source)?, find(&row.target)?))
     }
 
     /// What each of the methods answered on the pair of `row`; empty where nobody kept it.

@@ -5,7 +5,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, svg};
+use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, inked, svg};
 use crate::report::palette::{EXTRA, QUOTED, RIGHT, SECOND, ink};
 use crate::table::number;
 
@@ -25,6 +25,13 @@ pub(in crate::report) struct Panel {
     pub model: Vec<(f64, f64)>,
     pub lead: Option<f64>,
     pub second: Option<f64>,
+}
+
+/// Where the value of a line is written.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Left,
+    Right,
 }
 
 /// What the vertical axis shows.
@@ -110,9 +117,9 @@ where
         .axis_desc_style(font(11.0))
         .draw()?;
     let across = [
-        (panel.quoted_semfm, QUOTED, (7, 5), HPos::Right),
-        (panel.second, SECOND, (2, 4), HPos::Left),
-        (panel.lead, RIGHT, (3, 4), HPos::Left),
+        (panel.quoted_semfm, QUOTED, (7, 5), Side::Right),
+        (panel.second, SECOND, (2, 4), Side::Left),
+        (panel.lead, RIGHT, (3, 4), Side::Left),
     ];
     for (value, color, (dash, gap), _) in across {
         let Some(value) = value else { continue };
@@ -130,18 +137,20 @@ where
         }
     }
     // Values of our lines stand at the left, the paper's at the right: they rarely meet there.
-    let height = f64::from(area.dim_in_pixel().1);
-    let mut taken: Vec<(i32, i32)> = Vec::new();
+    let apart = (APART * f64::from(area.dim_in_pixel().1)) as i32;
+    let base = area.get_base_pixel();
+    let mut taken: Vec<(Side, i32)> = Vec::new();
     for (value, color, _, side) in across {
         let Some(value) = value else { continue };
-        let (x, y) = chart.backend_coord(&(if side == HPos::Left { 0.62 } else { 6.4 }, value));
-        let side_id = i32::from(side == HPos::Left);
-        let gap = (APART * height) as i32;
-        let near = taken.iter().any(|&(s, other)| s == side_id && (other - y).abs() < gap);
+        let (place, horizontal) = match side {
+            Side::Left => (0.62, HPos::Left),
+            Side::Right => (6.4, HPos::Right),
+        };
+        let (x, y) = chart.backend_coord(&(place, value));
+        let near = taken.iter().any(|&(s, other)| s == side && (other - y).abs() < apart);
         let (vertical, shift) = if near { (VPos::Top, 3) } else { (VPos::Bottom, -3) };
-        taken.push((side_id, y));
-        let base = area.get_base_pixel();
-        let style = at(font(11.0).color(&ink(color)), side, vertical);
+        taken.push((side, y));
+        let style = at(inked(11.0, ink(color)), horizontal, vertical);
         area.draw_text(&scale.write(value), &style, (x - base.0, y - base.1 + shift))?;
     }
     Ok(())

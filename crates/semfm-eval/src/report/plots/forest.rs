@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{DrawError, GRID, SOFT_INK, TEXT_INK, at, font, svg};
+use super::{DrawError, GRID, SOFT_INK, TEXT_INK, at, font, inked, svg};
 use crate::report::palette::{RIGHT, ink};
 use crate::table::number;
 
@@ -61,9 +61,9 @@ pub(in crate::report) fn draw(lines: &[Line]) -> Result<String, DrawError> {
             }
             chart.draw_series([Circle::new((line.mean, y), 6, color.filled())])?;
             let (_, pixel) = chart.backend_coord(&(0.0, y));
-            let name = at(font(13.0).color(&color), HPos::Right, VPos::Center);
+            let name = at(inked(13.0, color), HPos::Right, VPos::Center);
             area.draw_text(&line.name, &name, (LEFT as i32 - 10, pixel))?;
-            let value = at(font(13.0).color(&color), HPos::Left, VPos::Center);
+            let value = at(inked(13.0, color), HPos::Left, VPos::Center);
             let x = (WIDTH - RIGHT_MARGIN) as i32 + 12;
             area.draw_text(&number(Some(line.mean), 3), &value, (x, pixel))?;
         }

@@ -35,7 +35,14 @@ fn svg(
 
 /// Text of so many pixels.
 fn font(pixels: f64) -> TextStyle<'static> {
-    (FONT, pixels * SVG_FONT_SCALE).into_font().color(&TEXT_INK)
+    inked(pixels, TEXT_INK)
+}
+
+/// Text of so many pixels in a colour.
+fn inked(pixels: f64, color: RGBColor) -> TextStyle<'static> {
+    let mut style = TextStyle::from((FONT, pixels * SVG_FONT_SCALE).into_font());
+    style.color = color.to_backend_color();
+    style
 }
 
 fn at(style: TextStyle<'static>, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
