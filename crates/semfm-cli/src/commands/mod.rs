@@ -3,7 +3,9 @@
 pub mod completions;
 pub mod demo;
 pub mod embed;
+pub mod eval;
 pub mod info;
+pub mod page;
 pub mod region;
 pub mod transfer;
 pub mod views;

@@ -1,0 +1,300 @@
+//! `semfm-cli eval`: how well regions are carried, measured.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::{ArgGroup, Args};
+use semfm::geom::ShapeCache;
+use semfm::geom::io::MeshFile;
+use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
+use semfm_eval::dataset::{Dataset, folder};
+use semfm_eval::embeddings::Embedded;
+use semfm_eval::workers::Workers;
+use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, report, table};
+use semfm_synth::Level;
+use serde_json::json;
+
+use super::Outcome;
+use super::embed::Encoder;
+use super::page::PageOptions;
+use crate::options::Common;
+use crate::talk;
+
+/// Measure how well regions are carried: every method, every ordered pair
+///
+/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region, or none with
+/// `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic", "report_only"]))]
+#[command(after_help = "Examples:\n  \
+    semfm-cli eval --synthetic -o report\n  \
+    semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
+    semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
+    Exit code 0: measured (failed pairs are told in the results). 2: bad input, or nothing could be measured.")]
+pub struct Evaluate {
+    /// Folder of labelled objects
+    dataset: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    #[command(flatten)]
+    synthetic: SyntheticOptions,
+    #[command(flatten)]
+    features: FeatureOptions,
+    #[command(flatten)]
+    methods: MethodOptions,
+    #[command(flatten)]
+    work: WorkOptions,
+    #[command(flatten)]
+    page: PageOptions,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Procedural objects")]
+struct SyntheticOptions {
+    /// Evaluate on procedural objects with a simulated encoder
+    #[arg(long)]
+    synthetic: bool,
+    /// How hard the simulated features are: easy, medium or hard
+    #[arg(long, requires = "synthetic", default_value_t = Level::Medium)]
+    level: Level,
+    /// Seeds of the objects: 0..2, or 0,3,7
+    #[arg(long, requires = "synthetic", default_value = "0..2", value_name = "SEEDS")]
+    seeds: Seeds,
+    /// Objects of each category and seed
+    #[arg(long, requires = "synthetic", default_value_t = 4, value_name = "N")]
+    objects: usize,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What the surfaces mean")]
+struct FeatureOptions {
+    /// Folder of `NAME.emb.mcap` [default: beside the meshes]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["encoder", "synthetic"])]
+    embeddings: Option<PathBuf>,
+    /// Make the embeddings: a Hugging Face name, a local checkpoint, or an ONNX encoder's JSON
+    #[arg(long, value_name = "MODEL", conflicts_with = "synthetic")]
+    encoder: Option<String>,
+    /// `fused`: give the published method our views and lifting instead of its own
+    #[arg(long, value_name = "METHOD", value_parser = ["fused", "semfm"])]
+    features: Option<String>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Methods")]
+struct MethodOptions {
+    /// Which methods, by comma [default: all: fused, anchored, sinkhorn, nearest, semfm+, semfm+image,
+    /// semfm, semfm-image, wks, oracle, whole]
+    #[arg(long, value_delimiter = ',', value_name = "A,B")]
+    methods: Vec<Candidate>,
+    /// Change a setting of a method, as fused.threshold=0.35 (repeatable)
+    #[arg(long, value_name = "METHOD.KEY=VALUE")]
+    set: Vec<Override>,
+    /// Seed of everything drawn by chance
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Simplify larger meshes to this many vertices; 0 keeps them all
+    #[arg(long, value_name = "N")]
+    working_vertices: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Work")]
+struct WorkOptions {
+    /// Pairs at once; 0 takes one for each thread. Results do not depend on it
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    jobs: usize,
+    /// Forget what an interrupted run left
+    #[arg(long)]
+    fresh: bool,
+    /// Do not keep the predictions, only their scores
+    #[arg(long)]
+    no_predictions: bool,
+    /// Neither use nor keep prepared shapes and embeddings
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl Evaluate {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        if self.page.report_only {
+            return self.page.again(&self.output, common);
+        }
+        let dataset = self.dataset()?;
+        let scratch = tempfile::tempdir().context("a folder for embeddings")?;
+        let encoder = self.features.encoder.as_deref().map(|model| Made {
+            model: model.to_owned(),
+            keep: !self.work.no_cache,
+            scratch: scratch.path(),
+            common: *common,
+        });
+        let embeddings = match &encoder {
+            Some(encoder) => EmbeddingSource::Encoder(encoder),
+            None => EmbeddingSource::Files(self.features.embeddings.clone()),
+        };
+        let settings = self.settings(common)?;
+        self.announce(&dataset, &settings, common);
+        let task = talk::watched_with_time_left(common.quiet);
+        let finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
+        if finished.resumed > 0 && !common.quiet {
+            talk::remark(format_args!("went on after {} pairs done before", finished.resumed));
+        }
+        let files = [
+            finished.results.write(&self.output)?,
+            table::write(&finished.results, &self.output)?,
+            report::write(&finished.results, &dataset, &self.output, &self.page.settings(), &task)?,
+        ];
+        let results = finished.close()?;
+        tell(&results, &files, common);
+        judge(&results, common)
+    }
+
+    fn dataset(&self) -> Result<Dataset> {
+        if let Some(path) = &self.dataset {
+            return Ok(folder::open(path)?);
+        }
+        let SyntheticOptions { level, ref seeds, objects, .. } = self.synthetic;
+        Ok(make(&SyntheticSettings { level, seeds: seeds.0.clone(), n_objects: objects })?)
+    }
+
+    fn settings(&self, common: &Common) -> Result<EvalSettings> {
+        let mut settings = EvalSettings {
+            overrides: self.methods.set.clone(),
+            seed: self.methods.seed,
+            workers: Workers::new(common.threads, self.work.jobs),
+            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            keep_predictions: !self.work.no_predictions,
+            fresh: self.work.fresh,
+            program: program()?,
+            ..EvalSettings::default()
+        };
+        if !self.methods.methods.is_empty() {
+            settings.candidates.clone_from(&self.methods.methods);
+        }
+        if self.features.features.as_deref() == Some("fused") {
+            let mut candidates: Vec<Candidate> = Vec::new();
+            for candidate in settings.candidates.iter().map(|c| c.with_our_features()) {
+                if !candidates.contains(&candidate) {
+                    candidates.push(candidate);
+                }
+            }
+            settings.candidates = candidates;
+        }
+        if let Some(n) = self.methods.working_vertices {
+            settings.shape.working_vertices = n;
+        }
+        Ok(settings)
+    }
+
+    fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
+        if !common.quiet {
+            talk::remark(format_args!(
+                "{} pairs of {} objects in {} groups, {} methods, {} at once",
+                dataset.n_pairs(),
+                dataset.objects.len(),
+                dataset.groups.len(),
+                settings.candidates.len(),
+                settings.workers.jobs,
+            ));
+        }
+    }
+}
+
+/// Hash of the running program: rows of another build are no rows of this one.
+fn program() -> Result<String> {
+    let path = std::env::current_exe().context("the path of this program")?;
+    let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    Ok(format!("{} {}", env!("CARGO_PKG_VERSION"), &blake3::hash(&bytes).to_hex()[..16]))
+}
+
+/// Seeds as a range or a list.
+#[derive(Clone, Debug)]
+struct Seeds(Vec<u64>);
+
+impl std::str::FromStr for Seeds {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let number = |text: &str| {
+            text.trim().parse::<u64>().map_err(|_| format!("expected 0..2 or 0,3,7, found {text}"))
+        };
+        let seeds: Vec<u64> = match text.split_once("..") {
+            Some((first, end)) => {
+                let (first, end) = (number(first)?, number(end)?);
+                if end.saturating_sub(first) > 10_000 {
+                    return Err(format!("expected at most 10000 seeds, found {text}"));
+                }
+                (first..end).collect()
+            }
+            None => text.split(',').map(number).collect::<std::result::Result<_, _>>()?,
+        };
+        if seeds.is_empty() {
+            Err(format!("expected at least one seed, found {text}"))
+        } else {
+            Ok(Self(seeds))
+        }
+    }
+}
+
+/// The sidecar as an encoder of the evaluation.
+struct Made<'a> {
+    model: String,
+    keep: bool,
+    scratch: &'a Path,
+    common: Common,
+}
+
+impl semfm_eval::Encoder for Made<'_> {
+    fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String> {
+        let make = || -> Result<Embedded> {
+            let encoder = Encoder::new(&self.model, rolls, self.keep, self.scratch)?;
+            // Several encoders at once would each take all cores.
+            let quiet = Common { quiet: true, ..self.common };
+            // All objects are shown in grey: colour on one side of a pair misleads.
+            let (file, took) = encoder.embed_timed(file, false, &quiet)?;
+            Ok(Embedded {
+                views: file.views,
+                encoder: file.metadata.encoder,
+                rolls: file.metadata.rolls,
+                views_ms: took.map(|took| took.views_ms),
+                embed_ms: took.map(|took| took.embed_ms),
+            })
+        };
+        make().map_err(|error| format!("{error:#}"))
+    }
+
+    fn identity(&self) -> String {
+        format!("encoder {}", self.model)
+    }
+}
+
+fn tell(results: &Results, files: &[PathBuf], common: &Common) {
+    if common.json {
+        talk::say(json!({
+            "n_rows": results.rows.len(),
+            "n_failed": results.rows.iter().filter(|row| row.failure.is_some()).count(),
+            "summaries": results.summaries,
+            "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+        }));
+        return;
+    }
+    talk::say(table::render(results));
+    talk::say("wrote");
+    files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
+}
+
+/// Failed rows are told; a run without a single score has failed.
+fn judge(results: &Results, common: &Common) -> Result<Outcome> {
+    let failed = results.rows.iter().filter(|row| row.failure.is_some()).count();
+    if results.rows.iter().all(|row| row.iou.is_none()) {
+        let first = results.rows.iter().find_map(|row| row.failure.as_ref());
+        bail!("no pair could be measured; the first: {}", first.map_or("no pair", |f| &f.text));
+    }
+    if failed > 0 && !common.quiet {
+        talk::remark(format_args!(
+            "{failed} of {} rows failed, see the results",
+            results.rows.len()
+        ));
+    }
+    Ok(Outcome::Done)
+}
