@@ -79,8 +79,11 @@ impl<'a> Context<'a> {
             }
             DatasetOrigin::Synthetic { level, seeds, n_objects } => format!(
                 "Procedural objects of six categories with simulated features of level {level} \
-                 ({n_objects} objects of each category for each of {} seeds)",
-                seeds.len()
+                 ({n_objects} objects of each category for {})",
+                match &seeds[..] {
+                    [seed] => format!("seed {seed}"),
+                    seeds => format!("each of {} seeds", seeds.len()),
+                }
             ),
         };
         let mut html = format!(

@@ -61,18 +61,26 @@ impl<'a> Chosen<'a> {
             let limit =
                 if method == context.lead { settings.leading_cards } else { settings.other_cards };
             if own.len() > limit {
-                left_out.push(format!("{limit} of {} for {method}", own.len()));
+                left_out.push((limit, method));
                 own.truncate(limit);
             }
             rows.extend(own);
         }
-        let left_out = match &left_out[..] {
-            [] => String::new(),
-            some => format!(
-                " To keep this page small it holds the worst {}; all scores are under “All pairs”, \
-                 all answers in the folder predictions.",
-                some.join(", ")
-            ),
+        let left_out = if left_out.is_empty() {
+            String::new()
+        } else {
+            let limits = [settings.leading_cards, settings.other_cards].into_iter().filter_map(|limit| {
+                let methods = left_out.iter().filter(|(own, _)| *own == limit).map(|(_, m)| *m);
+                let methods: Vec<&str> = methods.collect();
+                (!methods.is_empty()).then(|| format!("the worst {limit} of {}", methods.join(", ")))
+            });
+            let mut limits: Vec<String> = limits.collect();
+            limits.dedup();
+            format!(
+                " To keep this page small it holds {}; all scores are under “All pairs”, all answers in \
+                 the folder predictions.",
+                limits.join(" and ")
+            )
         };
         Self { rows, left_out }
     }

@@ -66,6 +66,8 @@ pub(super) struct Table {
     caption: String,
     head: Vec<String>,
     body: String,
+    /// Which columns hold numbers, as the first line has them.
+    numeric: Vec<bool>,
     n_lines: usize,
     sortable: bool,
 }
@@ -74,7 +76,7 @@ impl Table {
     /// A table of these columns, the first of which names the lines.
     pub fn new(caption: &str, head: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let head = head.into_iter().map(Into::into).collect();
-        Self { caption: caption.into(), head, body: String::new(), n_lines: 0, sortable: false }
+        Self { caption: caption.into(), head, body: String::new(), numeric: vec![], n_lines: 0, sortable: false }
     }
 
     /// Gives the columns buttons that sort by them.
@@ -101,7 +103,11 @@ impl Table {
             class_of(class),
             escape(name)
         );
+        let first = self.n_lines == 0;
         for cell in cells {
+            if first {
+                self.numeric.push(cell.class == "n");
+            }
             let value = cell.value.map_or_else(String::new, |v| format!(" data-v=\"{v}\""));
             let _ = write!(self.body, "<td{}{value}>{}</td>", class_of(cell.class), cell.html);
         }
@@ -116,8 +122,12 @@ impl Table {
 
     /// The element, in a frame that scrolls where the screen is narrower than the table.
     pub fn html(&self) -> String {
-        let head: String =
-            self.head.iter().map(|name| format!("<th scope=\"col\">{}</th>", escape(name))).collect();
+        let kinds = [false].iter().chain(&self.numeric).chain(std::iter::repeat(&false));
+        let heading = |(name, numeric): (&String, &bool)| {
+            let class = class_of(if *numeric { "n" } else { "" });
+            format!("<th scope=\"col\"{class}>{}</th>", escape(name))
+        };
+        let head: String = self.head.iter().zip(kinds).map(heading).collect();
         let class = if self.sortable { " class=\"sortable\"" } else { "" };
         format!(
             "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\

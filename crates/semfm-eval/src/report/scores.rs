@@ -1,8 +1,11 @@
 //! Every method on every group, intervals, and the other methods against the leading one.
 
+use std::collections::BTreeSet;
+
 use super::context::{Context, is_bound};
 use super::html::{Cell, Table, escape, plot};
 use super::plots::{DrawError, forest};
+use crate::row::Row;
 use crate::summary::Scope;
 use crate::table::number;
 
@@ -164,18 +167,17 @@ fn times(context: &Context<'_>) -> String {
     let rows = |method: &str| {
         context.rows_of(method).filter(|row| !row.stages_ms.is_empty()).collect::<Vec<_>>()
     };
-    let mut stages: Vec<&str> = Vec::new();
-    for row in &context.results.rows {
-        for stage in row.stages_ms.keys() {
-            if !stages.contains(&stage.as_str()) {
-                stages.push(stage);
-            }
-        }
-    }
+    let names = context.results.rows.iter().flat_map(|row| row.stages_ms.keys());
+    let names: BTreeSet<(bool, &str)> = names.map(|name| stage_of(name)).collect();
+    let stages: Vec<(bool, &str)> = names.into_iter().rev().collect(); // preparation first
     if stages.is_empty() {
         return String::new();
     }
-    let head = ["Method", "Matching", "Cold", "Whole"].into_iter().chain(stages.iter().copied());
+    let head = ["Method", "Matching", "Cold", "Whole"].map(str::to_owned);
+    let of_both = |&(both, name): &(bool, &str)| {
+        if both { format!("{name} (both)") } else { name.to_owned() }
+    };
+    let head = head.into_iter().chain(stages.iter().map(of_both));
     let mut table = Table::new("Median milliseconds", head).sortable();
     for &method in &context.methods {
         let rows = rows(method);
@@ -185,9 +187,13 @@ fn times(context: &Context<'_>) -> String {
         };
         let whole = s.median_paper_runtime.map(|seconds| 1e3 * seconds);
         let sums = [s.median_matching_ms, s.median_cold_ms, whole];
-        let of_stage = |stage: &&str| {
-            let mut values: Vec<f64> =
-                rows.iter().filter_map(|row| row.stages_ms.get(*stage).copied()).collect();
+        let of_stage = |stage: &(bool, &str)| {
+            let of_row = |row: &&Row| {
+                let parts = row.stages_ms.iter().filter(|(name, _)| stage_of(name) == *stage);
+                let parts: Vec<f64> = parts.map(|(_, ms)| *ms).collect();
+                (!parts.is_empty()).then(|| parts.iter().sum::<f64>())
+            };
+            let mut values: Vec<f64> = rows.iter().filter_map(of_row).collect();
             values.sort_by(f64::total_cmp);
             values.get(values.len() / 2).copied()
         };
@@ -199,8 +205,14 @@ fn times(context: &Context<'_>) -> String {
         escape(
             "Matching: from prepared objects to the region. Cold: from embeddings, nothing cached. \
              Whole: from meshes, views and encoder included, where the encoder was timed. Then each \
-             stage, both objects’ preparation on its own."
+             stage; “both” adds up source and target."
         ),
         table.html()
     )
+}
+
+/// Whether a stage is done for each of the objects, and its name.
+fn stage_of(name: &str) -> (bool, &str) {
+    let bare = name.strip_suffix("_source").or_else(|| name.strip_suffix("_target"));
+    (bare.is_some(), bare.unwrap_or(name))
 }

@@ -50,9 +50,7 @@ pub(super) fn categories(context: &Context<'_>, album: &Album<'_>, task: &Task) 
          worst.</p>\n",
         escape(context.lead)
     );
-    for (group, strip) in groups {
-        html += &format!("<h3>{}</h3>\n{strip}", escape(group));
-    }
+    html += &blocks(&groups);
     Ok(html)
 }
 
@@ -135,10 +133,16 @@ pub(super) fn wks(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Resu
         "<p>Functional maps from wave kernel signatures, the paper’s geometric baseline: the pair of each \
          group where it does worst.</p>\n",
     );
-    for (group, strip) in groups {
-        html += &format!("<h3>{}</h3>\n{strip}", escape(group));
-    }
+    html += &blocks(&groups);
     Ok(html)
+}
+
+/// One block for each group, side by side where there is room.
+fn blocks(groups: &[(&str, String)]) -> String {
+    let block = |(group, strip): &(&str, String)| {
+        format!("<div><h3>{}</h3>\n{strip}</div>\n", escape(group))
+    };
+    format!("<div class=\"sheets\">\n{}</div>\n", groups.iter().map(block).collect::<String>())
 }
 
 /// The leading method's row on the same pair.

@@ -12,8 +12,8 @@ use crate::table::number;
 /// Colour of the quoted model, as in the style sheet.
 const QUOTED_MODEL: [u8; 3] = [86, 180, 233];
 const SIZE: (u32, u32) = (960, 520);
-/// Labels closer than this share of a panel's height are moved apart.
-const APART: f64 = 0.085;
+/// Labels stand at least so many pixels below each other.
+const APART: i32 = 12;
 
 /// One category.
 pub(in crate::report) struct Panel {
@@ -25,13 +25,6 @@ pub(in crate::report) struct Panel {
     pub model: Vec<(f64, f64)>,
     pub lead: Option<f64>,
     pub second: Option<f64>,
-}
-
-/// Where the value of a line is written.
-#[derive(Clone, Copy, PartialEq)]
-enum Side {
-    Left,
-    Right,
 }
 
 /// What the vertical axis shows.
@@ -89,7 +82,7 @@ where
 {
     let mut chart = ChartBuilder::on(area)
         .margin(6)
-        .margin_right(14)
+        .margin_right(40)
         .caption(&panel.title, font(14.0))
         .x_label_area_size(34)
         .y_label_area_size(46)
@@ -117,11 +110,11 @@ where
         .axis_desc_style(font(11.0))
         .draw()?;
     let across = [
-        (panel.quoted_semfm, QUOTED, (7, 5), Side::Right),
-        (panel.second, SECOND, (2, 4), Side::Left),
-        (panel.lead, RIGHT, (3, 4), Side::Left),
+        (panel.quoted_semfm, QUOTED, (7, 5)),
+        (panel.second, SECOND, (2, 4)),
+        (panel.lead, RIGHT, (3, 4)),
     ];
-    for (value, color, (dash, gap), _) in across {
+    for (value, color, (dash, gap)) in across {
         let Some(value) = value else { continue };
         let style = ink(color).stroke_width(if color == RIGHT { 3 } else { 2 });
         chart.draw_series(dashes((0.5, value), (6.5, value), dash, gap, style))?;
@@ -136,22 +129,44 @@ where
             chart.draw_series(points.iter().map(mark))?;
         }
     }
-    // Values of our lines stand at the left, the paper's at the right: they rarely meet there.
-    let apart = (APART * f64::from(area.dim_in_pixel().1)) as i32;
+    let known = across.iter().filter_map(|&(value, color, _)| {
+        let value = value?;
+        let (x, y) = chart.backend_coord(&(6.5, value));
+        Some((y, x, scale.write(value), color))
+    });
+    let mut labels: Vec<_> = known.collect();
+    labels.sort_by_key(|label| label.0);
+    let heights = moved_apart(&labels.iter().map(|label| label.0).collect::<Vec<_>>());
     let base = area.get_base_pixel();
-    let mut taken: Vec<(Side, i32)> = Vec::new();
-    for (value, color, _, side) in across {
-        let Some(value) = value else { continue };
-        let (place, horizontal) = match side {
-            Side::Left => (0.62, HPos::Left),
-            Side::Right => (6.4, HPos::Right),
-        };
-        let (x, y) = chart.backend_coord(&(place, value));
-        let near = taken.iter().any(|&(s, other)| s == side && (other - y).abs() < apart);
-        let (vertical, shift) = if near { (VPos::Top, 3) } else { (VPos::Bottom, -3) };
-        taken.push((side, y));
-        let style = at(inked(11.0, ink(color)), horizontal, vertical);
-        area.draw_text(&scale.write(value), &style, (x - base.0, y - base.1 + shift))?;
+    for ((_, x, text, color), y) in labels.into_iter().zip(heights) {
+        let style = at(inked(11.0, ink(color)), HPos::Left, VPos::Center);
+        area.draw_text(&text, &style, (x - base.0 + 5, y - base.1))?;
     }
     Ok(())
+}
+
+/// Ascending heights, each at least [`APART`] below the one before, moved as a whole as little as
+/// needed.
+fn moved_apart(heights: &[i32]) -> Vec<i32> {
+    let mut moved: Vec<i32> = Vec::new();
+    for &height in heights {
+        moved.push(moved.last().map_or(height, |&above| height.max(above + APART)));
+    }
+    let excess: i32 = moved.iter().zip(heights).map(|(new, old)| new - old).sum();
+    let shift = excess / heights.len().max(1) as i32;
+    moved.into_iter().map(|height| height - shift).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_that_meet_are_moved_apart_and_others_stay() {
+        assert_eq!(moved_apart(&[10, 50, 90]), [10, 50, 90]);
+        let close = moved_apart(&[50, 51, 52]);
+        assert!(close.windows(2).all(|pair| pair[1] - pair[0] >= APART), "{close:?}");
+        assert!((close[1] - 51).abs() <= 1, "{close:?}");
+        assert_eq!(moved_apart(&[]), Vec::<i32>::new());
+    }
 }

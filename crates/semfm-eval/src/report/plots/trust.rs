@@ -30,7 +30,7 @@ pub(in crate::report) fn scatter(answers: &[Answer]) -> Result<String, DrawError
             match answer.verdict {
                 Some(Verdict::Check) => {
                     let style = ink(MISSED).mix(0.7).filled();
-                    chart.draw_series([TriangleMarker::new(point, 4, style)])?;
+                    chart.draw_series([TriangleMarker::new(point, 5, style)])?;
                 }
                 Some(Verdict::Refuse) => {
                     let style = ink(EXTRA).stroke_width(2);
