@@ -9,6 +9,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+/// Two or three objects, drawn again, give the same pairs over and over: an interval of no width.
+const LEAST_OBJECTS: usize = 4;
+
 /// How intervals are made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BootstrapSettings {
@@ -28,6 +31,8 @@ impl Default for BootstrapSettings {
 
 /// A weight for every pair in every resampling.
 pub struct PairDraws {
+    /// Whether there are objects enough to say anything.
+    enough: bool,
     level: f64,
     weights: Vec<Vec<f64>>,
 }
@@ -43,6 +48,7 @@ impl PairDraws {
                 objects.entry(object).or_insert(next);
             }
         }
+        let enough = groups.values().map(BTreeMap::len).sum::<usize>() >= LEAST_OBJECTS;
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let weights = (0..settings.draws)
             .map(|_| {
@@ -57,14 +63,14 @@ impl PairDraws {
                 pairs.iter().map(weigh).collect()
             })
             .collect();
-        Self { level: settings.level, weights }
+        Self { enough, level: settings.level, weights }
     }
 
-    /// The interval of a statistic that takes one weight per pair; none where too few resamplings
-    /// have the statistic at all.
+    /// The interval of a statistic that takes one weight per pair; none where there are fewer than
+    /// four objects, or half of the resamplings lack the statistic.
     pub fn interval(&self, statistic: impl Fn(&[f64]) -> Option<f64>) -> Option<[f64; 2]> {
         let mut values: Vec<f64> = self.weights.iter().filter_map(|w| statistic(w)).collect();
-        if values.len() * 2 < self.weights.len() || values.is_empty() {
+        if !self.enough || values.is_empty() || values.len() * 2 < self.weights.len() {
             return None;
         }
         values.sort_by(f64::total_cmp);

@@ -10,10 +10,12 @@
 pub mod actor;
 pub mod bootstrap;
 pub mod candidate;
+pub mod compare;
 pub mod dataset;
 pub mod embeddings;
 mod error;
 pub mod journal;
+pub mod matching;
 pub mod prediction;
 pub mod published;
 pub mod report;
@@ -23,6 +25,7 @@ pub mod run;
 pub mod summary;
 pub mod table;
 pub mod trust;
+pub mod vlm;
 pub mod workers;
 
 pub use candidate::{Candidate, Override};

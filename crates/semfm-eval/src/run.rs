@@ -12,7 +12,7 @@ use semfm::{Region, Task, TransferSettings};
 use crate::actor::{Actor, ObjectRow, Ready, Tried, Workshop, tried};
 use crate::bootstrap::BootstrapSettings;
 use crate::candidate::{Candidate, Features, Override};
-use crate::dataset::{Dataset, Group};
+use crate::dataset::{Dataset, DatasetOrigin, Group};
 use crate::embeddings::EmbeddingSource;
 use crate::journal::{DonePair, FORMAT, Journal, Line, RunIdentity};
 use crate::prediction::Predictions;
@@ -172,7 +172,10 @@ fn identity(
         format: FORMAT.into(),
         program: settings.program.clone(),
         dataset: dataset.hash.clone(),
-        embeddings: embeddings.identity(),
+        embeddings: match &dataset.origin {
+            DatasetOrigin::Synthetic { level, .. } => format!("the simulated encoder ({level})"),
+            DatasetOrigin::Folder { .. } => embeddings.identity(),
+        },
         methods: settings.candidates.iter().map(|c| c.name().to_owned()).collect(),
         settings: format!("seed {seed}, {shape:?}, changes {overrides:?}"),
     }
@@ -334,7 +337,7 @@ pub(crate) enum Answer {
     Everything(Region),
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
     fn carry(
         &self,
         candidate: Candidate,
@@ -349,14 +352,11 @@ impl Job<'_> {
             row.score(&everything, truth, areas)?;
             return Ok(Ok(Answer::Everything(everything)));
         };
-        let find = |ready: Option<&'_ Ready<'_>>| ready.is_some_and(|r| r.contains_key(&features));
-        if !find(self.source.1) || !find(self.target.1) {
-            return Ok(Err(Failure::new("object", "was not prepared")));
-        }
-        let (Some(a), Some(b)) = (self.source.1, self.target.1) else {
+        let by = |ready: Option<&'a Ready<'a>>| ready.and_then(|ready| ready.get(&features));
+        let (Some(a), Some(b)) = (by(self.source.1), by(self.target.1)) else {
             return Ok(Err(Failure::new("object", "was not prepared")));
         };
-        let ((a, a_ms), (b, b_ms)) = match (&a[&features], &b[&features]) {
+        let ((a, a_ms), (b, b_ms)) = match (a, b) {
             (Ok(a), Ok(b)) => (a, b),
             (Err(failure), _) | (_, Err(failure)) => return Ok(Err(failure.clone())),
         };

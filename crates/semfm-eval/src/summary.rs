@@ -353,7 +353,7 @@ mod tests {
         }
     }
 
-    /// Two categories, three objects and one: fused is better than nearest in the first.
+    /// Two categories, four objects and two: fused is better than nearest in the first.
     fn rows() -> Vec<Row> {
         let mut rows = Vec::new();
         for (i, pair) in [("a", "b"), ("a", "c"), ("b", "a"), ("b", "c"), ("c", "a"), ("c", "b")]

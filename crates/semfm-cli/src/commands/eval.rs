@@ -6,11 +6,13 @@ use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::geom::ShapeCache;
 use semfm::geom::io::MeshFile;
+use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
 use semfm_eval::embeddings::Embedded;
+use semfm_eval::matching::{self, MatchingDataset, MatchingSettings};
 use semfm_eval::workers::Workers;
-use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, report, table};
+use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, report, table, vlm};
 use semfm_synth::Level;
 use serde_json::json;
 
@@ -22,8 +24,9 @@ use crate::talk;
 
 /// Measure how well regions are carried: every method, every ordered pair
 ///
-/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region, or none with
-/// `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
+/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region; or a folder of
+/// sets with true correspondences (`SET/pairs.txt`, `SET/NAME.npz`), which point maps are measured
+/// on; or none with `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic", "report_only"]))]
 #[command(after_help = "Examples:\n  \
@@ -83,16 +86,20 @@ struct FeatureOptions {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Methods")]
 struct MethodOptions {
-    /// Which methods, by comma [default: all: fused, anchored, sinkhorn, nearest, semfm+, semfm+image,
-    /// semfm, semfm-image, wks, oracle, whole]
+    /// Which methods, by comma: fused, anchored, sinkhorn, nearest, semfm+, semfm+image, semfm,
+    /// semfm-image, wks, oracle, whole; for true correspondences wks, wks+zoomout, landmarks,
+    /// landmarks+zoomout, true20+zoomout [default: all]
     #[arg(long, value_delimiter = ',', value_name = "A,B")]
-    methods: Vec<Candidate>,
+    methods: Vec<String>,
     /// Change a setting of a method, as fused.threshold=0.35 (repeatable)
     #[arg(long, value_name = "METHOD.KEY=VALUE")]
     set: Vec<Override>,
     /// Seed of everything drawn by chance
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
+    /// Score a vision-language model's rows (`semfm.vlm/1`) beside the methods
+    #[arg(long, value_name = "ROWS.json")]
+    vlm: Option<PathBuf>,
     /// Simplify larger meshes to this many vertices; 0 keeps them all
     #[arg(long, value_name = "N")]
     working_vertices: Option<usize>,
@@ -104,6 +111,12 @@ struct WorkOptions {
     /// Pairs at once; 0 takes one for each thread. Results do not depend on it
     #[arg(long, default_value_t = 0, value_name = "N")]
     jobs: usize,
+    /// Say what changed since these results, worst first
+    #[arg(long, value_name = "OLD/results.json")]
+    compare: Option<PathBuf>,
+    /// For true correspondences: samples that an error is the mean of; 0 takes all
+    #[arg(long, default_value_t = MatchingSettings::default().n_samples, value_name = "N")]
+    samples: usize,
     /// Forget what an interrupted run left
     #[arg(long)]
     fresh: bool,
@@ -120,6 +133,11 @@ impl Evaluate {
         if self.page.report_only {
             return self.page.again(&self.output, common);
         }
+        if let Some(path) = self.dataset.as_deref().filter(|path| MatchingDataset::is_one(path)) {
+            return self.run_matching(path, common);
+        }
+        // What cannot be compared with should be known before the work is done.
+        let before = self.work.compare.as_deref().map(Results::read).transpose()?;
         let dataset = self.dataset()?;
         let scratch = tempfile::tempdir().context("a folder for embeddings")?;
         let encoder = self.features.encoder.as_deref().map(|model| Made {
@@ -135,17 +153,27 @@ impl Evaluate {
         let settings = self.settings(common)?;
         self.announce(&dataset, &settings, common);
         let task = talk::watched_with_time_left(common.quiet);
-        let finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
+        let vlm = self.methods.vlm.as_deref().map(|path| vlm::read(path, &dataset)).transpose()?;
+        let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
         if finished.resumed > 0 && !common.quiet {
             talk::remark(format_args!("went on after {} pairs done before", finished.resumed));
         }
-        let files = [
-            finished.results.write(&self.output)?,
-            table::write(&finished.results, &self.output)?,
-            report::write(&finished.results, &dataset, &self.output, &self.page.settings(), &task)?,
-        ];
+        if let Some(mut rows) = vlm {
+            if let Some(path) = self.methods.vlm.as_deref().filter(|_| !self.work.no_predictions) {
+                vlm::keep(path, &mut rows, &self.output)?;
+            }
+            finished.results = finished.results.with_rows(rows);
+        }
+        let results = &finished.results;
+        let mut files = vec![results.write(&self.output)?, table::write(results, &self.output)?];
+        let comparison = before.map(|before| Comparison::new(&before, results));
+        if let Some(comparison) = &comparison {
+            files.extend(comparison.write(&self.output)?);
+        }
+        let page = self.page.settings();
+        files.push(report::write(results, &dataset, &self.output, &page, &task)?);
         let results = finished.close()?;
-        tell(&results, &files, common);
+        tell(&results, comparison.as_ref(), &files, common);
         judge(&results, common)
     }
 
@@ -169,7 +197,7 @@ impl Evaluate {
             ..EvalSettings::default()
         };
         if !self.methods.methods.is_empty() {
-            settings.candidates.clone_from(&self.methods.methods);
+            settings.candidates = parsed(&self.methods.methods)?;
         }
         if self.features.features.as_deref() == Some("fused") {
             let mut candidates: Vec<Candidate> = Vec::new();
@@ -186,6 +214,50 @@ impl Evaluate {
         Ok(settings)
     }
 
+    /// Point maps on sets with true correspondences.
+    fn run_matching(&self, path: &Path, common: &Common) -> Result<Outcome> {
+        let SyntheticOptions { synthetic, .. } = self.synthetic;
+        let FeatureOptions { embeddings, encoder, features } = &self.features;
+        let unfit = [
+            ("--synthetic", synthetic),
+            ("--embeddings", embeddings.is_some()),
+            ("--encoder", encoder.is_some()),
+            ("--features", features.is_some()),
+            ("--set", !self.methods.set.is_empty()),
+            ("--vlm", self.methods.vlm.is_some()),
+            ("--compare", self.work.compare.is_some()),
+        ];
+        if let Some((name, _)) = unfit.iter().find(|(_, given)| *given) {
+            bail!("{name} has no meaning for true correspondences, which {} holds", path.display());
+        }
+        let dataset = MatchingDataset::open(path)?;
+        let mut settings = MatchingSettings {
+            n_samples: self.work.samples,
+            workers: Workers::new(common.threads, self.work.jobs),
+            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            ..MatchingSettings::default()
+        };
+        if !self.methods.methods.is_empty() {
+            settings.methods = parsed(&self.methods.methods)?;
+        }
+        let task = talk::watched_with_time_left(common.quiet);
+        let results = matching::run(&dataset, &settings, &task)?;
+        let mut files = results.write(&self.output)?;
+        files.push(report::matching::write(&results, &self.output)?);
+        if common.json {
+            let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+            talk::say(json!({ "summaries": results.summaries, "files": files }));
+        } else {
+            talk::say(matching::table::render(&results));
+            wrote(&files);
+        }
+        if results.rows.iter().all(|row| row.error.is_none()) {
+            let first = results.rows.iter().find_map(|row| row.failure.as_deref());
+            bail!("no map could be measured; the first: {}", first.unwrap_or("no pair"));
+        }
+        Ok(Outcome::Done)
+    }
+
     fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
         if !common.quiet {
             talk::remark(format_args!(
@@ -198,6 +270,11 @@ impl Evaluate {
             ));
         }
     }
+}
+
+/// Names of methods, read.
+fn parsed<T: std::str::FromStr<Err = semfm_eval::Error>>(names: &[String]) -> Result<Vec<T>> {
+    Ok(names.iter().map(|name| name.trim().parse()).collect::<Result<_, _>>()?)
 }
 
 /// Hash of the running program: rows of another build are no rows of this one.
@@ -268,17 +345,25 @@ impl semfm_eval::Encoder for Made<'_> {
     }
 }
 
-fn tell(results: &Results, files: &[PathBuf], common: &Common) {
+fn tell(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], common: &Common) {
     if common.json {
         talk::say(json!({
             "n_rows": results.rows.len(),
             "n_failed": results.rows.iter().filter(|row| row.failure.is_some()).count(),
             "summaries": results.summaries,
+            "comparison": comparison.map(|comparison| &comparison.methods),
             "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
         }));
         return;
     }
     talk::say(table::render(results));
+    if let Some(comparison) = comparison {
+        talk::say(comparison.render());
+    }
+    wrote(files);
+}
+
+fn wrote(files: &[PathBuf]) {
     talk::say("wrote");
     files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
 }

@@ -10,6 +10,7 @@ mod context;
 mod data_uri;
 mod gallery;
 mod html;
+pub mod matching;
 mod palette;
 mod pairs;
 mod paper;
@@ -80,6 +81,9 @@ pub fn write(
 /// # Errors
 /// As [`Results::read`] and [`write()`].
 pub fn again(folder: &Path, settings: &ReportSettings, task: &Task) -> Result<PathBuf> {
+    if let Some(results) = matching::read(folder)? {
+        return matching::write(&results, folder);
+    }
     let results = Results::read(folder)?;
     match Dataset::open(&results.about.origin) {
         Ok(dataset) => write(&results, &dataset, folder, settings, task),
@@ -124,6 +128,12 @@ fn page(
         ("gallery", "Gallery of pairs", gallery::body(context, album, settings, task)?),
         ("pairs", "All pairs", pairs::body(context)),
     ];
+    let head = context.head() + &album.missing();
+    Ok(shell("How well regions are carried over", &head, &album.shared_style(), &sections))
+}
+
+/// The document around some sections, of which empty ones are left out.
+fn shell(title: &str, head: &str, style: &str, sections: &[(&str, &str, String)]) -> String {
     let sections: Vec<_> = sections.iter().filter(|(_, _, body)| !body.is_empty()).collect();
     let links: String = sections
         .iter()
@@ -132,26 +142,21 @@ fn page(
     let bodies: String =
         sections.iter().map(|(id, title, body)| section(id, title, body)).collect();
     // The policy is the promise of this page: whatever is not in it is not loaded.
-    Ok(format!(
+    format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
          <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title}</title>\n<style>\n{style}{shared}</style>\n</head>\n<body>\n\
+         <title>{title}</title>\n<style>\n{}{style}</style>\n</head>\n<body>\n\
          <header>\n<h1>{title}</h1>\n{head}<nav aria-label=\"Contents\"><ul>{links}</ul></nav>\n\
-         {missing}</header>\n<main>\n{bodies}</main>\n\
-         <footer>Written by semfm {version} from <code>results.json</code>; \
-         <code>table.md</code> holds the same numbers as text.</footer>\n\
-         <script>\n{script}</script>\n</body>\n</html>\n",
-        title = "How well regions are carried over",
-        style = include_str!("style.css"),
-        shared = album.shared_style(),
-        head = context.head(),
-        missing = album.missing(),
-        version = env!("CARGO_PKG_VERSION"),
-        script = include_str!("page.js"),
-    ))
+         </header>\n<main>\n{bodies}</main>\n\
+         <footer>Written by semfm {} from <code>results.json</code>; <code>table.md</code> holds the \
+         same numbers as text.</footer>\n<script>\n{}</script>\n</body>\n</html>\n",
+        include_str!("style.css"),
+        env!("CARGO_PKG_VERSION"),
+        include_str!("page.js"),
+    )
 }
 
 #[cfg(test)]
@@ -182,15 +187,14 @@ mod tests {
     #[test]
     fn a_cancelled_task_writes_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let (results, task) = (some_results(), Task::default());
+        let (mut results, task) = (some_results(), Task::default());
         task.cancel();
-        let dataset = Dataset::open(&crate::dataset::DatasetOrigin::Synthetic {
+        let origin = crate::dataset::DatasetOrigin::Synthetic {
             level: "easy".into(),
             seeds: vec![0],
             n_objects: 2,
-        });
-        let mut results = results;
-        let dataset = dataset.unwrap();
+        };
+        let dataset = Dataset::open(&origin).unwrap();
         results.about.identity.dataset = dataset.hash.clone();
         let error =
             write(&results, &dataset, folder.path(), &ReportSettings::default(), &task).unwrap_err();
