@@ -40,15 +40,17 @@ addEventListener('load', () => {
     wks: choose('method', 'wks'), none: choose('words', 'no such object') };
   const images = [...document.querySelectorAll('img')];
   images.forEach((image) => { image.loading = 'eager'; });
-  Promise.all(images.map((image) => image.decode().then(() => null, () => image.alt))).then((broken) => {
+  setTimeout(() => {
+    const broken = images.filter((image) => !image.complete || !image.naturalWidth)
+      .map((image) => image.alt);
     document.getElementById('probe').textContent = JSON.stringify({
       up, down, gallery, count: controls.elements.count.value,
-      broken: broken.filter(Boolean), images: images.length,
+      broken, images: images.length,
       loaded: performance.getEntriesByType('resource').map((e) => e.name)
         .filter((name) => !name.startsWith('data:')),
       overflow: document.documentElement.scrollWidth - innerWidth,
     });
-  });
+  }, 5000);
 });
 </script>
 """

@@ -108,9 +108,9 @@ impl<'a> Context<'a> {
             let _ = write!(html, "<dt>{name}</dt><dd>{}</dd>", escape(value));
         }
         let bootstrap = &self.results.bootstrap;
-        let _ = write!(
+        let _ = writeln!(
             html,
-            "<dt>intervals</dt><dd>{:.0} %, objects resampled {} times</dd></dl></details>\n",
+            "<dt>intervals</dt><dd>{:.0} %, objects resampled {} times</dd></dl></details>",
             100.0 * bootstrap.level,
             bootstrap.draws
         );

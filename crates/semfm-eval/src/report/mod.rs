@@ -50,7 +50,7 @@ pub struct ReportSettings {
 impl Default for ReportSettings {
     /// Eleven methods on two hundred pairs make a page of some 10 MB.
     fn default() -> Self {
-        Self { picture_side: 180, leading_cards: 200, other_cards: 30, vlm_pictures: None }
+        Self { picture_side: 180, leading_cards: 240, other_cards: 30, vlm_pictures: None }
     }
 }
 

@@ -227,8 +227,8 @@ fn figures(context: &Context<'_>, time: Time) -> Result<String, DrawError> {
         &against_views::draw(&accuracy, against_views::Scale::Share)?,
         "Six panels, one per category: IoU against 1 to 6 views shown to a vision-language model, with \
          horizontal lines for the methods that need no such model. The numbers are in the tables above.",
-        "Mean IoU against views shown to the VLM. The paper states IoU for one and six views; its points \
-         at three were only drawn.",
+        "Mean IoU against views shown to the VLM. The paper states IoU at one and at six views; what \
+         it found at three is only drawn there.",
     );
     html += &plot(
         &against_views::draw(&seconds, against_views::Scale::Seconds)?,
