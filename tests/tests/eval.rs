@@ -124,7 +124,6 @@ fn a_worse_run_is_told_pair_by_pair() {
     let folder = tempfile::tempdir().unwrap();
     let (before, now) = (folder.path().join("before"), folder.path().join("now"));
     let few = ["--objects", "2", "--quiet", "--methods", "fused,whole", "--no-predictions"];
-    // The methods are named twice; the later list counts.
     let arguments: Vec<&str> = SMALL[..6].iter().chain(&few).copied().collect();
     let go = |out: &Path, more: &[&str]| {
         let out = out.to_str().unwrap();

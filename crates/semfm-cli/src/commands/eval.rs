@@ -144,6 +144,7 @@ impl Evaluate {
             model: model.to_owned(),
             keep: !self.work.no_cache,
             scratch: scratch.path(),
+            workers: Workers::new(common.threads, self.work.jobs),
             common: *common,
         });
         let embeddings = match &encoder {
@@ -318,6 +319,7 @@ struct Made<'a> {
     model: String,
     keep: bool,
     scratch: &'a Path,
+    workers: Workers,
     common: Common,
 }
 
@@ -325,8 +327,9 @@ impl semfm_eval::Encoder for Made<'_> {
     fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String> {
         let make = || -> Result<Embedded> {
             let encoder = Encoder::new(&self.model, rolls, self.keep, self.scratch)?;
-            // Several encoders at once would each take all cores.
-            let quiet = Common { quiet: true, ..self.common };
+            // Several encoders at work at once share the cores, as the pairs do.
+            let threads = self.workers.threads;
+            let quiet = Common { quiet: true, threads, ..self.common };
             // All objects are shown in grey: colour on one side of a pair misleads.
             let (file, took) = encoder.embed_timed(file, false, &quiet)?;
             Ok(Embedded {
