@@ -161,7 +161,8 @@ impl<'a> Album<'a> {
 
     /// A file of the results' folder: names that lead out of it are none.
     fn inside(&self, name: &str) -> Option<PathBuf> {
-        let plain = |part: std::path::Component<'_>| matches!(part, std::path::Component::Normal(_));
+        let plain =
+            |part: std::path::Component<'_>| matches!(part, std::path::Component::Normal(_));
         Path::new(name).components().all(plain).then(|| self.folder.join(name))
     }
 
@@ -173,7 +174,13 @@ impl<'a> Album<'a> {
     }
 
     /// What is right, too much and missed.
-    pub fn error(&self, target: &Subject, answer: &Answer, side: Side, alt: &str) -> Option<String> {
+    pub fn error(
+        &self,
+        target: &Subject,
+        answer: &Answer,
+        side: Side,
+        alt: &str,
+    ) -> Option<String> {
         let found = answer.region(&target.mesh)?;
         let colors = palette::by_error(&found.mask(), &target.truth.mask());
         target.draw(&colors, side, alt, &self.task)
@@ -231,7 +238,8 @@ impl Subject {
     fn uri(&self, colors: &[[f32; 3]], side: Side, task: &Task) -> Option<String> {
         let camera = self.cameras[side as usize];
         let settings = RenderSettings { supersampling: 3, ..RenderSettings::default() };
-        let views = render(&self.mesh, &Paint::Vertices(colors), &[camera], &settings, task).ok()?;
+        let views =
+            render(&self.mesh, &Paint::Vertices(colors), &[camera], &settings, task).ok()?;
         data_uri::jpeg(&views.first()?.rgb, camera.width, camera.height)
     }
 }
@@ -267,7 +275,8 @@ mod tests {
             [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Into::into).to_vec(),
             vec![[0, 1, 2]],
         );
-        let answer = |vertex: u32| Answer { vertices: vec![vertex], weights: vec![0.8], point_map: None };
+        let answer =
+            |vertex: u32| Answer { vertices: vec![vertex], weights: vec![0.8], point_map: None };
         let triangle = triangle.unwrap();
         assert_eq!(answer(2).region(&triangle).unwrap().vertices(), [2]);
         assert!(answer(3).region(&triangle).is_none());

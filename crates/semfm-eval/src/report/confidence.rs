@@ -61,7 +61,8 @@ fn table(context: &Context<'_>) -> Table {
     for trust in &context.results.trust {
         let verdict = |verdict| {
             let found = trust.verdicts.iter().find(|v| v.verdict == verdict);
-            let text = found.map_or("–".into(), |v| format!("{} ({})", v.n, number(Some(v.mean_iou), 2)));
+            let text = found
+                .map_or("–".into(), |v| format!("{} ({})", v.n, number(Some(v.mean_iou), 2)));
             Cell::written(found.map(|v| v.n as f64), text)
         };
         let cells = [

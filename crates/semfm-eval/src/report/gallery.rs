@@ -55,9 +55,17 @@ impl<'a> Chosen<'a> {
         let shown = context.methods.iter().filter(|method| **method != Candidate::Whole.name());
         for &method in shown {
             let answered = |row: &&Row| row.iou.is_some() && row.prediction.is_some();
-            let mut own: Vec<&Row> =
-                context.rows_of(method).filter(answered).filter(|row| album.pair(row).is_some()).collect();
-            own.sort_by(|a, b| a.iou.unwrap_or(0.0).total_cmp(&b.iou.unwrap_or(0.0)).then_with(|| a.key().cmp(&b.key())));
+            let mut own: Vec<&Row> = context
+                .rows_of(method)
+                .filter(answered)
+                .filter(|row| album.pair(row).is_some())
+                .collect();
+            own.sort_by(|a, b| {
+                a.iou
+                    .unwrap_or(0.0)
+                    .total_cmp(&b.iou.unwrap_or(0.0))
+                    .then_with(|| a.key().cmp(&b.key()))
+            });
             let limit =
                 if method == context.lead { settings.leading_cards } else { settings.other_cards };
             if own.len() > limit {
@@ -69,11 +77,13 @@ impl<'a> Chosen<'a> {
         let left_out = if left_out.is_empty() {
             String::new()
         } else {
-            let limits = [settings.leading_cards, settings.other_cards].into_iter().filter_map(|limit| {
-                let methods = left_out.iter().filter(|(own, _)| *own == limit).map(|(_, m)| *m);
-                let methods: Vec<&str> = methods.collect();
-                (!methods.is_empty()).then(|| format!("the worst {limit} of {}", methods.join(", ")))
-            });
+            let limits =
+                [settings.leading_cards, settings.other_cards].into_iter().filter_map(|limit| {
+                    let methods = left_out.iter().filter(|(own, _)| *own == limit).map(|(_, m)| *m);
+                    let methods: Vec<&str> = methods.collect();
+                    (!methods.is_empty())
+                        .then(|| format!("the worst {limit} of {}", methods.join(", ")))
+                });
             let mut limits: Vec<String> = limits.collect();
             limits.dedup();
             format!(
@@ -103,7 +113,8 @@ fn cards(
         .par_iter()
         .map(|places| {
             task.check()?;
-            let answers = places.first().map(|&first| album.answers(rows[first])).unwrap_or_default();
+            let answers =
+                places.first().map(|&first| album.answers(rows[first])).unwrap_or_default();
             let card = |&place: &usize| {
                 let row = rows[place];
                 (place, card(context, album, row, answers.get(&row.method)))
@@ -130,7 +141,9 @@ fn card(context: &Context<'_>, album: &Album<'_>, row: &Row, answer: Option<&Ans
     let pictures = [
         Some(shown(&source.own("with the demonstrated region"), "source")),
         Some(shown(&target.own("with the true region"), "truth")),
-        album.region(target, answer, &format!("region found on {found}")).map(|p| shown(&p, "found")),
+        album
+            .region(target, answer, &format!("region found on {found}"))
+            .map(|p| shown(&p, "found")),
         album
             .error(target, answer, Side::Best, &format!("error on {found}"))
             .map(|p| shown(&p, "error")),

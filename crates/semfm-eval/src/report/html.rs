@@ -76,7 +76,14 @@ impl Table {
     /// A table of these columns, the first of which names the lines.
     pub fn new(caption: &str, head: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let head = head.into_iter().map(Into::into).collect();
-        Self { caption: caption.into(), head, body: String::new(), numeric: vec![], n_lines: 0, sortable: false }
+        Self {
+            caption: caption.into(),
+            head,
+            body: String::new(),
+            numeric: vec![],
+            n_lines: 0,
+            sortable: false,
+        }
     }
 
     /// Gives the columns buttons that sort by them.

@@ -93,8 +93,7 @@ fn of_set<'a>(results: &'a MatchingResults, set: &str) -> Vec<&'a MatchingSummar
 
 fn table(results: &MatchingResults, set: &str) -> Table {
     let head = ["Method", "Error", "95 %", "Mirror", "Nearer of both", "Flips", "Map, ms", "Pairs"];
-    let caption =
-        "Mean error. Mirror: against the mirrored truth. Flips: pairs whose mirrored answer is nearer.";
+    let caption = "Mean error. Mirror: against the mirrored truth. Flips: pairs whose mirrored answer is nearer.";
     let mut table = Table::new(caption, head);
     for (name, _, error) in PYFM.iter().filter(|row| row.1 == set) {
         let rest = (0..6).map(|_| Cell::written(None, String::new()));
@@ -135,7 +134,10 @@ fn figure(results: &MatchingResults, set: &str) -> std::result::Result<String, D
         .iter()
         .zip(curves::COLORS.iter().cycle())
         .map(|(s, [r, g, b])| {
-            format!("<li class=\"solid\" style=\"--c:rgb({r} {g} {b})\">{}</li>", escape(about(&s.method)))
+            format!(
+                "<li class=\"solid\" style=\"--c:rgb({r} {g} {b})\">{}</li>",
+                escape(about(&s.method))
+            )
         })
         .collect();
     let plot = plot(
@@ -159,12 +161,19 @@ fn pairs(results: &MatchingResults, set: &str) -> String {
         seen.push(pair);
         let error = |method: &&str| {
             let same = |r: &&crate::matching::MatchingRow| {
-                r.set == set && (r.source.as_str(), r.target.as_str()) == pair && r.method == **method
+                r.set == set
+                    && (r.source.as_str(), r.target.as_str()) == pair
+                    && r.method == **method
             };
             let found = results.rows.iter().find(same).and_then(|row| row.error);
             Cell::written(found, found.map_or("–".into(), |x| format!("{x:.1}")))
         };
-        table.line("", &format!("{} → {}", pair.0, pair.1), "", methods.iter().map(error).collect::<Vec<_>>());
+        table.line(
+            "",
+            &format!("{} → {}", pair.0, pair.1),
+            "",
+            methods.iter().map(error).collect::<Vec<_>>(),
+        );
     }
     table.html()
 }

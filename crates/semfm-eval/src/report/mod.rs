@@ -11,8 +11,8 @@ mod data_uri;
 mod gallery;
 mod html;
 pub mod matching;
-mod palette;
 mod pairs;
+mod palette;
 mod paper;
 mod plots;
 mod scores;
@@ -174,11 +174,14 @@ mod tests {
         for word in ["fused", "nearest", "<svg", "no file", "cups"] {
             assert!(page.contains(word), "{word}");
         }
-        for (open, close) in [("<section", "</section>"), ("<figure", "</figure>"), ("<table", "</table>")] {
+        for (open, close) in
+            [("<section", "</section>"), ("<figure", "</figure>"), ("<table", "</table>")]
+        {
             assert_eq!(page.matches(open).count(), page.matches(close).count(), "{open}");
         }
         for outside in ["http://", "https://"] {
-            let found: Vec<_> = page.match_indices(outside).map(|(at, _)| &page[at..at + 40]).collect();
+            let found: Vec<_> =
+                page.match_indices(outside).map(|(at, _)| &page[at..at + 40]).collect();
             let names = ["http://www.w3.org/2000/svg"]; // a name, not an address
             assert!(found.iter().all(|f| names.iter().any(|n| f.starts_with(n))), "{found:?}");
         }
@@ -196,9 +199,63 @@ mod tests {
         };
         let dataset = Dataset::open(&origin).unwrap();
         results.about.identity.dataset = dataset.hash.clone();
-        let error =
-            write(&results, &dataset, folder.path(), &ReportSettings::default(), &task).unwrap_err();
+        let error = write(&results, &dataset, folder.path(), &ReportSettings::default(), &task)
+            .unwrap_err();
         assert!(error.is_cancelled(), "{error}");
         assert!(!folder.path().join(FILE).exists());
+    }
+
+    /// A model's answer, which is the truth, on one pair of tools; its picture is kept in `pictures`.
+    fn answered(folder: &Path, pictures: &Path) -> (Results, Dataset) {
+        let origin = crate::dataset::DatasetOrigin::Synthetic {
+            level: "easy".into(),
+            seeds: vec![0],
+            n_objects: 2,
+        };
+        let dataset = Dataset::open(&origin).unwrap();
+        let truth = dataset.objects[1].load().unwrap().truth.vertices();
+        let rows = folder.join("rows.json");
+        let row = serde_json::json!({
+            "group": "tools", "source": "tools_0_s0", "target": "tools_1_s0", "n_views": 1,
+            "mode": "polygons", "model": "m", "real_model": false, "inconsistency": 0.25,
+            "region": { "vertices": truth },
+        });
+        let file = serde_json::json!({ "format": crate::vlm::FORMAT, "rows": [row] });
+        std::fs::write(&rows, file.to_string()).unwrap();
+        let mut scored = crate::vlm::read(&rows, &dataset).unwrap();
+        crate::vlm::keep(&rows, &mut scored, folder).unwrap();
+        let own = pictures.join("tools/tools_0_s0--tools_1_s0--1");
+        std::fs::create_dir_all(&own).unwrap();
+        image::RgbImage::new(64, 64).save(own.join("answer-T1.png")).unwrap();
+        let mut results = some_results();
+        results.about.origin = origin;
+        results.about.identity.dataset = dataset.hash.clone();
+        results.rows.clear();
+        (results.with_rows(scored), dataset)
+    }
+
+    #[test]
+    fn a_model_s_answer_is_shown_beside_its_lift_and_called_what_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let pictures = folder.path().join("pictures");
+        let (results, dataset) = answered(folder.path(), &pictures);
+        let settings =
+            ReportSettings { vlm_pictures: Some(pictures), picture_side: 48, ..Default::default() };
+        let path = write(&results, &dataset, folder.path(), &settings, &Task::default()).unwrap();
+        let page = std::fs::read_to_string(path).unwrap();
+        for words in [
+            "stand-in “m”, 1 views, IoU 1.00, inconsistency .25",
+            "alt=\"answer in view 1 of tools_1_s0\"",
+            "alt=\"lifted region on tools_1_s0, IoU 1.00\"",
+            "no model was asked in this run",
+        ] {
+            assert!(page.contains(words), "{words}");
+        }
+        // Another set of objects: scores stay, pictures go, and the page says why.
+        let mut other = results;
+        other.about.identity.dataset = "blake3:0".into();
+        let path = write(&other, &dataset, folder.path(), &settings, &Task::default()).unwrap();
+        let page = std::fs::read_to_string(path).unwrap();
+        assert!(page.contains("the objects have changed") && !page.contains("<img"));
     }
 }

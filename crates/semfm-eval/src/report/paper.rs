@@ -127,7 +127,8 @@ fn columns(
     method: &str,
     of: impl Fn(&Summary) -> Option<f64>,
 ) -> Vec<Option<f64>> {
-    let value = |name: &Option<&str>| of(context.summary(&Scope::Category((*name)?.into()), method)?);
+    let value =
+        |name: &Option<&str>| of(context.summary(&Scope::Category((*name)?.into()), method)?);
     let mut values: Vec<Option<f64>> = context.paper_columns.iter().map(value).collect();
     let known: Vec<f64> = values.iter().flatten().copied().collect();
     let mean = known.iter().sum::<f64>() / known.len() as f64;
@@ -144,7 +145,8 @@ fn bound_note(method: &str) -> &'static str {
 }
 
 fn accuracy(context: &Context<'_>) -> Table {
-    let caption = "Accuracy: mean IoU of all ordered pairs (higher is better). Mean: of the categories.";
+    let caption =
+        "Accuracy: mean IoU of all ordered pairs (higher is better). Mean: of the categories.";
     table(context, caption, &published::IOU, 2, false, |summary| summary.mean)
 }
 
@@ -155,7 +157,8 @@ fn runtime(context: &Context<'_>, time: Time) -> Table {
 
 impl Context<'_> {
     fn vlm_note(&self) -> String {
-        let real = self.results.rows.iter().filter_map(|row| row.vlm.as_ref()).any(|vlm| vlm.real_model);
+        let real =
+            self.results.rows.iter().filter_map(|row| row.vlm.as_ref()).any(|vlm| vlm.real_model);
         let words = if real {
             "VLM rows in italics are the paper's; the others are answers of the model named in them."
         } else {
@@ -191,14 +194,17 @@ fn figures(context: &Context<'_>, time: Time) -> Result<String, DrawError> {
         (0..published::CATEGORIES.len())
             .map(|place| {
                 let column = context.paper_columns[place];
-                let ours = |method: &str| {
-                    of(context.summary(&Scope::Category(column?.into()), method)?)
-                };
-                let models = quoted.iter().filter_map(|row| Some((row.n_views? as f64, row.values[place])));
+                let ours =
+                    |method: &str| of(context.summary(&Scope::Category(column?.into()), method)?);
+                let models =
+                    quoted.iter().filter_map(|row| Some((row.n_views? as f64, row.values[place])));
                 against_views::Panel {
                     title: format!("C. {} {}", place + 1, published::CATEGORIES[place]),
                     quoted_model: models.collect(),
-                    quoted_semfm: quoted.iter().find(|r| r.method == "SemFM").map(|r| r.values[place]),
+                    quoted_semfm: quoted
+                        .iter()
+                        .find(|r| r.method == "SemFM")
+                        .map(|r| r.values[place]),
                     model: column.map_or_else(Vec::new, |name| by_views(context, name, of)),
                     lead: ours(context.lead),
                     second: second.and_then(ours),
@@ -215,7 +221,8 @@ fn figures(context: &Context<'_>, time: Time) -> Result<String, DrawError> {
         escape(context.lead)
     );
     if let Some(second) = second {
-        legend += &format!("<li class=\"dotted secondline\">{}, this run (dotted)</li>", escape(second));
+        legend +=
+            &format!("<li class=\"dotted secondline\">{}, this run (dotted)</li>", escape(second));
     }
     if accuracy.iter().any(|panel| !panel.model.is_empty()) {
         legend += "<li class=\"solid extra\">VLM, this run (solid, triangles)</li>";

@@ -183,7 +183,12 @@ fn times(context: &Context<'_>) -> String {
         let rows = rows(method);
         let Some(s) = context.overall(method).filter(|_| !rows.is_empty()) else { continue };
         let ms = |x: Option<f64>| {
-            Cell::written(x, x.map_or("–".into(), |x| if x < 10.0 { format!("{x:.1}") } else { format!("{x:.0}") }))
+            Cell::written(
+                x,
+                x.map_or("–".into(), |x| {
+                    if x < 10.0 { format!("{x:.1}") } else { format!("{x:.0}") }
+                }),
+            )
         };
         let whole = s.median_paper_runtime.map(|seconds| 1e3 * seconds);
         let sums = [s.median_matching_ms, s.median_cold_ms, whole];

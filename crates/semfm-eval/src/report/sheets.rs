@@ -31,7 +31,9 @@ pub(super) fn categories(context: &Context<'_>, album: &Album<'_>, task: &Task) 
         );
         let mut n_shown = 0;
         for row in rows {
-            let Some(((_, target), answer)) = album.pair(row).zip(album.answer(row)) else { continue };
+            let Some(((_, target), answer)) = album.pair(row).zip(album.answer(row)) else {
+                continue;
+            };
             let words = format!("{} ({})", target.name, number(row.iou, 2));
             let alt = format!("region found on {words}");
             if let Some(picture) = album.region(target, &answer, &alt) {
@@ -108,7 +110,8 @@ pub(super) fn wks(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Resu
             escape(&source.name)
         );
         strip += &shown(&target.own("with the true region"), &format!("{}: truth", target.name));
-        strip += &shown(&album.region(target, &answer, &alt("region found"))?, &format!("WKS ({iou})"));
+        strip +=
+            &shown(&album.region(target, &answer, &alt("region found"))?, &format!("WKS ({iou})"));
         strip += &shown(
             &album.error(target, &answer, Side::Best, &alt("error"))?,
             "WKS: right, too much, missed",
@@ -171,7 +174,8 @@ fn each_group_of<'a>(
         .par_iter()
         .map(|&group| {
             task.check()?;
-            let scored = |row: &&Row| row.group == group && row.iou.is_some() && row.prediction.is_some();
+            let scored =
+                |row: &&Row| row.group == group && row.iou.is_some() && row.prediction.is_some();
             let rows: Vec<&Row> = context.rows_of(method).filter(scored).collect();
             Ok(draw(&rows).map(|html| (group, html)))
         })
@@ -186,13 +190,16 @@ fn typical<'a>(album: &Album<'_>, rows: &[&'a Row], n: usize) -> Vec<&'a Row> {
 }
 
 fn of_typical_source(rows: Vec<&Row>) -> Vec<&Row> {
-    let mean = |rows: &[&Row]| rows.iter().filter_map(|row| row.iou).sum::<f64>() / rows.len() as f64;
-    let of = |source: &str| rows.iter().copied().filter(|row| row.source == source).collect::<Vec<_>>();
+    let mean =
+        |rows: &[&Row]| rows.iter().filter_map(|row| row.iou).sum::<f64>() / rows.len() as f64;
+    let of =
+        |source: &str| rows.iter().copied().filter(|row| row.source == source).collect::<Vec<_>>();
     let mut sources: Vec<&str> = rows.iter().map(|row| row.source.as_str()).collect();
     sources.sort_unstable();
     sources.dedup();
     // A source with several targets shows more than one with a single target.
-    let most = sources.iter().map(|source| of(source).len().min(COLOURED_TARGETS)).max().unwrap_or(0);
+    let most =
+        sources.iter().map(|source| of(source).len().min(COLOURED_TARGETS)).max().unwrap_or(0);
     let overall = mean(&rows);
     let off = |source: &str| (mean(&of(source)) - overall).abs();
     let rich = sources.into_iter().filter(|source| of(source).len() >= most);

@@ -30,12 +30,15 @@ pub(super) fn body(
     task: &Task,
 ) -> Result<String> {
     let rows = context.results.rows.iter();
-    let mut rows: Vec<&Row> =
-        rows.filter(|row| row.vlm.is_some() && row.iou.is_some() && row.prediction.is_some()).collect();
+    let mut rows: Vec<&Row> = rows
+        .filter(|row| row.vlm.is_some() && row.iou.is_some() && row.prediction.is_some())
+        .collect();
     if rows.is_empty() {
-        return Ok("<p>No rows of a vision-language model are in these results, so there is no overlay \
+        return Ok(
+            "<p>No rows of a vision-language model are in these results, so there is no overlay \
                    to show beside its lift; its numbers above are quoted from the paper.</p>\n"
-            .into());
+                .into(),
+        );
     }
     let iou = |row: &Row| row.iou.unwrap_or(0.0);
     rows.sort_by(|a, b| iou(b).total_cmp(&iou(a)).then_with(|| a.key().cmp(&b.key())));
@@ -58,8 +61,10 @@ pub(super) fn body(
 fn strip(album: &Album<'_>, row: &Row, settings: &ReportSettings) -> Option<String> {
     let (vlm, (_, target)) = (row.vlm.as_ref()?, album.pair(row)?);
     let answer = album.answer(row)?;
-    let who = if vlm.real_model { vlm.model.clone() } else { format!("stand-in “{}”", vlm.model) };
-    let inconsistency = vlm.inconsistency.map(|x| format!(", inconsistency {}", number(Some(x), 2)));
+    let who =
+        if vlm.real_model { vlm.model.clone() } else { format!("stand-in “{}”", vlm.model) };
+    let inconsistency =
+        vlm.inconsistency.map(|x| format!(", inconsistency {}", number(Some(x), 2)));
     let title = format!(
         "{} → {}: {who}, {} views, IoU {}{}",
         row.source,
@@ -71,7 +76,8 @@ fn strip(album: &Album<'_>, row: &Row, settings: &ReportSettings) -> Option<Stri
     let mut strip = String::new();
     let folder = settings.vlm_pictures.as_deref().map(|root| folder_of(root, row, vlm.n_views));
     for view in 1..=vlm.n_views.min(VIEWS) {
-        let overlay = folder.as_deref().and_then(|folder| overlay(folder, view, settings.picture_side));
+        let overlay =
+            folder.as_deref().and_then(|folder| overlay(folder, view, settings.picture_side));
         if let Some(uri) = overlay {
             let alt = format!("answer in view {view} of {}", row.target);
             strip += &shown(&img(&uri, &alt), &format!("answer, view {view}"));

@@ -66,7 +66,14 @@ mod tests {
         let thirds = [1.0 / 3.0, 2.0 / 3.0];
         assert_eq!(
             steps,
-            [(0.0, 0.0), (1.0, 0.0), (1.0, thirds[0]), (3.0, thirds[0]), (3.0, thirds[1]), (5.0, thirds[1])]
+            [
+                (0.0, 0.0),
+                (1.0, 0.0),
+                (1.0, thirds[0]),
+                (3.0, thirds[0]),
+                (3.0, thirds[1]),
+                (5.0, thirds[1])
+            ]
         );
         assert_eq!(staircase(&[], 5.0), [(0.0, 0.0), (5.0, 0.0)]);
     }

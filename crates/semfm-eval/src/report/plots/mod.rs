@@ -51,7 +51,12 @@ fn at(style: TextStyle<'static>, horizontal: HPos, vertical: VPos) -> TextStyle<
 }
 
 /// A horizontal line through a panel, in dashes of so many pixels.
-fn dashes(from: (f64, f64), to: (f64, f64), dash: u32, gap: u32, style: ShapeStyle)
--> DashedLineSeries<std::vec::IntoIter<(f64, f64)>, u32> {
+fn dashes(
+    from: (f64, f64),
+    to: (f64, f64),
+    dash: u32,
+    gap: u32,
+    style: ShapeStyle,
+) -> DashedLineSeries<std::vec::IntoIter<(f64, f64)>, u32> {
     DashedLineSeries::new(vec![from, to], dash, gap, style)
 }
