@@ -10,13 +10,13 @@ from vlm_fixtures import endpoint, mallets  # noqa: F401
 
 
 def pytest_addoption(parser):
-    parser.addoption("--full", action="store_true", help="also the tests that need torch")
+    parser.addoption("--full", action="store_true", help="also the tests that need torch, or a browser")
 
 
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--full") or os.environ.get("SEMFM_FULL") == "1":
         return
-    skip = pytest.mark.skip(reason="needs torch and transformers: run with --full")
+    skip = pytest.mark.skip(reason="needs torch, or a browser: run with --full")
     for item in items:
         if "full" in item.keywords:
             item.add_marker(skip)

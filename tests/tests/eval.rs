@@ -76,6 +76,13 @@ fn six_categories_are_measured_and_the_methods_stand_in_order() {
     assert!(!out.join("journal.jsonl").exists());
     let table = std::fs::read_to_string(out.join("table.md")).unwrap();
     assert!(table.contains("*SemFM (quoted)*") && !table.contains("## Failures"), "{table}");
+    // The page stands alone, and is made again to the byte from what is there.
+    let page = std::fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.contains("class=\"card\"") && page.contains("default-src 'none'"));
+    assert!(!page.contains("Pictures are missing"));
+    let again = run(&["eval", "--report-only", "-o", out.to_str().unwrap()]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert!(std::fs::read_to_string(out.join("index.html")).unwrap() == page);
 }
 
 #[test]

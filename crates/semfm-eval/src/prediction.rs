@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::Result;
 use crate::candidate::Candidate;
-use crate::row::AnchorRow;
+use crate::row::{AnchorRow, Row};
 use crate::run::Answer;
 
 /// The format that is written.
@@ -90,6 +90,22 @@ impl Page {
         write_atomically(&path, |out| Ok(serde_json::to_writer(out, &page)?))?;
         Ok(())
     }
+}
+
+/// Writes the answer of one row that no run of ours made; gives the file, relative to the results.
+pub(crate) fn write_one(folder: &Path, row: &Row, answer: Value) -> Result<String> {
+    let [group, source, target, method] = row.key();
+    let stem = [source, target, method].map(plain).join("--");
+    let name = format!("{FOLDER}/{}/{stem}.json", plain(group));
+    let mut page = Page {
+        folder: folder.to_owned(),
+        name: name.clone(),
+        about: [group, source, target].map(str::to_owned),
+        methods: Map::new(),
+    };
+    page.methods.insert(method.into(), answer);
+    page.write()?;
+    Ok(name)
 }
 
 fn region_json(region: &Region) -> Value {

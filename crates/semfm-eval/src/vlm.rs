@@ -5,9 +5,10 @@ use std::path::Path;
 
 use semfm::Region;
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::dataset::Dataset;
+use crate::prediction;
 use crate::row::{Failure, Row, VlmDetails};
 use crate::{Error, Result};
 
@@ -121,6 +122,31 @@ pub fn read(path: &Path, dataset: &Dataset) -> Result<Vec<Row>> {
     }
     scored.sort_by_key(|(number, _)| *number);
     Ok(scored.into_iter().map(|(_, row)| row).collect())
+}
+
+/// Keeps the regions of the file's rows beside the predictions of the other methods in `folder`, and
+/// tells `rows`, which [`read`] made of the same file, where they are.
+///
+/// # Errors
+/// As [`read`], and what cannot be written.
+pub fn keep(path: &Path, rows: &mut [Row], folder: &Path) -> Result<()> {
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let file: RowsFile = serde_json::from_slice(&bytes).map_err(|error| {
+        let place = format!("line {}, column {}", error.line(), error.column());
+        Error::format(path, place, "rows of a vision-language model", error.to_string())
+    })?;
+    if file.rows.len() != rows.len() {
+        let found = format!("{} rows", file.rows.len());
+        return Err(Error::format(path, "rows", format!("{} as before", rows.len()), found));
+    }
+    for (row, answered) in rows.iter_mut().zip(&file.rows) {
+        if let Some(found) = &answered.region {
+            let weights = found.weights.clone().unwrap_or_else(|| vec![1.0; found.vertices.len()]);
+            let answer = json!({ "vertices": found.vertices, "weights": weights });
+            row.prediction = Some(prediction::write_one(folder, row, answer)?);
+        }
+    }
+    Ok(())
 }
 
 fn method(row: &VlmRow) -> String {

@@ -12,12 +12,13 @@ use semfm_eval::dataset::{Dataset, folder};
 use semfm_eval::embeddings::Embedded;
 use semfm_eval::matching::{self, MatchingDataset, MatchingSettings};
 use semfm_eval::workers::Workers;
-use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, table, vlm};
+use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, report, table, vlm};
 use semfm_synth::Level;
 use serde_json::json;
 
 use super::Outcome;
 use super::embed::Encoder;
+use super::page::PageOptions;
 use crate::options::Common;
 use crate::talk;
 
@@ -27,7 +28,7 @@ use crate::talk;
 /// sets with true correspondences (`SET/pairs.txt`, `SET/NAME.npz`), which point maps are measured
 /// on; or none with `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic"]))]
+#[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic", "report_only"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli eval --synthetic -o report\n  \
     semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
@@ -47,6 +48,8 @@ pub struct Evaluate {
     methods: MethodOptions,
     #[command(flatten)]
     work: WorkOptions,
+    #[command(flatten)]
+    page: PageOptions,
 }
 
 #[derive(Debug, Args)]
@@ -127,6 +130,9 @@ struct WorkOptions {
 
 impl Evaluate {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        if self.page.report_only {
+            return self.page.again(&self.output, common);
+        }
         if let Some(path) = self.dataset.as_deref().filter(|path| MatchingDataset::is_one(path)) {
             return self.run_matching(path, common);
         }
@@ -153,7 +159,10 @@ impl Evaluate {
         if finished.resumed > 0 && !common.quiet {
             talk::remark(format_args!("went on after {} pairs done before", finished.resumed));
         }
-        if let Some(rows) = vlm {
+        if let Some(mut rows) = vlm {
+            if let Some(path) = self.methods.vlm.as_deref().filter(|_| !self.work.no_predictions) {
+                vlm::keep(path, &mut rows, &self.output)?;
+            }
             finished.results = finished.results.with_rows(rows);
         }
         let results = &finished.results;
@@ -162,6 +171,8 @@ impl Evaluate {
         if let Some(comparison) = &comparison {
             files.extend(comparison.write(&self.output)?);
         }
+        let page = self.page.settings();
+        files.push(report::write(results, &dataset, &self.output, &page, &task)?);
         let results = finished.close()?;
         tell(&results, comparison.as_ref(), &files, common);
         judge(&results, common)
@@ -232,7 +243,8 @@ impl Evaluate {
         }
         let task = talk::watched_with_time_left(common.quiet);
         let results = matching::run(&dataset, &settings, &task)?;
-        let files = results.write(&self.output)?;
+        let mut files = results.write(&self.output)?;
+        files.push(report::matching::write(&results, &self.output)?);
         if common.json {
             let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
             talk::say(json!({ "summaries": results.summaries, "files": files }));

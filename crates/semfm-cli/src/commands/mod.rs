@@ -7,6 +7,7 @@ pub mod embed;
 pub mod grasp;
 pub mod eval;
 pub mod info;
+pub mod page;
 pub mod region;
 pub mod show;
 pub mod transfer;

@@ -13,7 +13,7 @@ use semfm_geom::{Mesh, Task};
 use semfm_grasp::{Grasp, Gripper};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{viewpoints, weight_colors, write_sheet};
+use super::{SIDE, viewpoints, weight_colors, write_sheet};
 use crate::Result;
 
 /// Colour of the worst and of the best hand shown, as sRGB in 0..1.
@@ -62,7 +62,7 @@ fn sides(
     let scene = Mesh::new(vertices, faces)?;
     let marked: Vec<f64> =
         (0..scene.n_vertices()).map(|v| weights.get(v).copied().unwrap_or(0.0)).collect();
-    let cameras = viewpoints(&scene, &marked, task)?;
+    let cameras = viewpoints(&scene, &marked, SIDE, task)?;
     let light = RenderSettings::default();
     Ok(render(&scene, &Paint::Vertices(&colors), &cameras, &light, task)?)
 }

@@ -12,7 +12,7 @@ use semfm_fmap::features::{CentredFeatures, JointFeatures};
 use semfm_geom::{PointIndex, SemanticCloud, Task};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{viewpoints, write_sheet};
+use super::{SIDE, viewpoints, write_sheet};
 use crate::{PreparedObject, Region, Result, Transfer};
 
 /// Features have unit RMS length: this much on each side of grey shows all but the outliers.
@@ -105,7 +105,7 @@ fn row(
     task: &Task,
 ) -> Result<Vec<View>> {
     let mesh = object.shape.original();
-    let [best, other] = viewpoints(mesh, weights, task)?;
+    let [best, other] = viewpoints(mesh, weights, SIDE, task)?;
     let paint = |&(label, anchor): &AnchorOfPoint| match anchor {
         Some(rank) => anchor_color(rank as i64),
         None => REST[label as usize % REST.len()],

@@ -44,10 +44,14 @@ pub fn position_colors(points: &[DVec3]) -> Vec<[f32; 3]> {
     points.iter().map(color).collect()
 }
 
-/// From where the region shows the most pixels, and the best view from another side.
-fn viewpoints(mesh: &Mesh, weights: &[f64], task: &Task) -> Result<[Camera; 2]> {
+/// From where the region shows the most pixels, and the best view from another side; both for
+/// pictures of `side` pixels.
+///
+/// # Errors
+/// Whatever rendering reports.
+pub fn viewpoints(mesh: &Mesh, weights: &[f64], side: u32, task: &Task) -> Result<[Camera; 2]> {
     let scouts = rig(mesh, &RigSettings { size: SCOUT, count: 24, ..Default::default() })?;
-    let full = rig(mesh, &RigSettings { size: SIDE, count: 24, ..Default::default() })?;
+    let full = rig(mesh, &RigSettings { size: side, count: 24, ..Default::default() })?;
     let views = render(mesh, &Paint::default(), &scouts, &RenderSettings::default(), task)?;
     let shown: Vec<usize> = views
         .iter()

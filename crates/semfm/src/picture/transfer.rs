@@ -9,7 +9,7 @@ use std::path::Path;
 use semfm_geom::{Mesh, Task};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{position_colors, viewpoints, weight_colors, write_sheet};
+use super::{SIDE, position_colors, viewpoints, weight_colors, write_sheet};
 use crate::{PreparedObject, Region, Result, Transfer};
 
 /// Writes the picture of a transfer.
@@ -35,7 +35,7 @@ pub fn write_picture(
 
 /// The three pictures of one object.
 fn row(mesh: &Mesh, weights: &[f64], places: &[[f32; 3]], task: &Task) -> Result<Vec<View>> {
-    let [best, other] = viewpoints(mesh, weights, task)?;
+    let [best, other] = viewpoints(mesh, weights, SIDE, task)?;
     let marked = weight_colors(weights);
     let light = RenderSettings::default();
     let mut pictures = render(mesh, &Paint::Vertices(&marked), &[best, other], &light, task)?;

@@ -1,0 +1,59 @@
+//! The page that `semfm-cli eval` writes beside its results.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use semfm_eval::{ReportSettings, Results, report, table};
+
+use super::Outcome;
+use crate::options::Common;
+use crate::talk;
+
+/// What the page holds.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Page")]
+pub struct PageOptions {
+    /// Measure nothing: make index.html and table.md anew from the results in the output folder
+    #[arg(long)]
+    pub report_only: bool,
+    /// Pairs in the gallery for the default method, worst first
+    #[arg(long, default_value_t = ReportSettings::default().leading_cards, value_name = "N")]
+    gallery: usize,
+    /// Pairs in the gallery for each other method, worst first
+    #[arg(long, default_value_t = ReportSettings::default().other_cards, value_name = "N")]
+    gallery_others: usize,
+    /// What `semfm-vlm --pictures` kept, to be shown beside its lift
+    #[arg(long, value_name = "FOLDER")]
+    vlm_pictures: Option<PathBuf>,
+}
+
+impl PageOptions {
+    /// As settings.
+    pub fn settings(&self) -> ReportSettings {
+        ReportSettings {
+            leading_cards: self.gallery,
+            other_cards: self.gallery_others,
+            vlm_pictures: self.vlm_pictures.clone(),
+            ..ReportSettings::default()
+        }
+    }
+
+    /// Makes the page and the table in a folder of results anew.
+    pub fn again(&self, folder: &Path, common: &Common) -> Result<Outcome> {
+        let files = match report::matching::read(folder)? {
+            Some(results) => {
+                let mut files = results.write(folder)?;
+                files.push(report::matching::write(&results, folder)?);
+                files
+            }
+            None => {
+                let task = talk::watched(common.quiet);
+                let table = table::write(&Results::read(folder)?, folder)?;
+                vec![table, report::again(folder, &self.settings(), &task)?]
+            }
+        };
+        files.iter().for_each(|file| talk::say(file.display()));
+        Ok(Outcome::Done)
+    }
+}

@@ -1,0 +1,220 @@
+//! Pairs to look at, worst first: source, target with truth, what was found, and the error from two
+//! sides.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use semfm::{Task, Verdict};
+
+use super::ReportSettings;
+use super::album::{Album, Answer, Side};
+use super::context::Context;
+use super::html::{escape, shown};
+use crate::Result;
+use crate::candidate::Candidate;
+use crate::row::Row;
+use crate::table::number;
+
+/// The section; empty without pictures.
+///
+/// # Errors
+/// Only cancellation.
+pub(super) fn body(
+    context: &Context<'_>,
+    album: &Album<'_>,
+    settings: &ReportSettings,
+    task: &Task,
+) -> Result<String> {
+    let chosen = Chosen::new(context, album, settings);
+    if chosen.rows.is_empty() {
+        return Ok(String::new());
+    }
+    let cards = cards(context, album, &chosen.rows, task)?;
+    Ok(format!(
+        "<p>Each method’s worst answers first. The demonstrated region and the true one are green; \
+         what a method found is orange, paler where it is less sure.{}</p>\n\
+         <ul class=\"legend\"><li class=\"right\">right</li><li class=\"extra\">too much</li>\
+         <li class=\"missed\">missed</li></ul>\n{}<div class=\"cards\" id=\"cards\">\n{}</div>\n",
+        escape(&chosen.left_out),
+        controls(context, &chosen.rows),
+        cards.concat(),
+    ))
+}
+
+/// The rows with a card, by method and from the worst.
+struct Chosen<'a> {
+    rows: Vec<&'a Row>,
+    left_out: String,
+}
+
+impl<'a> Chosen<'a> {
+    fn new(context: &Context<'a>, album: &Album<'_>, settings: &ReportSettings) -> Self {
+        let (mut rows, mut left_out) = (Vec::new(), Vec::new());
+        // The floor answers everything, always.
+        let shown = context.methods.iter().filter(|method| **method != Candidate::Whole.name());
+        for &method in shown {
+            let answered = |row: &&Row| row.iou.is_some() && row.prediction.is_some();
+            let mut own: Vec<&Row> = context
+                .rows_of(method)
+                .filter(answered)
+                .filter(|row| album.pair(row).is_some())
+                .collect();
+            own.sort_by(|a, b| {
+                a.iou
+                    .unwrap_or(0.0)
+                    .total_cmp(&b.iou.unwrap_or(0.0))
+                    .then_with(|| a.key().cmp(&b.key()))
+            });
+            let limit =
+                if method == context.lead { settings.leading_cards } else { settings.other_cards };
+            if own.len() > limit {
+                left_out.push((limit, method));
+                own.truncate(limit);
+            }
+            rows.extend(own);
+        }
+        let left_out = if left_out.is_empty() {
+            String::new()
+        } else {
+            let limits =
+                [settings.leading_cards, settings.other_cards].into_iter().filter_map(|limit| {
+                    let methods = left_out.iter().filter(|(own, _)| *own == limit).map(|(_, m)| *m);
+                    let methods: Vec<&str> = methods.collect();
+                    (!methods.is_empty())
+                        .then(|| format!("the worst {limit} of {}", methods.join(", ")))
+                });
+            let mut limits: Vec<String> = limits.collect();
+            limits.dedup();
+            format!(
+                " To keep this page small it holds {}; all scores are under “All pairs”, all answers in \
+                 the folder predictions.",
+                limits.join(" and ")
+            )
+        };
+        Self { rows, left_out }
+    }
+}
+
+/// Drawn pair by pair, so that each file of answers is read once.
+fn cards(
+    context: &Context<'_>,
+    album: &Album<'_>,
+    rows: &[&Row],
+    task: &Task,
+) -> Result<Vec<String>> {
+    let mut by_pair: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (place, row) in rows.iter().enumerate() {
+        by_pair.entry(row.prediction.as_deref().unwrap_or_default()).or_default().push(place);
+    }
+    let pairs: Vec<Vec<usize>> = by_pair.into_values().collect();
+    let done = AtomicUsize::new(0);
+    let drawn: Vec<Result<Vec<(usize, String)>>> = pairs
+        .par_iter()
+        .map(|places| {
+            task.check()?;
+            let answers =
+                places.first().map(|&first| album.answers(rows[first])).unwrap_or_default();
+            let card = |&place: &usize| {
+                let row = rows[place];
+                (place, card(context, album, row, answers.get(&row.method)))
+            };
+            let cards = places.iter().map(card).collect();
+            let count = done.fetch_add(places.len(), Ordering::Relaxed) + places.len();
+            task.step("gallery", count, rows.len())?;
+            Ok(cards)
+        })
+        .collect();
+    let mut cards = vec![String::new(); rows.len()];
+    for (place, card) in drawn.into_iter().collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+        cards[place] = card;
+    }
+    Ok(cards)
+}
+
+fn card(context: &Context<'_>, album: &Album<'_>, row: &Row, answer: Option<&Answer>) -> String {
+    let (Some((source, target)), Some(answer)) = (album.pair(row), answer) else {
+        return String::new();
+    };
+    let iou = number(row.iou, 2);
+    let found = format!("{} by {}, IoU {iou}", row.target, row.method);
+    let pictures = [
+        Some(shown(&source.own("with the demonstrated region"), "source")),
+        Some(shown(&target.own("with the true region"), "truth")),
+        album
+            .region(target, answer, &format!("region found on {found}"))
+            .map(|p| shown(&p, "found")),
+        album
+            .error(target, answer, Side::Best, &format!("error on {found}"))
+            .map(|p| shown(&p, "error")),
+        album
+            .error(target, answer, Side::Other, &format!("error on {found}, from another side"))
+            .map(|p| shown(&p, "other side")),
+    ];
+    let mut words = format!("IoU <b>{iou}</b>");
+    if let Some(confidence) = row.confidence {
+        words += &format!(" · confidence <b>{}</b>", number(Some(confidence), 2));
+    }
+    if let Some(verdict) = row.verdict {
+        words += &format!(" · {}", in_words(verdict));
+    }
+    let attribute = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    format!(
+        "<article class=\"card\" data-method=\"{method}\" data-rank=\"{rank}\" data-group=\"{group}\" \
+         data-verdict=\"{verdict}\" data-iou=\"{iou}\" data-confidence=\"{confidence}\" \
+         data-name=\"{source} {target}\"><h3>{source} → {target}</h3>\
+         <p>{method} · {group} · {words}</p><div class=\"five\">{pictures}</div></article>\n",
+        method = escape(&row.method),
+        rank = context.methods.iter().position(|m| *m == row.method).unwrap_or(0),
+        group = escape(&row.group),
+        verdict = row.verdict.map_or("", in_words),
+        iou = attribute(row.iou),
+        confidence = attribute(row.confidence),
+        source = escape(&row.source),
+        target = escape(&row.target),
+        pictures = pictures.into_iter().flatten().collect::<String>(),
+    )
+}
+
+fn in_words(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Accept => "accept",
+        Verdict::Check => "check",
+        Verdict::Refuse => "refuse",
+    }
+}
+
+/// Filters and orders; hidden until the script that serves them runs.
+fn controls(context: &Context<'_>, rows: &[&Row]) -> String {
+    let option = |value: &str, words: &str, chosen: bool| {
+        let chosen = if chosen { " selected" } else { "" };
+        format!("<option value=\"{}\"{chosen}>{}</option>", escape(value), escape(words))
+    };
+    let select = |name: &str, label: &str, options: String| {
+        format!("<label>{label}<select name=\"{name}\">{options}</select></label>\n")
+    };
+    let has_card = |method: &&&str| rows.iter().any(|row| row.method == ***method);
+    let methods = context.methods.iter().filter(has_card);
+    let methods: String = methods.map(|m| option(m, m, *m == context.lead)).collect();
+    let groups: String = context.groups.iter().map(|g| option(g, g, false)).collect();
+    let verdicts: String = ["accept", "check", "refuse"].map(|v| option(v, v, false)).concat();
+    let orders = [
+        ("worst", "worst IoU first"),
+        ("best", "best IoU first"),
+        ("wrong", "most misplaced trust first"),
+        ("sure", "most confident first"),
+        ("unsure", "least confident first"),
+        ("method", "by method, worst first"),
+        ("group", "by group, worst first"),
+    ];
+    let orders: String = orders.map(|(value, words)| option(value, words, false)).concat();
+    format!(
+        "<form class=\"controls\" id=\"controls\" hidden aria-label=\"Which pairs are shown\">\n{}{}{}{}\
+         <label>Name holds<input name=\"words\" type=\"search\"></label>\n\
+         <output name=\"count\" aria-live=\"polite\"></output>\n</form>\n",
+        select("method", "Method", option("", "all", false) + &methods),
+        select("group", "Group", option("", "all", false) + &groups),
+        select("verdict", "Verdict", option("", "all", false) + &verdicts),
+        select("order", "Order", orders),
+    )
+}
