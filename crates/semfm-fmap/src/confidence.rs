@@ -10,7 +10,7 @@ use semfm_geom::Mesh;
 use serde::{Deserialize, Serialize};
 
 use crate::Region;
-use crate::clusters::Pieces;
+use crate::neighbour_graph::Pieces;
 
 /// From this agreement on the answer is accepted: above it two in three answers reach IoU .7.
 pub const ACCEPT: f64 = 0.6;

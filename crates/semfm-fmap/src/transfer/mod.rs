@@ -2,7 +2,7 @@
 //!
 //! | name | what |
 //! | --- | --- |
-//! | `fused` | transport between the clouds starts a bidirectional, feature-augmented ZoomOut |
+//! | `fused` | transport between the clouds starts a bidirectional, feature-augmented ZoomOut; the vote is spread along the target's own features |
 //! | `semfm` | the published method: two anchors, minimum-norm C, plain ZoomOut |
 //! | `anchored` | the same anchors, then feature-augmented ZoomOut and a diffused vote |
 //! | `sinkhorn` | unbalanced transport between the clouds, no map |
@@ -28,6 +28,7 @@ use crate::confidence::{Hypothesis, Verdict, is_one_piece, islands};
 use crate::features::JointFeatures;
 use crate::fit::FitReport;
 use crate::metrics::overlap;
+use crate::propagation::{PropagationSettings, propagate};
 use crate::transport::{Plan, couple};
 use crate::zoomout::MapSide;
 use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedShape, Region, Result, ShapePair};
@@ -212,6 +213,7 @@ impl<'a> Matching<'a> {
             Some(map) => {
                 let diffusion = Method::Fused.diffusion();
                 let votes = self.votes_by_map(map, Rule::Preimage, diffusion, &inside)?;
+                let votes = self.spread(votes, &Method::Fused.propagation())?;
                 at_threshold(&votes, Method::Fused.threshold())
             }
         };
@@ -267,7 +269,23 @@ impl<'a> Matching<'a> {
                 self.target.onto_vertices(&neighbours.iter().map(mean).collect::<Vec<f64>>())
             }
         };
-        Ok(at_threshold(&raw, self.settings.threshold))
+        let spread = self.spread(raw, &self.settings.propagation)?;
+        Ok(at_threshold(&spread, self.settings.threshold))
+    }
+
+    /// A vote on the target's working vertices, spread along its features.
+    fn spread(&self, votes: Vec<f64>, settings: &PropagationSettings) -> Result<Vec<f64>> {
+        if settings.weight == 0.0 {
+            return Ok(votes);
+        }
+        let on_points: Vec<f64> = self
+            .target
+            .vertex_of_point()
+            .iter()
+            .map(|&v| votes[v as usize].clamp(0.0, 1.0))
+            .collect();
+        let spread = propagate(self.target.graph(), self.target.masses(), &on_points, settings)?;
+        Ok(self.target.onto_vertices(&spread))
     }
 
     fn votes_by_map(
