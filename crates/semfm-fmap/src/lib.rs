@@ -43,7 +43,7 @@ pub mod transport;
 pub mod zoomout;
 
 pub use anchors::{Anchor, Anchors};
-pub use confidence::{Hypothesis, Verdict};
+pub use confidence::{Evidence, Hypothesis, Verdict};
 pub use error::{Error, Result};
 pub use functional_map::FunctionalMap;
 pub use nearest_rows::nearest_rows;

@@ -24,7 +24,9 @@ use std::time::Instant;
 use faer::Mat;
 use semfm_geom::Task;
 
-use crate::confidence::{Hypothesis, Verdict, is_one_piece, islands};
+use crate::confidence::{
+    Evidence, Hypothesis, Verdict, is_one_piece, islands, probability_by_agreement,
+};
 use crate::features::JointFeatures;
 use crate::fit::FitReport;
 use crate::metrics::overlap;
@@ -42,7 +44,8 @@ pub struct Transfer {
     /// The region on the target. Weights are scaled so that the method's threshold stands at
     /// [`Region::COUNTS`].
     pub region: Region,
-    /// Agreement with an independent opinion, in [0, 1].
+    /// The probability that the region's IoU with the truth is at least one half, in [0, 1]
+    /// ([`confidence`](crate::confidence) says how it is known).
     pub confidence: f64,
     /// What to do with the answer.
     pub verdict: Verdict,
@@ -111,6 +114,7 @@ pub struct Matching<'a> {
     source: &'a PreparedShape<'a>,
     target: &'a PreparedShape<'a>,
     settings: TransferSettings,
+    joint: JointFeatures,
     plan: Plan,
     anchors: Anchors,
     matched: Matched,
@@ -177,7 +181,7 @@ impl<'a> Matching<'a> {
                 Some(fused::match_pair(&pair, &plan, &mut stages)?)
             }
         };
-        Ok(Self { source, target, settings, plan, anchors, matched, voter, witness, stages })
+        Ok(Self { source, target, settings, joint, plan, anchors, matched, voter, witness, stages })
     }
 
     /// The semantic anchors of the pair.
@@ -236,15 +240,21 @@ impl<'a> Matching<'a> {
         let other_rule = other.as_deref().map(onto_original).transpose()?;
         let other_iou = other.map(|other| overlap(&mask(&votes), &mask(&other), areas));
         let region = onto_original(&votes)?;
-        let verdict = if region.is_empty() { Verdict::Refuse } else { Verdict::of(agreement) };
+        let evidence = self.evidence(&inside, &votes);
+        let confidence = match self.settings.method {
+            _ if region.is_empty() => 0.0,
+            Method::Fused => evidence.probability(),
+            _ => probability_by_agreement(agreement),
+        };
         stages.put("vote", start.elapsed());
-        let report =
-            stages.time("report", || Ok(self.report(agreement, other_iou, &votes, &inside)))?;
+        let report = stages.time("report", || {
+            Ok(self.report((agreement, evidence), other_iou, &votes, &inside))
+        })?;
         let report = TransferReport { stages_ms: stages, ..report };
         Ok(Transfer {
             region,
-            confidence: agreement,
-            verdict,
+            confidence,
+            verdict: Verdict::of(confidence),
             hypotheses,
             point_map: self.matched.point_map.onto_originals(self.source.shape(), shape),
             other_rule,
@@ -320,6 +330,20 @@ impl<'a> Matching<'a> {
 
     fn votes_by_transport(&self, inside: &[bool]) -> Vec<f64> {
         self.target.onto_vertices(&self.plan.vote(&self.on_points(inside)))
+    }
+
+    fn evidence(&self, inside: &[bool], votes: &[f64]) -> Evidence {
+        let region: Vec<bool> =
+            self.source.vertex_of_point().iter().map(|&v| inside[v as usize]).collect();
+        let answered = mask(votes);
+        let answer: Vec<bool> =
+            self.target.vertex_of_point().iter().map(|&v| answered[v as usize]).collect();
+        Evidence::gather(
+            (votes, &self.target.shape().basis().mass),
+            (&self.joint, &self.plan),
+            (&region, &answer),
+            (self.source.masses(), self.target.masses()),
+        )
     }
 
     fn on_points(&self, inside: &[bool]) -> Vec<f64> {
