@@ -12,7 +12,7 @@ use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
-use commands::{Outcome, completions, demo, info, region, transfer, views};
+use commands::{Outcome, completions, demo, eval, info, region, transfer, views};
 use options::Common;
 
 /// Carry a demonstrated region from one object to another.
@@ -34,6 +34,7 @@ enum Command {
     Views(views::Views),
     Region(region::MakeRegion),
     Transfer(Box<transfer::Carry>),
+    Eval(Box<eval::Evaluate>),
     Info(info::Info),
     Completions(completions::Completions),
 }
@@ -54,6 +55,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Views(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),
+        Command::Eval(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     });

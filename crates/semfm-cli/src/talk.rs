@@ -52,3 +52,27 @@ pub fn watched(quiet: bool) -> Task {
         }
     })
 }
+
+/// As [`watched`], for long runs of one stage: with the time that is left. It is reckoned from the
+/// first report on, so that what an interrupted run had done does not count as speed.
+pub fn watched_with_time_left(quiet: bool) -> Task {
+    if quiet || !std::io::stderr().is_terminal() {
+        return Task::default();
+    }
+    let style = ProgressStyle::with_template("{prefix:>12} {bar:30} {pos}/{len} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_style(style);
+    let start = std::time::Instant::now();
+    Task::with_progress(move |progress| {
+        bar.set_prefix(progress.stage.to_owned());
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+        let left = progress.total.saturating_sub(progress.done) as f64;
+        let each = start.elapsed().as_secs_f64() / progress.done.max(1) as f64;
+        let seconds = (left * each).round() as u64;
+        bar.set_message(format!("{}:{:02} left", seconds / 60, seconds % 60));
+        if progress.done >= progress.total {
+            bar.finish_and_clear();
+        }
+    })
+}

@@ -94,17 +94,7 @@ impl PreparedObject {
         task: &Task,
     ) -> Result<Self> {
         let start = Instant::now();
-        let (cloud, lifted) = match meaning {
-            Meaning::Views(views) => {
-                let lifted = lift(&mesh, views, &settings.lift, task)?;
-                (lifted.cloud, Some(lifted.report))
-            }
-            Meaning::PerVertex(features) => {
-                let n_points = settings.lift.n_samples;
-                (cloud_of_vertices(&mesh, features, n_points)?, None)
-            }
-            Meaning::Cloud(cloud) => (cloud.into_owned(), None),
-        };
+        let (cloud, lifted) = semantic_cloud(&mesh, meaning, &settings.lift, task)?;
         let lift_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
         let cached = settings.cache.shape(mesh, &settings.shape, task)?;
@@ -120,6 +110,29 @@ impl PreparedObject {
 
     fn semantic(&self) -> SemanticShape<'_> {
         SemanticShape { shape: &self.shape, cloud: &self.cloud }
+    }
+}
+
+/// The meaning of a mesh as a cloud on its surface, and how well views covered it, where there were
+/// views. [`PreparedObject::new`] does this; alone it serves who gives one shape several meanings.
+///
+/// # Errors
+/// Whatever the lifting reports; [`Error::Invalid`] where per-vertex features do not fit the mesh.
+pub fn semantic_cloud(
+    mesh: &Mesh,
+    meaning: Meaning<'_>,
+    settings: &LiftSettings,
+    task: &Task,
+) -> Result<(SemanticCloud, Option<LiftReport>)> {
+    match meaning {
+        Meaning::Views(views) => {
+            let lifted = lift(mesh, views, settings, task)?;
+            Ok((lifted.cloud, Some(lifted.report)))
+        }
+        Meaning::PerVertex(features) => {
+            Ok((cloud_of_vertices(mesh, features, settings.n_samples)?, None))
+        }
+        Meaning::Cloud(cloud) => Ok((cloud.into_owned(), None)),
     }
 }
 

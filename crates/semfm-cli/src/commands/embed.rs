@@ -3,12 +3,14 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use semfm::geom::ShapeCache;
-use semfm::geom::io::MeshFile;
+use semfm::geom::io::{MeshFile, write_atomically};
 use semfm::views::RigSettings;
 use semfm::views::mcap::EmbeddingsFile;
+use serde::{Deserialize, Serialize};
 
 use super::views::make_views;
 use crate::options::Common;
@@ -16,6 +18,15 @@ use crate::{load, talk};
 
 /// Names the program that embeds; else `semfm-embed` is looked for on the PATH.
 const PROGRAM: &str = "SEMFM_EMBED";
+
+/// What making the embeddings of an object took, the encoder's start included.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Took {
+    /// Milliseconds for the pictures.
+    pub views_ms: f64,
+    /// Milliseconds for the encoder.
+    pub embed_ms: f64,
+}
 
 /// An encoder and where its work is kept.
 pub struct Encoder {
@@ -36,16 +47,36 @@ impl Encoder {
 
     /// The embeddings of an object's default views, made where they are not there yet.
     pub fn embed(&self, file: &MeshFile, colored: bool, common: &Common) -> Result<EmbeddingsFile> {
+        Ok(self.embed_timed(file, colored, common)?.0)
+    }
+
+    /// The same, and what making them took, now or then.
+    pub fn embed_timed(
+        &self,
+        file: &MeshFile,
+        colored: bool,
+        common: &Common,
+    ) -> Result<(EmbeddingsFile, Option<Took>)> {
         let path = self.folder.join(format!("{}.emb.mcap", self.key(file, colored)));
         // Whatever is wrong with a kept file, a new one is the cure.
         if let Ok(kept) = load::embeddings(&path, &file.mesh) {
-            return Ok(kept);
+            let took = std::fs::read(path.with_extension("took.json")).ok();
+            let took = took.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+            return Ok((kept, took));
         }
+        let start = Instant::now();
         let scratch = tempfile::tempdir().context("a folder for the views")?;
         let views = scratch.path().join("object.views.mcap");
         make_views(file, colored, &RigSettings::default(), &views, common)?;
+        let views_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
         self.run(&views, &path, common)?;
-        load::embeddings(&path, &file.mesh)
+        let took = Took { views_ms, embed_ms: start.elapsed().as_secs_f64() * 1e3 };
+        // The times are beside the point: embeddings without them are as good.
+        let _ = write_atomically(path.with_extension("took.json"), |out| {
+            Ok(serde_json::to_writer(out, &took)?)
+        });
+        Ok((load::embeddings(&path, &file.mesh)?, Some(took)))
     }
 
     fn run(&self, views: &Path, output: &Path, common: &Common) -> Result<()> {

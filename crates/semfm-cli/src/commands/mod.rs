@@ -3,6 +3,7 @@
 pub mod completions;
 pub mod demo;
 pub mod embed;
+pub mod eval;
 pub mod info;
 pub mod region;
 pub mod transfer;

@@ -4,7 +4,7 @@ mod hks;
 mod wks;
 
 pub use hks::{HksSettings, hks};
-pub use wks::{WksSettings, wks};
+pub use wks::{WksSettings, landmark_wks, wks};
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
@@ -71,6 +71,22 @@ mod tests {
                 assert!(column.iter().all(|d| d.is_finite() && *d >= 0.0), "{name}");
             }
         }
+    }
+
+    #[test]
+    fn the_landmark_kernel_is_the_signature_at_the_landmark_itself() {
+        let torus = zoo::torus(20, 10);
+        let basis = basis(&torus, 30);
+        let settings = WksSettings { n_energies: 12 };
+        let signature = wks(&basis, &settings).unwrap();
+        let kernel = landmark_wks(&basis, &[7, 40], &settings).unwrap();
+        assert_eq!((kernel.nrows(), kernel.ncols()), (torus.n_vertices(), 24));
+        for e in 0..12 {
+            assert!((kernel[(7, e)] - signature[(7, e)]).abs() < 1e-12);
+            assert!((kernel[(40, 12 + e)] - signature[(40, e)]).abs() < 1e-12);
+            assert!((kernel[(40, e)] - kernel[(7, 12 + e)]).abs() < 1e-12, "not symmetric");
+        }
+        assert!(landmark_wks(&basis, &[u32::MAX], &settings).is_err());
     }
 
     #[test]

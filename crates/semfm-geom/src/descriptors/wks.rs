@@ -33,6 +33,38 @@ const BAND: f64 = 7.0;
 /// # Errors
 /// [`Error::OutOfRange`] for no energies, or a basis without an eigenvalue above zero.
 pub fn wks(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
+    Ok(weighted_squares(basis, bands(basis, settings)?))
+}
+
+/// The wave kernel between each vertex and each of some landmarks, (n × landmarks · n_energies),
+/// landmark by landmark: Σ exp(−(e − ln λ)² / 2σ²) φ(landmark) φ, divided by the sum of the
+/// exponentials. Where two shapes share landmarks, these functions correspond, whatever the
+/// symmetries of the shapes.
+///
+/// # Errors
+/// As [`wks`]; [`Error::OutOfRange`] for a landmark beyond the vertices.
+pub fn landmark_wks(
+    basis: &Eigenbasis,
+    landmarks: &[u32],
+    settings: &WksSettings,
+) -> Result<Mat<f64>> {
+    if let Some(landmark) = landmarks.iter().find(|&&l| l as usize >= basis.n_vertices()) {
+        let expected = format!("a vertex below {}", basis.n_vertices());
+        let found = landmark.to_string();
+        return Err(Error::OutOfRange { what: "landmark", expected, found });
+    }
+    let bands = bands(basis, settings)?;
+    let n = bands.ncols();
+    let totals: Vec<f64> = (0..n).map(|e| bands.col(e).iter().sum()).collect();
+    let weights = Mat::from_fn(basis.k(), landmarks.len() * n, |k, column| {
+        let (landmark, e) = (landmarks[column / n] as usize, column % n);
+        bands[(k, e)] / totals[e] * basis.functions[(landmark, k)]
+    });
+    Ok(basis.reconstruct_all(weights.as_ref()))
+}
+
+/// Weight of each eigenfunction in each band of energy (k × n_energies), up to a factor a band.
+fn bands(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
     let n = settings.n_energies;
     if n == 0 {
         return Err(Error::OutOfRange {
@@ -56,5 +88,5 @@ pub fn wks(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
         let top = positive.iter().map(|&k| exponent(k, e)).fold(f64::NEG_INFINITY, f64::max);
         positive.iter().for_each(|&k| weights[(k, e)] = (exponent(k, e) - top).exp());
     }
-    Ok(weighted_squares(basis, weights))
+    Ok(weights)
 }

@@ -1,0 +1,376 @@
+//! `semfm-cli eval`: how well regions are carried, measured.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::{ArgGroup, Args};
+use semfm::geom::ShapeCache;
+use semfm::geom::io::MeshFile;
+use semfm_eval::compare::Comparison;
+use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
+use semfm_eval::dataset::{Dataset, folder};
+use semfm_eval::embeddings::Embedded;
+use semfm_eval::matching::{self, MatchingDataset, MatchingSettings};
+use semfm_eval::workers::Workers;
+use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, table, vlm};
+use semfm_synth::Level;
+use serde_json::json;
+
+use super::Outcome;
+use super::embed::Encoder;
+use crate::options::Common;
+use crate::talk;
+
+/// Measure how well regions are carried: every method, every ordered pair
+///
+/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region; or a folder of
+/// sets with true correspondences (`SET/pairs.txt`, `SET/NAME.npz`), which point maps are measured
+/// on; or none with `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic"]))]
+#[command(after_help = "Examples:\n  \
+    semfm-cli eval --synthetic -o report\n  \
+    semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
+    semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
+    Exit code 0: measured (failed pairs are told in the results). 2: bad input, or nothing could be measured.")]
+pub struct Evaluate {
+    /// Folder of labelled objects
+    dataset: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    #[command(flatten)]
+    synthetic: SyntheticOptions,
+    #[command(flatten)]
+    features: FeatureOptions,
+    #[command(flatten)]
+    methods: MethodOptions,
+    #[command(flatten)]
+    work: WorkOptions,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Procedural objects")]
+struct SyntheticOptions {
+    /// Evaluate on procedural objects with a simulated encoder
+    #[arg(long)]
+    synthetic: bool,
+    /// How hard the simulated features are: easy, medium or hard
+    #[arg(long, requires = "synthetic", default_value_t = Level::Medium)]
+    level: Level,
+    /// Seeds of the objects: 0..2, or 0,3,7
+    #[arg(long, requires = "synthetic", default_value = "0..2", value_name = "SEEDS")]
+    seeds: Seeds,
+    /// Objects of each category and seed
+    #[arg(long, requires = "synthetic", default_value_t = 4, value_name = "N")]
+    objects: usize,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What the surfaces mean")]
+struct FeatureOptions {
+    /// Folder of `NAME.emb.mcap` [default: beside the meshes]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["encoder", "synthetic"])]
+    embeddings: Option<PathBuf>,
+    /// Make the embeddings: a Hugging Face name, a local checkpoint, or an ONNX encoder's JSON
+    #[arg(long, value_name = "MODEL", conflicts_with = "synthetic")]
+    encoder: Option<String>,
+    /// `fused`: give the published method our views and lifting instead of its own
+    #[arg(long, value_name = "METHOD", value_parser = ["fused", "semfm"])]
+    features: Option<String>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Methods")]
+struct MethodOptions {
+    /// Which methods, by comma: fused, anchored, sinkhorn, nearest, semfm+, semfm+image, semfm,
+    /// semfm-image, wks, oracle, whole; for true correspondences wks, wks+zoomout, landmarks,
+    /// landmarks+zoomout, true20+zoomout [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "A,B")]
+    methods: Vec<String>,
+    /// Change a setting of a method, as fused.threshold=0.35 (repeatable)
+    #[arg(long, value_name = "METHOD.KEY=VALUE")]
+    set: Vec<Override>,
+    /// Seed of everything drawn by chance
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Score a vision-language model's rows (`semfm.vlm/1`) beside the methods
+    #[arg(long, value_name = "ROWS.json")]
+    vlm: Option<PathBuf>,
+    /// Simplify larger meshes to this many vertices; 0 keeps them all
+    #[arg(long, value_name = "N")]
+    working_vertices: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Work")]
+struct WorkOptions {
+    /// Pairs at once; 0 takes one for each thread. Results do not depend on it
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    jobs: usize,
+    /// Say what changed since these results, worst first
+    #[arg(long, value_name = "OLD/results.json")]
+    compare: Option<PathBuf>,
+    /// For true correspondences: samples that an error is the mean of; 0 takes all
+    #[arg(long, default_value_t = MatchingSettings::default().n_samples, value_name = "N")]
+    samples: usize,
+    /// Forget what an interrupted run left
+    #[arg(long)]
+    fresh: bool,
+    /// Do not keep the predictions, only their scores
+    #[arg(long)]
+    no_predictions: bool,
+    /// Neither use nor keep prepared shapes and embeddings
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl Evaluate {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        if let Some(path) = self.dataset.as_deref().filter(|path| MatchingDataset::is_one(path)) {
+            return self.run_matching(path, common);
+        }
+        // What cannot be compared with should be known before the work is done.
+        let before = self.work.compare.as_deref().map(Results::read).transpose()?;
+        let dataset = self.dataset()?;
+        let scratch = tempfile::tempdir().context("a folder for embeddings")?;
+        let encoder = self.features.encoder.as_deref().map(|model| Made {
+            model: model.to_owned(),
+            keep: !self.work.no_cache,
+            scratch: scratch.path(),
+            workers: Workers::new(common.threads, self.work.jobs),
+            common: *common,
+        });
+        let embeddings = match &encoder {
+            Some(encoder) => EmbeddingSource::Encoder(encoder),
+            None => EmbeddingSource::Files(self.features.embeddings.clone()),
+        };
+        let settings = self.settings(common)?;
+        self.announce(&dataset, &settings, common);
+        let task = talk::watched_with_time_left(common.quiet);
+        let vlm = self.methods.vlm.as_deref().map(|path| vlm::read(path, &dataset)).transpose()?;
+        let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
+        if finished.resumed > 0 && !common.quiet {
+            talk::remark(format_args!("went on after {} pairs done before", finished.resumed));
+        }
+        if let Some(rows) = vlm {
+            finished.results = finished.results.with_rows(rows);
+        }
+        let results = &finished.results;
+        let mut files = vec![results.write(&self.output)?, table::write(results, &self.output)?];
+        let comparison = before.map(|before| Comparison::new(&before, results));
+        if let Some(comparison) = &comparison {
+            files.extend(comparison.write(&self.output)?);
+        }
+        let results = finished.close()?;
+        tell(&results, comparison.as_ref(), &files, common);
+        judge(&results, common)
+    }
+
+    fn dataset(&self) -> Result<Dataset> {
+        if let Some(path) = &self.dataset {
+            return Ok(folder::open(path)?);
+        }
+        let SyntheticOptions { level, ref seeds, objects, .. } = self.synthetic;
+        Ok(make(&SyntheticSettings { level, seeds: seeds.0.clone(), n_objects: objects })?)
+    }
+
+    fn settings(&self, common: &Common) -> Result<EvalSettings> {
+        let mut settings = EvalSettings {
+            overrides: self.methods.set.clone(),
+            seed: self.methods.seed,
+            workers: Workers::new(common.threads, self.work.jobs),
+            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            keep_predictions: !self.work.no_predictions,
+            fresh: self.work.fresh,
+            program: program()?,
+            ..EvalSettings::default()
+        };
+        if !self.methods.methods.is_empty() {
+            settings.candidates = parsed(&self.methods.methods)?;
+        }
+        if self.features.features.as_deref() == Some("fused") {
+            let mut candidates: Vec<Candidate> = Vec::new();
+            for candidate in settings.candidates.iter().map(|c| c.with_our_features()) {
+                if !candidates.contains(&candidate) {
+                    candidates.push(candidate);
+                }
+            }
+            settings.candidates = candidates;
+        }
+        if let Some(n) = self.methods.working_vertices {
+            settings.shape.working_vertices = n;
+        }
+        Ok(settings)
+    }
+
+    /// Point maps on sets with true correspondences.
+    fn run_matching(&self, path: &Path, common: &Common) -> Result<Outcome> {
+        let SyntheticOptions { synthetic, .. } = self.synthetic;
+        let FeatureOptions { embeddings, encoder, features } = &self.features;
+        let unfit = [
+            ("--synthetic", synthetic),
+            ("--embeddings", embeddings.is_some()),
+            ("--encoder", encoder.is_some()),
+            ("--features", features.is_some()),
+            ("--set", !self.methods.set.is_empty()),
+            ("--vlm", self.methods.vlm.is_some()),
+            ("--compare", self.work.compare.is_some()),
+        ];
+        if let Some((name, _)) = unfit.iter().find(|(_, given)| *given) {
+            bail!("{name} has no meaning for true correspondences, which {} holds", path.display());
+        }
+        let dataset = MatchingDataset::open(path)?;
+        let mut settings = MatchingSettings {
+            n_samples: self.work.samples,
+            workers: Workers::new(common.threads, self.work.jobs),
+            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            ..MatchingSettings::default()
+        };
+        if !self.methods.methods.is_empty() {
+            settings.methods = parsed(&self.methods.methods)?;
+        }
+        let task = talk::watched_with_time_left(common.quiet);
+        let results = matching::run(&dataset, &settings, &task)?;
+        let files = results.write(&self.output)?;
+        if common.json {
+            let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+            talk::say(json!({ "summaries": results.summaries, "files": files }));
+        } else {
+            talk::say(matching::table::render(&results));
+            wrote(&files);
+        }
+        if results.rows.iter().all(|row| row.error.is_none()) {
+            let first = results.rows.iter().find_map(|row| row.failure.as_deref());
+            bail!("no map could be measured; the first: {}", first.unwrap_or("no pair"));
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
+        if !common.quiet {
+            talk::remark(format_args!(
+                "{} pairs of {} objects in {} groups, {} methods, {} at once",
+                dataset.n_pairs(),
+                dataset.objects.len(),
+                dataset.groups.len(),
+                settings.candidates.len(),
+                settings.workers.jobs,
+            ));
+        }
+    }
+}
+
+/// Names of methods, read.
+fn parsed<T: std::str::FromStr<Err = semfm_eval::Error>>(names: &[String]) -> Result<Vec<T>> {
+    Ok(names.iter().map(|name| name.trim().parse()).collect::<Result<_, _>>()?)
+}
+
+/// Hash of the running program: rows of another build are no rows of this one.
+fn program() -> Result<String> {
+    let path = std::env::current_exe().context("the path of this program")?;
+    let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    Ok(format!("{} {}", env!("CARGO_PKG_VERSION"), &blake3::hash(&bytes).to_hex()[..16]))
+}
+
+/// Seeds as a range or a list.
+#[derive(Clone, Debug)]
+struct Seeds(Vec<u64>);
+
+impl std::str::FromStr for Seeds {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let number = |text: &str| {
+            text.trim().parse::<u64>().map_err(|_| format!("expected 0..2 or 0,3,7, found {text}"))
+        };
+        let seeds: Vec<u64> = match text.split_once("..") {
+            Some((first, end)) => {
+                let (first, end) = (number(first)?, number(end)?);
+                if end.saturating_sub(first) > 10_000 {
+                    return Err(format!("expected at most 10000 seeds, found {text}"));
+                }
+                (first..end).collect()
+            }
+            None => text.split(',').map(number).collect::<std::result::Result<_, _>>()?,
+        };
+        if seeds.is_empty() {
+            Err(format!("expected at least one seed, found {text}"))
+        } else {
+            Ok(Self(seeds))
+        }
+    }
+}
+
+/// The sidecar as an encoder of the evaluation.
+struct Made<'a> {
+    model: String,
+    keep: bool,
+    scratch: &'a Path,
+    workers: Workers,
+    common: Common,
+}
+
+impl semfm_eval::Encoder for Made<'_> {
+    fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String> {
+        let make = || -> Result<Embedded> {
+            let encoder = Encoder::new(&self.model, rolls, self.keep, self.scratch)?;
+            // Several encoders at work at once share the cores, as the pairs do.
+            let threads = self.workers.threads;
+            let quiet = Common { quiet: true, threads, ..self.common };
+            // All objects are shown in grey: colour on one side of a pair misleads.
+            let (file, took) = encoder.embed_timed(file, false, &quiet)?;
+            Ok(Embedded {
+                views: file.views,
+                encoder: file.metadata.encoder,
+                rolls: file.metadata.rolls,
+                views_ms: took.map(|took| took.views_ms),
+                embed_ms: took.map(|took| took.embed_ms),
+            })
+        };
+        make().map_err(|error| format!("{error:#}"))
+    }
+
+    fn identity(&self) -> String {
+        format!("encoder {}", self.model)
+    }
+}
+
+fn tell(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], common: &Common) {
+    if common.json {
+        talk::say(json!({
+            "n_rows": results.rows.len(),
+            "n_failed": results.rows.iter().filter(|row| row.failure.is_some()).count(),
+            "summaries": results.summaries,
+            "comparison": comparison.map(|comparison| &comparison.methods),
+            "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+        }));
+        return;
+    }
+    talk::say(table::render(results));
+    if let Some(comparison) = comparison {
+        talk::say(comparison.render());
+    }
+    wrote(files);
+}
+
+fn wrote(files: &[PathBuf]) {
+    talk::say("wrote");
+    files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
+}
+
+/// Failed rows are told; a run without a single score has failed.
+fn judge(results: &Results, common: &Common) -> Result<Outcome> {
+    let failed = results.rows.iter().filter(|row| row.failure.is_some()).count();
+    if results.rows.iter().all(|row| row.iou.is_none()) {
+        let first = results.rows.iter().find_map(|row| row.failure.as_ref());
+        bail!("no pair could be measured; the first: {}", first.map_or("no pair", |f| &f.text));
+    }
+    if failed > 0 && !common.quiet {
+        talk::remark(format_args!(
+            "{failed} of {} rows failed, see the results",
+            results.rows.len()
+        ));
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,266 @@
+//! A folder of real meshes: `<category>/<name>.obj` (or another format) beside `<name>.json`.
+//!
+//! The label holds `region.vertices` and perhaps `parts`, which name the vertices of each part. An
+//! object without a label is a target that nobody scores, and a folder without labelled objects is
+//! no category; both are left out. `pairs.json` at the root (group → \[\[source, target\], …\]) chooses
+//! pairs; else each category's labelled objects form all ordered pairs.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::region_file::read_region;
+use serde::Deserialize;
+
+use super::{
+    Dataset, DatasetOrigin, Group, LabelledObject, ObjectEntry, ObjectSource, ordered_pairs,
+};
+use crate::{Error, Result};
+
+/// The file that chooses pairs.
+const PAIRS: &str = "pairs.json";
+
+/// Opens a folder: finds the labelled objects and the pairs, and hashes both.
+///
+/// # Errors
+/// [`Error::Io`] for what cannot be read, [`Error::Format`] where `pairs.json` is not what it should
+/// be or names an object without a label, or where the folder has no pair to score.
+pub fn open(path: &Path) -> Result<Dataset> {
+    let mut objects = Vec::new();
+    for folder in entries(path)?.into_iter().filter(|entry| entry.is_dir()) {
+        objects.extend(labelled(&folder)?);
+    }
+    let chosen = path.join(PAIRS);
+    let groups =
+        if chosen.is_file() { chosen_pairs(&chosen, &objects)? } else { all_pairs(&objects) };
+    if groups.iter().all(|group| group.pairs.is_empty()) {
+        let expected = "at least two labelled objects in a category (NAME.obj beside NAME.json)";
+        let found = format!("{} labelled objects and no pair", objects.len());
+        return Err(Error::format(path, "folder", expected, found));
+    }
+    let (objects, groups) = only_used(objects, groups);
+    let hash = hash(&objects, &groups)?;
+    let origin = DatasetOrigin::Folder { path: path.to_owned() };
+    Ok(Dataset { origin, hash, objects, groups })
+}
+
+/// Mesh, region and parts of one object.
+pub(super) fn load(mesh: &Path, label: &Path) -> Result<LabelledObject> {
+    let file = read_mesh(mesh)?;
+    let truth = read_region(label, &file.mesh)?;
+    let parts = read_parts(label, file.mesh.n_vertices())?;
+    Ok(LabelledObject { file, truth, parts, procedural: None })
+}
+
+fn read_parts(label: &Path, n_vertices: usize) -> Result<BTreeMap<String, Vec<u32>>> {
+    #[derive(Deserialize)]
+    struct Label {
+        #[serde(default)]
+        parts: BTreeMap<String, Vec<u32>>,
+    }
+    let bytes = std::fs::read(label).map_err(Error::io(label))?;
+    let expected = "part names with lists of vertex ids";
+    let Label { parts } = serde_json::from_slice(&bytes)
+        .map_err(|error| Error::format(label, "parts", expected, error.to_string()))?;
+    for (name, ids) in &parts {
+        if let Some(at) = ids.iter().position(|&id| id as usize >= n_vertices) {
+            let expected = format!("ids below {n_vertices}, the mesh's vertex count");
+            let place = format!("parts.{name}[{at}]");
+            return Err(Error::format(label, place, expected, ids[at].to_string()));
+        }
+    }
+    Ok(parts)
+}
+
+/// Files and folders in a folder, sorted by name.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut paths = std::fs::read_dir(folder)
+        .and_then(|entries| {
+            entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>()
+        })
+        .map_err(Error::io(folder))?;
+    paths.sort();
+    Ok(paths)
+}
+
+/// The objects of a category folder that have a label.
+fn labelled(folder: &Path) -> Result<Vec<ObjectEntry>> {
+    let name_of = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let category =
+        folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut objects: Vec<ObjectEntry> = Vec::new();
+    for mesh in entries(folder)? {
+        let (label, Some(name)) = (mesh.with_extension("json"), name_of(&mesh)) else { continue };
+        let is_mesh = mesh.is_file() && MeshFormat::from_path(&mesh).is_some();
+        // One object in two formats counts once.
+        let known = objects.last().is_some_and(|last| last.name == name);
+        if is_mesh && label.is_file() && !known {
+            let source = ObjectSource::Files { mesh, label };
+            objects.push(ObjectEntry { name, category: category.clone(), source });
+        }
+    }
+    Ok(objects)
+}
+
+fn all_pairs(objects: &[ObjectEntry]) -> Vec<Group> {
+    let mut members = BTreeMap::<&str, Vec<usize>>::new();
+    for (place, object) in objects.iter().enumerate() {
+        members.entry(&object.category).or_default().push(place);
+    }
+    members
+        .into_iter()
+        .map(|(name, members)| Group { name: name.to_owned(), pairs: ordered_pairs(&members) })
+        .filter(|group| !group.pairs.is_empty())
+        .collect()
+}
+
+fn chosen_pairs(path: &Path, objects: &[ObjectEntry]) -> Result<Vec<Group>> {
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let listed: BTreeMap<String, Vec<[String; 2]>> =
+        serde_json::from_slice(&bytes).map_err(|error| {
+            let expected = "group → [[source, target], …]";
+            Error::format(path, format!("line {}", error.line()), expected, error.to_string())
+        })?;
+    let mut places = HashMap::<String, Vec<usize>>::new();
+    for (place, object) in objects.iter().enumerate() {
+        places.entry(object.name.clone()).or_default().push(place);
+        places.insert(format!("{}/{}", object.category, object.name), vec![place]);
+    }
+    let find = |group: &str, name: &str| match places.get(name).map(Vec::as_slice) {
+        Some([place]) => Ok(*place),
+        Some(_) => {
+            let expected = "CATEGORY/NAME, for several categories have this name";
+            Err(Error::format(path, group, expected, name))
+        }
+        None => Err(Error::format(path, group, "the name of a labelled object", name)),
+    };
+    let mut groups = Vec::new();
+    for (name, pairs) in listed {
+        let pairs = pairs.iter().map(|[source, target]| {
+            let pair = (find(&name, source)?, find(&name, target)?);
+            if pair.0 == pair.1 {
+                let found = format!("{source} with itself");
+                return Err(Error::format(path, &name, "two different objects", found));
+            }
+            Ok(pair)
+        });
+        groups.push(Group { pairs: pairs.collect::<Result<_>>()?, name });
+    }
+    Ok(groups)
+}
+
+/// Leaves out objects that no pair names, and numbers the rest anew.
+fn only_used(objects: Vec<ObjectEntry>, groups: Vec<Group>) -> (Vec<ObjectEntry>, Vec<Group>) {
+    let mut new_place = vec![None; objects.len()];
+    for &(source, target) in groups.iter().flat_map(|group| &group.pairs) {
+        (new_place[source], new_place[target]) = (Some(0), Some(0));
+    }
+    let mut kept = Vec::new();
+    for (object, place) in objects.into_iter().zip(&mut new_place).filter(|(_, p)| p.is_some()) {
+        *place = Some(kept.len());
+        kept.push(object);
+    }
+    let renumber = |place: usize| new_place[place].unwrap_or(0);
+    let groups = groups.into_iter().map(|group| {
+        let pairs = group.pairs.iter().map(|&(a, b)| (renumber(a), renumber(b))).collect();
+        Group { pairs, ..group }
+    });
+    (kept, groups.collect())
+}
+
+/// Names, contents of meshes and labels, and pairs.
+fn hash(objects: &[ObjectEntry], groups: &[Group]) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    for object in objects {
+        hasher.update(format!("{}/{}\n", object.category, object.name).as_bytes());
+        if let ObjectSource::Files { mesh, label } = &object.source {
+            for path in [mesh, label] {
+                let bytes = std::fs::read(path).map_err(Error::io(path))?;
+                hasher.update(blake3::hash(&bytes).as_bytes());
+            }
+        }
+    }
+    groups.iter().for_each(|group| {
+        hasher.update(format!("{group:?}\n").as_bytes());
+    });
+    Ok(format!("blake3:{}", hasher.finalize().to_hex()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm::Mesh;
+    use semfm::geom::io::write_mesh;
+    use semfm::geom::math::DVec3;
+
+    fn put(folder: &Path, category: &str, name: &str, label: Option<&str>) {
+        let folder = folder.join(category);
+        std::fs::create_dir_all(&folder).unwrap();
+        let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let mesh = Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
+        write_mesh(folder.join(format!("{name}.obj")), &mesh).unwrap();
+        if let Some(label) = label {
+            std::fs::write(folder.join(format!("{name}.json")), label).unwrap();
+        }
+    }
+
+    const LABEL: &str =
+        r#"{"region": {"vertices": [1, 2]}, "parts": {"grip": [1, 2], "rest": [0, 3]}}"#;
+
+    fn three_cups() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a", "b", "c"] {
+            put(folder.path(), "cups", name, Some(LABEL));
+        }
+        put(folder.path(), "cups", "unlabelled", None);
+        put(folder.path(), "coloured", "a", None);
+        folder
+    }
+
+    #[test]
+    fn all_ordered_pairs_of_a_category_unless_pairs_are_chosen() {
+        let folder = three_cups();
+        let dataset = open(folder.path()).unwrap();
+        assert_eq!((dataset.objects.len(), dataset.groups.len(), dataset.n_pairs()), (3, 1, 6));
+        let object = dataset.objects[0].load().unwrap();
+        assert_eq!(object.truth.vertices(), [1, 2]);
+        assert_eq!(object.parts["rest"], [0, 3]);
+
+        let chosen = r#"{"mugs": [["b", "cups/c"]], "again": [["c", "b"]]}"#;
+        std::fs::write(folder.path().join(PAIRS), chosen).unwrap();
+        let fewer = open(folder.path()).unwrap();
+        let names: Vec<&str> = fewer.objects.iter().map(|o| o.name.as_str()).collect();
+        assert_eq!(names, ["b", "c"]);
+        assert_eq!((&*fewer.groups[1].name, &fewer.groups[1].pairs[..]), ("mugs", &[(0, 1)][..]));
+        assert_ne!(dataset.hash, fewer.hash);
+    }
+
+    #[test]
+    fn the_hash_knows_the_labels() {
+        let folder = three_cups();
+        let before = open(folder.path()).unwrap().hash;
+        assert_eq!(before, open(folder.path()).unwrap().hash);
+        put(folder.path(), "cups", "b", Some(r#"{"region": {"vertices": [1]}}"#));
+        assert_ne!(before, open(folder.path()).unwrap().hash);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let folder = three_cups();
+        for (pairs, word) in [
+            (r#"{"mugs": [["a", "nobody"]]}"#, "nobody"),
+            (r#"{"mugs": [["a", "a"]]}"#, "itself"),
+            (r#"{"mugs": ["a"]}"#, "line 1"),
+            (r#"{"mugs": []}"#, "no pair"),
+        ] {
+            std::fs::write(folder.path().join(PAIRS), pairs).unwrap();
+            let error = open(folder.path()).unwrap_err().to_string();
+            assert!(error.contains(word), "{pairs}: {error}");
+        }
+        std::fs::remove_file(folder.path().join(PAIRS)).unwrap();
+        put(folder.path(), "cups", "a", Some(r#"{"vertices": [1], "parts": {"grip": [4]}}"#));
+        let error = open(folder.path()).unwrap().objects[0].load().unwrap_err().to_string();
+        assert!(error.contains("parts.grip[0]"), "{error}");
+        assert!(open(&folder.path().join("nowhere")).is_err());
+    }
+}

@@ -1,0 +1,136 @@
+//! Where features come from: files beside the meshes, an encoder, or the simulated one.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use semfm::Task;
+use semfm::geom::io::MeshFile;
+use semfm::views::EmbeddedView;
+use semfm::views::mcap::EmbeddingsFile;
+use semfm_synth::{embed, render_views};
+
+use crate::dataset::{LabelledObject, ObjectEntry, ObjectSource};
+use crate::{Error, Result};
+
+/// Rotations of each picture that the encoder averages: ours, and the published method's.
+pub const OUR_ROLLS: u32 = 4;
+/// The published method shows each picture once.
+pub const PAPER_ROLLS: u32 = 1;
+
+/// Embedded views of one object, and what making them took where that is known.
+#[derive(Clone, Debug)]
+pub struct Embedded {
+    /// The views.
+    pub views: Vec<EmbeddedView>,
+    /// Name of the encoder.
+    pub encoder: String,
+    /// Rotations of each picture that were averaged.
+    pub rolls: u32,
+    /// Milliseconds for the pictures.
+    pub views_ms: Option<f64>,
+    /// Milliseconds for the encoder.
+    pub embed_ms: Option<f64>,
+}
+
+/// Somebody who makes embeddings of a mesh's default views.
+pub trait Encoder: Sync {
+    /// Embeddings of `file`, averaged over `rolls` rotations.
+    ///
+    /// # Errors
+    /// Whatever keeps the encoder from its work, in words.
+    fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String>;
+
+    /// Names the encoder: another name, other features.
+    fn identity(&self) -> String;
+}
+
+/// Where an evaluation takes its features from.
+pub enum EmbeddingSource<'a> {
+    /// Files: `NAME.emb.mcap` (and, for the published method, `NAME.r1.emb.mcap` with one roll where
+    /// it is there) in a folder or in its subfolder CATEGORY; `None` for beside the meshes.
+    /// Procedural objects take the simulated encoder.
+    Files(Option<PathBuf>),
+    /// An encoder makes them.
+    Encoder(&'a dyn Encoder),
+}
+
+impl EmbeddingSource<'_> {
+    /// Names the features for the journal.
+    pub fn identity(&self) -> String {
+        match self {
+            Self::Files(None) => "files beside the meshes".into(),
+            Self::Files(Some(folder)) => format!("files in {}", folder.display()),
+            Self::Encoder(encoder) => encoder.identity(),
+        }
+    }
+
+    /// The embedded views of an object.
+    ///
+    /// # Errors
+    /// No file, one of another mesh, or what the encoder reports.
+    pub fn views(
+        &self,
+        entry: &ObjectEntry,
+        object: &LabelledObject,
+        rolls: u32,
+        task: &Task,
+    ) -> Result<Embedded> {
+        match (&entry.source, self) {
+            (ObjectSource::Procedural { level, .. }, _) => {
+                let Some(procedural) = &object.procedural else {
+                    return Err(Error::invalid("object", "a procedural one", &entry.name));
+                };
+                let start = Instant::now();
+                let pictures = render_views(procedural, task)?;
+                let views_ms = Some(start.elapsed().as_secs_f64() * 1e3);
+                let start = Instant::now();
+                let views = embed(procedural, &pictures, *level)?;
+                let embed_ms = Some(start.elapsed().as_secs_f64() * 1e3);
+                let encoder = format!("simulated/{level}");
+                Ok(Embedded { views, encoder, rolls: 1, views_ms, embed_ms })
+            }
+            (ObjectSource::Files { mesh, .. }, Self::Files(folder)) => {
+                read(entry, object, mesh, folder.as_deref(), rolls)
+            }
+            (ObjectSource::Files { mesh, .. }, Self::Encoder(encoder)) => {
+                encoder.embed(&object.file, rolls).map_err(|reason| {
+                    Error::format(mesh, "embeddings", "an encoder that answers", reason)
+                })
+            }
+        }
+    }
+}
+
+fn read(
+    entry: &ObjectEntry,
+    object: &LabelledObject,
+    mesh: &Path,
+    folder: Option<&Path>,
+    rolls: u32,
+) -> Result<Embedded> {
+    let name = &entry.name;
+    let folders = match folder {
+        Some(folder) => vec![folder.join(&entry.category), folder.to_owned()],
+        None => vec![mesh.with_file_name("")],
+    };
+    let own = (rolls == PAPER_ROLLS).then(|| format!("{name}.r1.emb.mcap"));
+    let names: Vec<String> = own.into_iter().chain([format!("{name}.emb.mcap")]).collect();
+    let candidates = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
+    let Some(path) = candidates.into_iter().find(|path| path.is_file()) else {
+        let path = folders[folders.len() - 1].join(format!("{name}.emb.mcap"));
+        let source = std::io::Error::new(
+            std::io::ErrorKind::NotFound,
+            "no embeddings: give --embeddings DIR or --encoder MODEL, or put them beside the mesh",
+        );
+        return Err(Error::Io { path, source });
+    };
+    let file = EmbeddingsFile::read(&path)?;
+    file.check_mesh(object.mesh())?;
+    Ok(Embedded {
+        views: file.views,
+        encoder: file.metadata.encoder,
+        rolls: file.metadata.rolls,
+        views_ms: None,
+        embed_ms: None,
+    })
+}

@@ -1,0 +1,131 @@
+//! What can go wrong with an evaluation as a whole. What goes wrong with one pair is a row.
+
+use std::path::{Path, PathBuf};
+
+/// Result of an evaluation call.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why there is no evaluation.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A floor below refused.
+    #[error(transparent)]
+    Facade(#[from] semfm::Error),
+    /// A procedural object could not be made.
+    #[error(transparent)]
+    Synth(#[from] semfm_synth::Error),
+    /// A file or folder cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A file is not what its format demands.
+    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Field, line or element.
+        place: String,
+        /// What the format demands there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// An argument outside what it may be.
+    #[error("{what}: expected {expected}, found {found}")]
+    Invalid {
+        /// Name of the argument.
+        what: String,
+        /// What is allowed.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// The output folder holds an unfinished run of something else.
+    #[error(
+        "{}: an unfinished run with another {what} (then {before}, now {now}): \
+         give the same again to go on, start afresh, or choose another folder", path.display()
+    )]
+    OtherRun {
+        /// The journal.
+        path: PathBuf,
+        /// What differs.
+        what: String,
+        /// What the journal names.
+        before: String,
+        /// What is asked for.
+        now: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn invalid(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
+    }
+
+    pub(crate) fn format(
+        path: &Path,
+        place: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        let (place, expected, found) = (place.into(), expected.into(), found.into());
+        Self::Format { path: path.to_owned(), place, expected, found }
+    }
+
+    /// Wraps what the system said about `path`.
+    pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    /// Whether the caller asked the work to stop.
+    pub fn is_cancelled(&self) -> bool {
+        let geom = match self {
+            Self::Facade(semfm::Error::Geom(cause)) => cause,
+            Self::Facade(semfm::Error::Fmap(semfm::fmap::Error::Geom(cause))) => cause,
+            Self::Facade(semfm::Error::Views(semfm::views::Error::Geom(cause))) => cause,
+            _ => return false,
+        };
+        matches!(geom, semfm::geom::Error::Cancelled)
+    }
+
+    /// A short name of the kind of failure, for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Facade(cause) => cause.code(),
+            Self::Synth(_) => "synth",
+            Self::Io { .. } => "io",
+            Self::Format { .. } => "format",
+            Self::Invalid { .. } => "invalid",
+            Self::OtherRun { .. } => "other-run",
+        }
+    }
+}
+
+impl From<semfm::geom::Error> for Error {
+    fn from(cause: semfm::geom::Error) -> Self {
+        Self::Facade(cause.into())
+    }
+}
+
+impl From<semfm::fmap::Error> for Error {
+    fn from(cause: semfm::fmap::Error) -> Self {
+        Self::Facade(cause.into())
+    }
+}
+
+impl From<semfm::views::Error> for Error {
+    fn from(cause: semfm::views::Error) -> Self {
+        Self::Facade(cause.into())
+    }
+}

@@ -1,0 +1,354 @@
+//! `table.md`: the results for people who read text.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use semfm::geom::io::write_atomically;
+
+use crate::Result;
+use crate::dataset::DatasetOrigin;
+use crate::published::{self, PublishedRow};
+use crate::results::Results;
+use crate::summary::{Scope, ScoreTable, Summary};
+
+/// The file in the output folder.
+pub const FILE: &str = "table.md";
+/// Failures are listed up to this many.
+const LISTED: usize = 20;
+
+/// Writes `table.md` into `folder`.
+///
+/// # Errors
+/// [`crate::Error::Facade`] where it cannot be written.
+pub fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
+    let path = folder.join(FILE);
+    let text = render(results);
+    write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
+    Ok(path)
+}
+
+/// The whole page as Markdown.
+pub fn render(results: &Results) -> String {
+    let table = ScoreTable::new(&results.rows);
+    let page = Page {
+        results,
+        groups: table.groups(),
+        categories: table.categories(),
+        methods: table.methods,
+    };
+    let sections = [
+        page.head(),
+        page.accuracy(),
+        page.intervals(),
+        page.differences(),
+        page.trust(),
+        page.times(),
+        page.paper(),
+        page.failures(),
+    ];
+    let sections: Vec<String> = sections.into_iter().filter(|text| !text.is_empty()).collect();
+    sections.join("\n")
+}
+
+struct Page<'a> {
+    results: &'a Results,
+    methods: Vec<&'a str>,
+    groups: Vec<&'a str>,
+    categories: Vec<&'a str>,
+}
+
+impl Page<'_> {
+    fn summary(&self, scope: &Scope, method: &str) -> Option<&Summary> {
+        self.results.summary(scope, method)
+    }
+
+    fn head(&self) -> String {
+        let about = &self.results.about;
+        let what = match &about.origin {
+            DatasetOrigin::Folder { path } => format!("folder `{}`", path.display()),
+            DatasetOrigin::Synthetic { level, seeds, n_objects } => format!(
+                "procedural objects, simulated features of level {level}, seeds {seeds:?}, \
+                 {n_objects} objects of each category and seed"
+            ),
+        };
+        let pairs = self.results.rows.iter().map(|row| (&row.group, &row.source, &row.target));
+        let n_pairs = pairs.collect::<std::collections::BTreeSet<_>>().len();
+        format!(
+            "# Evaluation\n\n{what}: {n_pairs} ordered pairs of {} objects; features from {}; seed {}.\n\
+             Dataset {}.\n",
+            self.results.objects.len(),
+            about.identity.embeddings,
+            about.seed,
+            about.identity.dataset,
+        )
+    }
+
+    fn columns(&self) -> Vec<(String, Scope)> {
+        let groups = self.groups.iter().map(|&name| (name.to_owned(), Scope::Group(name.into())));
+        groups.chain([("all".to_owned(), Scope::All)]).collect()
+    }
+
+    fn accuracy(&self) -> String {
+        let columns = self.columns();
+        let names = columns.iter().map(|(name, scope)| {
+            let n = self.methods.iter().filter_map(|m| Some(self.summary(scope, m)?.n)).max();
+            format!("{name} ({})", n.unwrap_or(0))
+        });
+        let last = ["mean of categories", "± std", "< .3", "by area"].map(str::to_owned);
+        let mut text = String::from("## Accuracy\n\nMean vertex IoU (pairs).\n\n");
+        text += &header(["method".to_owned()].into_iter().chain(names).chain(last));
+        for &method in &self.methods {
+            let mut cells = vec![method.to_owned()];
+            for (_, scope) in &columns {
+                cells.push(number(self.summary(scope, method).and_then(|s| s.mean), 2));
+            }
+            let all = self.summary(&Scope::All, method);
+            let categories = self.summary(&Scope::MeanOfCategories, method);
+            cells.push(number(categories.and_then(|s| s.mean), 3));
+            cells.push(number(all.and_then(|s| s.std), 2));
+            cells.push(number(all.and_then(|s| s.below_poor), 2));
+            cells.push(number(all.and_then(|s| s.area_mean), 2));
+            text += &line(cells);
+        }
+        if let Some(first) = self.methods.first().filter(|_| self.methods.contains(&"oracle")) {
+            let mut cells = vec![format!("way of {first} from floor to ceiling")];
+            for (_, scope) in &columns {
+                cells.push(percent(self.summary(scope, first).and_then(|s| s.way)));
+            }
+            cells.push(percent(self.summary(&Scope::MeanOfCategories, first).and_then(|s| s.way)));
+            cells.extend([const { String::new() }; 3]);
+            text += &line(cells);
+        }
+        text
+    }
+
+    fn intervals(&self) -> String {
+        let names =
+            ["method", "mean", "95 %", "anchors landed", "anchor distance, √area", "failed"];
+        let mut text = String::from("## Over all pairs\n\nIntervals by resampling objects.\n\n");
+        text += &header(names.map(str::to_owned));
+        for &method in &self.methods {
+            let Some(s) = self.summary(&Scope::All, method) else { continue };
+            text += &line([
+                method.to_owned(),
+                number(s.mean, 3),
+                interval(s.interval, false),
+                number(s.anchor_landed, 2),
+                number(s.anchor_distance, 3),
+                s.n_failed.to_string(),
+            ]);
+        }
+        text
+    }
+
+    /// The other methods against the first.
+    fn differences(&self) -> String {
+        let Some(&first) = self.methods.first() else { return String::new() };
+        let ours: Vec<_> = self.results.differences.iter().filter(|d| d.against == first).collect();
+        if ours.is_empty() {
+            return String::new();
+        }
+        let columns = self.columns();
+        let mut text = format!(
+            "## Against {first}\n\nMean difference in IoU, pair by pair; **bold** where the 95 % interval \
+             excludes 0.\n\n"
+        );
+        let names = columns.iter().map(|(name, _)| name.clone());
+        text += &header(["method".to_owned()].into_iter().chain(names).chain(["95 %, all".into()]));
+        for &method in &self.methods[1..] {
+            let find =
+                |scope: &Scope| ours.iter().find(|d| d.scope == *scope && d.method == method);
+            if find(&Scope::All).is_none() {
+                continue;
+            }
+            let mut cells = vec![method.to_owned()];
+            for (_, scope) in &columns {
+                cells.push(find(scope).map_or_else(dash, |d| {
+                    let text = format!("{:+.2}", d.mean);
+                    if d.sign() == 0 { text } else { format!("**{text}**") }
+                }));
+            }
+            cells.push(find(&Scope::All).map_or_else(dash, |d| interval(d.interval, true)));
+            text += &line(cells);
+        }
+        text
+    }
+
+    fn trust(&self) -> String {
+        if self.results.trust.is_empty() {
+            return String::new();
+        }
+        let mut text = String::from(
+            "## Confidence\n\nA right answer has IoU ≥ .5. AUC: chance that a right answer is trusted \
+             more than a wrong one. Verdicts: answers (mean IoU).\n\n",
+        );
+        let names = ["method", "right", "AUC", "calibration error", "accept", "check", "refuse"];
+        text += &header(names.map(str::to_owned));
+        for trust in &self.results.trust {
+            let mut cells = vec![
+                trust.method.clone(),
+                number(Some(trust.right), 2),
+                number(trust.auc, 2),
+                number(Some(trust.calibration_error), 2),
+            ];
+            use semfm::Verdict::{Accept, Check, Refuse};
+            for verdict in [Accept, Check, Refuse] {
+                let found = trust.verdicts.iter().find(|v| v.verdict == verdict);
+                cells.push(found.map_or_else(dash, |v| format!("{} ({:.2})", v.n, v.mean_iou)));
+            }
+            text += &line(cells);
+        }
+        text
+    }
+
+    fn times(&self) -> String {
+        let mut text = String::from(
+            "## Time\n\nMedians. Matching: from prepared objects to the region. Cold: from embeddings, nothing \
+             cached. Whole: from meshes, views and encoder included.\n\n",
+        );
+        text += &header(["method", "matching, ms", "cold, ms", "whole, s"].map(str::to_owned));
+        for &method in &self.methods {
+            let Some(s) = self.summary(&Scope::All, method) else { continue };
+            let ms = |x: Option<f64>| x.map_or_else(dash, |x| format!("{x:.0}"));
+            let whole = s.median_paper_runtime.map_or_else(dash, |x| format!("{x:.2}"));
+            text += &line([method.into(), ms(s.median_matching_ms), ms(s.median_cold_ms), whole]);
+        }
+        text
+    }
+
+    /// The paper's table beside ours, where the categories are the paper's.
+    fn paper(&self) -> String {
+        let places: Vec<(usize, &str)> = self
+            .categories
+            .iter()
+            .filter_map(|name| Some((published::paper_category(name)?, *name)))
+            .collect();
+        if places.len() < published::CATEGORIES.len() {
+            return String::new();
+        }
+        let mut text = String::from(
+            "## Beside the paper\n\n*Quoted* rows are the paper's own numbers: other meshes and another \
+             encoder, so no contest.\n",
+        );
+        let column = |place: usize| places.iter().find(|(p, _)| *p == place).map(|(_, name)| *name);
+        let mut part = |title: &str, quoted: &[PublishedRow], of: fn(&Summary) -> Option<f64>| {
+            let names = published::CATEGORIES.map(str::to_owned);
+            let _ = writeln!(text, "\n{title}\n");
+            text += &header(["method".to_owned()].into_iter().chain(names).chain(["mean".into()]));
+            for row in quoted {
+                let values = row.values.iter().map(|x| format!("{x:.2}"));
+                let name = format!("*{} (quoted)*", row.method);
+                text +=
+                    &line([name].into_iter().chain(values).chain([format!("{:.3}", row.mean())]));
+            }
+            for &method in &self.methods {
+                let value = |place: usize| {
+                    of(self.summary(&Scope::Category(column(place)?.into()), method)?)
+                };
+                let values: Vec<Option<f64>> =
+                    (0..published::CATEGORIES.len()).map(value).collect();
+                if values.iter().all(Option::is_none) {
+                    continue;
+                }
+                let known: Vec<f64> = values.iter().flatten().copied().collect();
+                let mean = known.iter().sum::<f64>() / known.len() as f64;
+                let cells = values.iter().map(|x| number(*x, 2));
+                text += &line(
+                    [method.to_owned()].into_iter().chain(cells).chain([number(Some(mean), 3)]),
+                );
+            }
+        };
+        part("Mean IoU.", &published::IOU, |s| s.mean);
+        part("Seconds a transfer, from meshes.", &published::SECONDS, |s| s.median_paper_runtime);
+        text
+    }
+
+    fn failures(&self) -> String {
+        let failed: Vec<_> =
+            self.results.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?))).collect();
+        if failed.is_empty() {
+            return String::new();
+        }
+        let mut text = format!("## Failures ({})\n\n", failed.len());
+        for (row, failure) in failed.iter().take(LISTED) {
+            let [group, source, target, method] = row.key();
+            let words = failure.text.replace('\n', " ");
+            let _ = writeln!(
+                text,
+                "- {group}: {source} → {target}, {method}: {} ({words})",
+                failure.kind
+            );
+        }
+        if failed.len() > LISTED {
+            let _ = writeln!(text, "- and {} more in `results.json`", failed.len() - LISTED);
+        }
+        text
+    }
+}
+
+pub(crate) fn header(names: impl IntoIterator<Item = String>) -> String {
+    let names: Vec<String> = names.into_iter().collect();
+    let rule = vec!["---".to_owned(); names.len()];
+    line(names) + &line(rule)
+}
+
+pub(crate) fn line(cells: impl IntoIterator<Item = String>) -> String {
+    let escaped: Vec<String> = cells.into_iter().map(|cell| cell.replace('|', "\\|")).collect();
+    format!("| {} |\n", escaped.join(" | "))
+}
+
+fn dash() -> String {
+    "–".into()
+}
+
+/// `0.74` as `.74`, as the paper and this project's pages write shares.
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
+    let Some(value) = value else { return dash() };
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix("0.") {
+        Some(rest) => format!(".{rest}"),
+        None => text,
+    }
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(dash, |x| format!("{:.0} %", 100.0 * x))
+}
+
+fn interval(ends: Option<[f64; 2]>, signed: bool) -> String {
+    let one = |x: f64| if signed { format!("{x:+.3}") } else { number(Some(x), 3) };
+    ends.map_or_else(dash, |[low, high]| format!("{} … {}", one(low), one(high)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::tests::some_results;
+
+    #[test]
+    fn every_method_and_group_has_its_place() {
+        let text = render(&some_results());
+        for word in ["| fused |", "| whole |", "cups (2)", "Against fused", "*SemFM (quoted)*"] {
+            assert_eq!(text.contains(word), word != "*SemFM (quoted)*", "{word} in\n{text}");
+        }
+        assert!(text.contains("way of fused"), "{text}");
+        assert!(text.contains("## Failures (1)") && text.contains("a → b"), "{text}");
+        // Every line of a table has as many cells as its header.
+        for table in text.split("\n\n").filter(|block| block.starts_with('|')) {
+            let cells: Vec<usize> = table
+                .lines()
+                .filter(|l| l.starts_with('|'))
+                .map(|l| l.matches(" | ").count())
+                .collect();
+            assert!(cells.iter().all(|&n| n == cells[0]), "{table}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_written_as_the_paper_does() {
+        assert_eq!(number(Some(0.744), 2), ".74");
+        assert_eq!(number(Some(1.0), 2), "1.00");
+        assert_eq!(number(None, 2), "–");
+        assert_eq!(interval(Some([-0.1, 0.2]), true), "-0.100 … +0.200");
+    }
+}
