@@ -97,8 +97,8 @@ mod tests {
 
     #[test]
     fn the_outline_moves_to_where_the_features_change() {
-        // Three columns beyond the edge are cut off, three short of it filled up.
-        for found in [37, 43] {
+        // Two columns beyond the edge are cut off, two short of it filled up.
+        for found in [38, 42] {
             let spread =
                 propagate(&strip(40), &[1.0; 300], &votes(found), &PropagationSettings::default())
                     .unwrap();
