@@ -1,17 +1,12 @@
 //! Cutting a semantic cloud into parts: spectral clustering on its neighbour graph (section IV-D).
 
-use faer::sparse::{SparseColMat, Triplet};
 use semfm_geom::eigensolver::{EigenSettings, eigenbasis};
-use semfm_geom::{Laplacian, PointIndex, SemanticCloud, Task};
+use semfm_geom::{Laplacian, SemanticCloud, Task};
 use serde::{Deserialize, Serialize};
 
 use crate::kmeans::k_means;
+use crate::neighbour_graph::NeighbourGraph;
 use crate::{Error, Result};
-
-/// An edge never weighs less: a part whose features resemble no neighbour's would otherwise fall off
-/// numerically, and eigenvalues that close to zero leave their vectors undetermined (1e-6 was seen
-/// to). Beside the typical e⁻¹ a thousandth cuts as well.
-const LEAST_WEIGHT: f64 = 1e-3;
 
 /// How the graph is made and cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,111 +93,19 @@ pub fn spectral_clusters(
     if n <= k {
         return Ok(Clusters { labels: (0..n as u32).collect(), n_clusters: n });
     }
-    let laplacian = graph_laplacian(cloud, &neighbour_edges(cloud, settings.neighbours)?)?;
+    let square = |i: usize, j: usize| -> f64 {
+        let pairs = cloud.feature(i).iter().zip(cloud.feature(j));
+        pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    };
+    let graph = NeighbourGraph::new(cloud.points(), settings.neighbours, square)?;
+    // D − W as stiffness and the degrees D as mass: their eigenproblem is that of the normalised cut.
+    let (stiffness, mass) = graph.laplacian(1.0)?;
+    let laplacian = Laplacian { stiffness, mass };
     let eigen = EigenSettings { seed: settings.seed, ..EigenSettings::default() };
     let basis = eigenbasis(&laplacian, k, &eigen, task)?;
     let rows: Vec<f64> =
         (0..n).flat_map(|i| basis.functions.row(i).iter().copied().collect::<Vec<_>>()).collect();
     Ok(Clusters::from_labels(&k_means(&rows, k, k, settings.starts, settings.seed)))
-}
-
-/// Edges (i < j) to the nearest neighbours in space, connected.
-fn neighbour_edges(cloud: &SemanticCloud, neighbours: usize) -> Result<Vec<(u32, u32)>> {
-    let points = cloud.points();
-    let index = PointIndex::new(points)?;
-    let mut edges = Vec::with_capacity(points.len() * neighbours);
-    for (i, &p) in points.iter().enumerate() {
-        // The point itself is among the hits, though not always first: others may lie on it.
-        let others = index.k_nearest(p, neighbours + 1).into_iter().filter(|hit| hit.0 != i);
-        edges.extend(others.take(neighbours).map(|(j, _)| (i.min(j) as u32, i.max(j) as u32)));
-    }
-    edges.sort_unstable();
-    edges.dedup();
-    let mut pieces = Pieces::new(points.len());
-    let joined = edges.iter().filter(|&&(i, j)| pieces.join(i, j)).count();
-    if joined + 1 < points.len() {
-        let bridges: Vec<_> =
-            spanning_tree(cloud).into_iter().filter(|&(i, j)| pieces.join(i, j)).collect();
-        edges.extend(bridges);
-    }
-    Ok(edges)
-}
-
-/// Edges (i < j) of the Euclidean minimum spanning tree, shortest first (Prim 1957, dense).
-fn spanning_tree(cloud: &SemanticCloud) -> Vec<(u32, u32)> {
-    let points = cloud.points();
-    let mut nearest: Vec<(f64, u32)> =
-        points.iter().map(|p| (p.distance_squared(points[0]), 0)).collect();
-    let mut outside: Vec<u32> = (1..points.len() as u32).collect();
-    let mut tree = Vec::with_capacity(outside.len());
-    while let Some(at) = (0..outside.len())
-        .min_by(|&a, &b| nearest[outside[a] as usize].0.total_cmp(&nearest[outside[b] as usize].0))
-    {
-        let new = outside.swap_remove(at);
-        let (length, parent) = nearest[new as usize];
-        tree.push((length, new.min(parent), new.max(parent)));
-        for &i in &outside {
-            let distance = points[i as usize].distance_squared(points[new as usize]);
-            if distance < nearest[i as usize].0 {
-                nearest[i as usize] = (distance, new);
-            }
-        }
-    }
-    tree.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    tree.into_iter().map(|(_, i, j)| (i, j)).collect()
-}
-
-/// D − W as stiffness and the degrees D as mass: their eigenproblem is that of the normalised cut.
-fn graph_laplacian(cloud: &SemanticCloud, edges: &[(u32, u32)]) -> Result<Laplacian> {
-    let difference = |&(i, j): &(u32, u32)| -> f64 {
-        let pairs = cloud.feature(i as usize).iter().zip(cloud.feature(j as usize));
-        pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
-    };
-    let squares: Vec<f64> = edges.iter().map(difference).collect();
-    let sigma_squared = median(squares.clone()).max(f64::MIN_POSITIVE);
-    let n = cloud.n_points();
-    let mut degrees = vec![0.0; n];
-    let mut triplets = Vec::with_capacity(2 * edges.len() + n);
-    for (&(i, j), square) in edges.iter().zip(squares) {
-        let weight = (-square / sigma_squared).exp().max(LEAST_WEIGHT);
-        let (i, j) = (i as usize, j as usize);
-        degrees[i] += weight;
-        degrees[j] += weight;
-        triplets.extend([Triplet::new(i, j, -weight), Triplet::new(j, i, -weight)]);
-    }
-    triplets.extend(degrees.iter().enumerate().map(|(i, &d)| Triplet::new(i, i, d)));
-    let stiffness = SparseColMat::try_new_from_triplets(n, n, &triplets)
-        .map_err(|_| Error::LinearAlgebra("assembling the neighbour graph"))?;
-    Ok(Laplacian { stiffness, mass: degrees })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Which points hang together: a union–find forest.
-pub(crate) struct Pieces(Vec<u32>);
-
-impl Pieces {
-    pub fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    pub fn of(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-
-    /// Joins two points' pieces; false where they were one already.
-    pub fn join(&mut self, i: u32, j: u32) -> bool {
-        let (a, b) = (self.of(i), self.of(j));
-        self.0[a.max(b) as usize] = a.min(b);
-        a != b
-    }
 }
 
 #[cfg(test)]
@@ -236,16 +139,6 @@ mod tests {
                 (0..150).filter(|&i| clusters.labels()[i] != clusters.labels()[50 * (i / 50) + 25]);
             assert!(wrong.count() <= 3, "gap {gap}");
         }
-    }
-
-    #[test]
-    fn neighbour_graphs_are_connected_even_when_the_cloud_is_not() {
-        let edges = neighbour_edges(&strip(60, 1000.0), 4).unwrap();
-        let mut pieces = Pieces::new(60);
-        edges.iter().for_each(|&(i, j)| {
-            pieces.join(i, j);
-        });
-        assert!((0..60).all(|i| pieces.of(i) == 0));
     }
 
     #[test]

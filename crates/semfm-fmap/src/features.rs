@@ -61,6 +61,12 @@ impl CentredFeatures {
         let directions = principal(&columns)?;
         Ok(Self { columns, directions })
     }
+
+    /// Squared distance between the features of two points.
+    pub(crate) fn squared_distance(&self, i: usize, j: usize) -> f64 {
+        let pairs = self.columns.col_as_slice(i).iter().zip(self.columns.col_as_slice(j));
+        pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    }
 }
 
 /// Both objects' points in the principal space of the pair, one point per row.

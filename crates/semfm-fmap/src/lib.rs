@@ -15,7 +15,7 @@
 //! [`descriptors`] turn the pairs into smooth functions, [`fit`] finds the C that agrees with
 //! them, [`zoomout`] refines it, [`point_map`] reads vertices off it. Beside that road run
 //! [`features`] (both clouds in one small space) and [`transport`] (a coupling of the clouds without
-//! any map). [`transfer`](mod@transfer) offers six methods made of these pieces under one interface,
+//! any map); [`propagation`] draws the outline of what arrived along the target's own features. [`transfer`](mod@transfer) offers six methods made of these pieces under one interface,
 //! [`confidence`] says how far to trust the answer, [`metrics`] how good it was.
 //!
 //! The easy door is [`transfer()`]; [`PreparedShape`] and [`Matching`] keep what is worth keeping
@@ -33,15 +33,17 @@ pub mod functional_map;
 mod kmeans;
 pub mod metrics;
 mod nearest_rows;
+mod neighbour_graph;
 pub mod pair;
 pub mod point_map;
+pub mod propagation;
 pub mod region;
 pub mod transfer;
 pub mod transport;
 pub mod zoomout;
 
 pub use anchors::{Anchor, Anchors};
-pub use confidence::{Hypothesis, Verdict};
+pub use confidence::{Evidence, Hypothesis, Verdict};
 pub use error::{Error, Result};
 pub use functional_map::FunctionalMap;
 pub use nearest_rows::nearest_rows;

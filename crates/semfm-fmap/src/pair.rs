@@ -9,6 +9,7 @@ use semfm_geom::{PointIndex, SemanticCloud, Shape, Task};
 
 use crate::clusters::{ClusterSettings, Clusters, spectral_clusters};
 use crate::features::CentredFeatures;
+use crate::neighbour_graph::NeighbourGraph;
 use crate::{Error, Result};
 
 /// Samples mixed into the features of a vertex.
@@ -18,6 +19,8 @@ const MIXED: usize = 6;
 const MIX_REACH: f64 = 0.01;
 /// Vertices matched while a sampled map grows. 300 cost .01 IoU, 1200 gain nothing.
 const MAP_SAMPLES: usize = 600;
+/// Neighbours of a cloud point in the graph that votes are spread on.
+const GRAPH_NEIGHBOURS: usize = 10;
 /// Least share of the mean mass that a sample gets when no vertex is nearest to it.
 const LEAST_MASS: f64 = 1e-3;
 
@@ -52,6 +55,7 @@ pub struct PreparedShape<'a> {
     masses: Vec<f64>,
     samples: Vec<u32>,
     features: CentredFeatures,
+    graph: NeighbourGraph,
     clusters: Cow<'a, Clusters>,
 }
 
@@ -98,6 +102,8 @@ impl<'a> PreparedShape<'a> {
         masses.iter_mut().for_each(|m| *m /= total);
         let samples = farthest_points(vertices, MAP_SAMPLES);
         let features = CentredFeatures::new(cloud)?;
+        let square = |i, j| features.squared_distance(i, j);
+        let graph = NeighbourGraph::new(cloud.points(), GRAPH_NEIGHBOURS, square)?;
         Ok(Self {
             semantic,
             point_of_vertex,
@@ -106,6 +112,7 @@ impl<'a> PreparedShape<'a> {
             masses,
             samples,
             features,
+            graph,
             clusters,
         })
     }
@@ -152,6 +159,11 @@ impl<'a> PreparedShape<'a> {
 
     pub(crate) fn features(&self) -> &CentredFeatures {
         &self.features
+    }
+
+    /// The cloud as a graph whose edges know how much the features of their ends differ.
+    pub(crate) fn graph(&self) -> &NeighbourGraph {
+        &self.graph
     }
 
     /// Values on the cloud's points (M), mixed onto the working vertices (n).

@@ -291,6 +291,23 @@ impl Plan {
         .collect()
     }
 
+    /// A function on the target's points (M_target) as each source point (M_source) finds it where
+    /// its mass goes: the mean over there, 0 where no mass leaves.
+    pub fn vote_back(&self, on_target: &[f64]) -> Vec<f64> {
+        let (mut votes, mut all) = (vec![0.0; self.n_source()], vec![0.0; self.n_source()]);
+        for ((row, &u), &f) in
+            self.kernel.chunks(self.n_source()).zip(&self.on_target).zip(on_target)
+        {
+            for ((vote, all), &k) in votes.iter_mut().zip(&mut all).zip(row) {
+                let mass = f64::from(u) * f64::from(k);
+                *vote += mass * f;
+                *all += mass;
+            }
+        }
+        let mean = |(vote, all): (f64, f64)| if all > 0.0 { vote / all } else { 0.0 };
+        votes.into_iter().zip(all).map(mean).collect()
+    }
+
     /// For each target point the source point that sends it the most.
     pub fn source_of(&self) -> Vec<u32> {
         let best = |row: &[f32]| largest(row.iter().zip(&self.on_source).map(|(k, v)| k * v)).0;

@@ -2,7 +2,7 @@
 //!
 //! | name | what |
 //! | --- | --- |
-//! | `fused` | transport between the clouds starts a bidirectional, feature-augmented ZoomOut |
+//! | `fused` | transport between the clouds starts a bidirectional, feature-augmented ZoomOut; the vote is spread along the target's own features |
 //! | `semfm` | the published method: two anchors, minimum-norm C, plain ZoomOut |
 //! | `anchored` | the same anchors, then feature-augmented ZoomOut and a diffused vote |
 //! | `sinkhorn` | unbalanced transport between the clouds, no map |
@@ -24,10 +24,13 @@ use std::time::Instant;
 use faer::Mat;
 use semfm_geom::Task;
 
-use crate::confidence::{Hypothesis, Verdict, is_one_piece, islands};
+use crate::confidence::{
+    Evidence, Hypothesis, Verdict, is_one_piece, islands, probability_by_agreement,
+};
 use crate::features::JointFeatures;
 use crate::fit::FitReport;
 use crate::metrics::overlap;
+use crate::propagation::{PropagationSettings, propagate};
 use crate::transport::{Plan, couple};
 use crate::zoomout::MapSide;
 use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedShape, Region, Result, ShapePair};
@@ -41,7 +44,8 @@ pub struct Transfer {
     /// The region on the target. Weights are scaled so that the method's threshold stands at
     /// [`Region::COUNTS`].
     pub region: Region,
-    /// Agreement with an independent opinion, in [0, 1].
+    /// The probability that the region's IoU with the truth is at least one half, in [0, 1]
+    /// ([`confidence`](crate::confidence) says how it is known).
     pub confidence: f64,
     /// What to do with the answer.
     pub verdict: Verdict,
@@ -110,6 +114,7 @@ pub struct Matching<'a> {
     source: &'a PreparedShape<'a>,
     target: &'a PreparedShape<'a>,
     settings: TransferSettings,
+    joint: JointFeatures,
     plan: Plan,
     anchors: Anchors,
     matched: Matched,
@@ -176,7 +181,7 @@ impl<'a> Matching<'a> {
                 Some(fused::match_pair(&pair, &plan, &mut stages)?)
             }
         };
-        Ok(Self { source, target, settings, plan, anchors, matched, voter, witness, stages })
+        Ok(Self { source, target, settings, joint, plan, anchors, matched, voter, witness, stages })
     }
 
     /// The semantic anchors of the pair.
@@ -212,6 +217,7 @@ impl<'a> Matching<'a> {
             Some(map) => {
                 let diffusion = Method::Fused.diffusion();
                 let votes = self.votes_by_map(map, Rule::Preimage, diffusion, &inside)?;
+                let votes = self.spread(votes, &Method::Fused.propagation())?;
                 at_threshold(&votes, Method::Fused.threshold())
             }
         };
@@ -234,15 +240,21 @@ impl<'a> Matching<'a> {
         let other_rule = other.as_deref().map(onto_original).transpose()?;
         let other_iou = other.map(|other| overlap(&mask(&votes), &mask(&other), areas));
         let region = onto_original(&votes)?;
-        let verdict = if region.is_empty() { Verdict::Refuse } else { Verdict::of(agreement) };
+        let evidence = self.evidence(&inside, &votes);
+        let confidence = match self.settings.method {
+            _ if region.is_empty() => 0.0,
+            Method::Fused => evidence.probability(),
+            _ => probability_by_agreement(agreement),
+        };
         stages.put("vote", start.elapsed());
-        let report =
-            stages.time("report", || Ok(self.report(agreement, other_iou, &votes, &inside)))?;
+        let report = stages.time("report", || {
+            Ok(self.report((agreement, evidence), other_iou, &votes, &inside))
+        })?;
         let report = TransferReport { stages_ms: stages, ..report };
         Ok(Transfer {
             region,
-            confidence: agreement,
-            verdict,
+            confidence,
+            verdict: Verdict::of(confidence),
             hypotheses,
             point_map: self.matched.point_map.onto_originals(self.source.shape(), shape),
             other_rule,
@@ -267,7 +279,23 @@ impl<'a> Matching<'a> {
                 self.target.onto_vertices(&neighbours.iter().map(mean).collect::<Vec<f64>>())
             }
         };
-        Ok(at_threshold(&raw, self.settings.threshold))
+        let spread = self.spread(raw, &self.settings.propagation)?;
+        Ok(at_threshold(&spread, self.settings.threshold))
+    }
+
+    /// A vote on the target's working vertices, spread along its features.
+    fn spread(&self, votes: Vec<f64>, settings: &PropagationSettings) -> Result<Vec<f64>> {
+        if settings.weight == 0.0 {
+            return Ok(votes);
+        }
+        let on_points: Vec<f64> = self
+            .target
+            .vertex_of_point()
+            .iter()
+            .map(|&v| votes[v as usize].clamp(0.0, 1.0))
+            .collect();
+        let spread = propagate(self.target.graph(), self.target.masses(), &on_points, settings)?;
+        Ok(self.target.onto_vertices(&spread))
     }
 
     fn votes_by_map(
@@ -302,6 +330,20 @@ impl<'a> Matching<'a> {
 
     fn votes_by_transport(&self, inside: &[bool]) -> Vec<f64> {
         self.target.onto_vertices(&self.plan.vote(&self.on_points(inside)))
+    }
+
+    fn evidence(&self, inside: &[bool], votes: &[f64]) -> Evidence {
+        let region: Vec<bool> =
+            self.source.vertex_of_point().iter().map(|&v| inside[v as usize]).collect();
+        let answered = mask(votes);
+        let answer: Vec<bool> =
+            self.target.vertex_of_point().iter().map(|&v| answered[v as usize]).collect();
+        Evidence::gather(
+            (votes, &self.target.shape().basis().mass),
+            (&self.joint, &self.plan),
+            (&region, &answer),
+            (self.source.masses(), self.target.masses()),
+        )
     }
 
     fn on_points(&self, inside: &[bool]) -> Vec<f64> {

@@ -11,6 +11,7 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Matching, Rule, TransferSettings, mask};
+use crate::confidence::Evidence;
 use crate::fit::FitReport;
 use crate::metrics::{AnchorError, anchor_error, dirichlet_energy};
 use crate::{Anchor, Result};
@@ -154,6 +155,8 @@ pub struct TransferReport {
     pub stages_ms: Stages,
     /// Agreement of the method's region with the second opinion.
     pub agreement: f64,
+    /// What the answer says about itself: the confidence of `fused` follows from it.
+    pub evidence: Evidence,
     /// Share of the source's area in the region.
     pub source_area_share: f64,
     /// Share of the target's area in the region.
@@ -173,7 +176,7 @@ pub struct TransferReport {
 impl Matching<'_> {
     pub(super) fn report(
         &self,
-        agreement: f64,
+        (agreement, evidence): (f64, Evidence),
         other_iou: Option<f64>,
         votes: &[f64],
         inside: &[bool],
@@ -187,6 +190,7 @@ impl Matching<'_> {
             settings: self.settings.clone(),
             stages_ms: Stages::default(),
             agreement,
+            evidence,
             source_area_share: share(inside, &self.source.shape().basis().mass),
             target_area_share: share(&mask(votes), &self.target.shape().basis().mass),
             anchors: self.anchor_reports(),
