@@ -90,6 +90,7 @@ from .errors import (
 )
 
 __all__ = [
+    "Alignment",
     "Anchors",
     "Camera",
     "Cancelled",
@@ -101,6 +102,9 @@ __all__ = [
     "FileError",
     "FormatError",
     "FunctionalMap",
+    "Grasp",
+    "Grasps",
+    "Gripper",
     "HeatGeodesics",
     "Hypothesis",
     "InternalError",
@@ -121,6 +125,7 @@ __all__ = [
     "TransferSettings",
     "View",
     "__version__",
+    "align",
     "camera_towards",
     "cotan_laplacian",
     "demo_object",
@@ -128,6 +133,7 @@ __all__ = [
     "eigenbasis",
     "errors",
     "farthest_points",
+    "find_grasps",
     "geodesic_distances",
     "get_num_threads",
     "hks",

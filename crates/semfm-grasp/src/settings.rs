@@ -75,6 +75,19 @@ pub struct Separation {
     pub rotation: f64,
 }
 
+/// Names of the terms of a score, in the order in which they are listed.
+pub const TERMS: [&str; 9] = [
+    "contact",
+    "friction",
+    "epsilon",
+    "gravity",
+    "lever",
+    "clearance",
+    "bite",
+    "approach",
+    "region",
+];
+
 /// Weight of each named term; the score is their weighted mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScoreWeights {

@@ -18,7 +18,7 @@ use crate::work::run;
 use crate::{errors, json, lend};
 
 /// One parallel-jaw grasp, in the frame of the object scaled to metres.
-#[pyclass(frozen, module = "semfm", skip_from_py_object)]
+#[pyclass(frozen, module = "semfm")]
 #[derive(Clone)]
 pub struct Grasp {
     pub grasp: grasp::Grasp,
@@ -126,9 +126,9 @@ impl Grasps {
         let n = self.found.grasps.len();
         let at = if index < 0 { index + n as isize } else { index };
         let grasp = usize::try_from(at).ok().and_then(|at| self.found.grasps.get(at));
-        grasp.map(|grasp| Grasp { grasp: grasp.clone() }).ok_or_else(|| {
-            pyo3::exceptions::PyIndexError::new_err(format!("grasp {index} of {n}"))
-        })
+        grasp
+            .map(|grasp| Grasp { grasp: grasp.clone() })
+            .ok_or_else(|| pyo3::exceptions::PyIndexError::new_err(format!("grasp {index} of {n}")))
     }
 
     /// (g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres.

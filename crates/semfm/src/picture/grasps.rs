@@ -5,8 +5,6 @@
 use std::path::Path;
 
 use parry3d_f64::math::Pose;
-#[cfg(test)]
-use parry3d_f64::shape::SharedShape;
 use parry3d_f64::shape::{Shape, TypedShape};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
@@ -99,32 +97,23 @@ fn add_shape(shape: &dyn Shape, pose: Pose, vertices: &mut Vec<DVec3>, faces: &m
 
 #[cfg(test)]
 mod tests {
-    use semfm_grasp::gripper::{Part, Role};
     use semfm_views::View;
 
     use super::*;
 
-    /// Two fingers and a palm around a block, seen as pixels that are neither grey nor red.
+    /// A hand above a block, seen as pixels that are neither grey nor red.
     #[test]
     fn the_hand_is_in_the_picture() {
-        let boxed = |size: [f64; 3]| SharedShape::cuboid(size[0], size[1], size[2]);
-        let gripper = Gripper {
-            name: "palm".into(),
-            opening: 0.0..=0.08,
-            pad: [0.02, 0.02],
-            flange_from_tcp: Pose::IDENTITY,
-            parts: vec![Part {
-                link: "palm".into(),
-                role: Role::Palm,
-                shape: boxed([0.01, 0.05, 0.01]),
-            }],
-        };
+        let gripper = Gripper::builtin("franka").unwrap();
         let (points, faces) = parry3d_f64::shape::Cuboid::new(DVec3::splat(0.02)).to_trimesh();
         let block = Mesh::new(points, faces).unwrap();
         let grasp = Grasp {
             object_from_tcp: Pose::from_translation(DVec3::new(0.0, 0.0, 0.05)),
             width: 0.04,
+            opening: 0.08,
             contacts: [DVec3::ZERO; 2],
+            normals: [DVec3::Y, -DVec3::Y],
+            epsilon: 0.0,
             score: 1.0,
             terms: Vec::new(),
         };
