@@ -8,7 +8,7 @@
 //!   reverse, which would shrink the model onto the one side that was seen.
 //! * **Point to plane under an annealed Geman–McClure kernel** (Zhou, Park & Koltun 2016), Gauss–
 //!   Newton on the seven parameters, scale within bounds.
-//! * **Many starts**, spread over all rotations; a table of nearest samples makes each cost a tenth
+//! * **Many starts**, spread over all rotations; a table of nearest samples makes each cost a fifth
 //!   of a millisecond. An initial pose narrows them down.
 //! * **A visibility check.** Observed points alone like a model that is too large, or one that hides
 //!   in a flat patch. So a pose must also explain itself: the side of the model that faces the
@@ -192,8 +192,8 @@ pub fn align_model(
     Ok(found)
 }
 
-/// Kernel widths of the last round in standard deviations of the noise: 95 % of the efficiency of
-/// least squares lies near 4 for this kernel, and clutter within 4 mm of the surface does no harm.
+/// Width of the last round's kernel in standard deviations of the noise: wide enough to lose little
+/// against least squares, narrow enough that clutter a few millimetres away does no harm.
 const NOISE_WIDTH: f64 = 4.0;
 
 /// Least width of the kernel, as a share of the observed diameter, on clouds without noise.

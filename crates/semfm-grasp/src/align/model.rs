@@ -40,7 +40,7 @@ pub struct AlignModel {
 }
 
 impl AlignModel {
-    /// Prepares a mesh (about 10 ms for 16 000 triangles).
+    /// Prepares a mesh (about 15 ms for 16 000 triangles).
     ///
     /// # Errors
     /// [`semfm_geom::Error::NoArea`] for a mesh without area, [`semfm_geom::Error::Cancelled`].

@@ -11,7 +11,7 @@ use super::solve::{Matching, Problem, geman_mcclure};
 use super::starts::{fit_extent, rotations, rotations_nearby};
 use crate::Result;
 
-/// Points of the first round; each start takes about .1 ms.
+/// Points of the first round; each start takes about .2 ms.
 const FIRST_POINTS: usize = 160;
 /// Steps of the first round.
 const FIRST_STEPS: usize = 10;

@@ -223,3 +223,67 @@ fn outside(window: [f64; 4], place: DVec3) -> bool {
     let (u, v) = (place.x / place.z, place.y / place.z);
     !(u >= window[0] && u <= window[1] && v >= window[2] && v <= window[3])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::{Task, zoo};
+
+    /// A ball of radius .05 at half a metre, the half of it that a camera at the origin sees.
+    fn ball() -> (AlignModel, Sim3, Vec<DVec3>) {
+        let pose = Sim3 { scale: 0.05, translation: 0.5 * DVec3::Z, ..Sim3::IDENTITY };
+        let model = AlignModel::new(&zoo::icosphere(3), 0, &Task::default()).unwrap();
+        let dense = zoo::icosphere(5);
+        let points = dense.vertices().iter().map(|&p| pose.apply(p));
+        let seen = points.filter(|p| (p - pose.translation).dot(*p) < 0.0).collect();
+        (model, pose * Sim3 { scale: model_radius(), ..Sim3::IDENTITY }, seen)
+    }
+
+    fn model_radius() -> f64 {
+        zoo::icosphere(3).bounding_sphere().1
+    }
+
+    fn share(sight: &Sight, model: &AlignModel, pose: &Sim3, exact: bool) -> f64 {
+        sight.compare(model, pose, 0.003, 1, exact).share()
+    }
+
+    #[test]
+    fn the_true_pose_is_explained_and_others_are_not() {
+        let (model, pose, points) = ball();
+        let frame = SightFrame::along(DVec3::Z);
+        let sight = Sight::new(&points, &[], DVec3::ZERO, frame, None);
+        let moved = |shift: DVec3, growth: f64| Sim3 {
+            scale: pose.scale * growth,
+            translation: pose.translation + shift,
+            ..pose
+        };
+        for exact in [false, true] {
+            assert!(share(&sight, &model, &pose, exact) > 0.95);
+            // Beside, before, behind, inside, around what was seen.
+            assert!(share(&sight, &model, &moved(0.05 * DVec3::X, 1.0), exact) < 0.6);
+            assert!(share(&sight, &model, &moved(-0.05 * DVec3::Z, 1.0), exact) < 0.4);
+            assert!(share(&sight, &model, &moved(0.2 * DVec3::Z, 1.0), exact) < 0.1);
+            assert!(share(&sight, &model, &moved(DVec3::ZERO, 0.5), exact) < 0.4);
+            assert!(share(&sight, &model, &moved(DVec3::ZERO, 1.8), exact) < 0.4);
+        }
+    }
+
+    #[test]
+    fn what_stands_before_the_object_or_beyond_the_picture_is_no_evidence() {
+        let (model, pose, points) = ball();
+        let frame = SightFrame::along(DVec3::Z);
+        let (left, right): (Vec<DVec3>, Vec<DVec3>) = points.iter().partition(|p| p.x < 0.0);
+        let alone = Sight::new(&left, &[], DVec3::ZERO, frame, None);
+        // The silhouette's grid ends with the left half, and so does the picture.
+        let half = Some([-1.0, 0.0, -1.0, 1.0]);
+        let cut = Sight::new(&left, &[], DVec3::ZERO, frame, half);
+        // A screen half way to the right half; the object peeps out at its far end.
+        let screen: Vec<DVec3> = right.iter().map(|p| 0.7 * p).collect();
+        let peeping: Vec<DVec3> =
+            left.iter().chain(right.iter().filter(|p| p.x > 0.047)).copied().collect();
+        let hidden = Sight::new(&peeping, &screen, DVec3::ZERO, frame, None);
+        assert!(share(&alone, &model, &pose, true) < 0.6);
+        assert!(share(&cut, &model, &pose, true) > 0.9);
+        assert!(share(&hidden, &model, &pose, true) > 0.7);
+    }
+}

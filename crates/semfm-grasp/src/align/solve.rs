@@ -119,9 +119,9 @@ impl Problem<'_> {
             let weight = geman_mcclure(pull.squared, width) * pull.agreement;
             total += weight;
             let mut slot = 0;
-            for i in 0..7 {
+            for (i, g) in g.iter_mut().enumerate() {
                 let scaled = weight * pull.jacobian[i];
-                g[i] += scaled * pull.residual;
+                *g += scaled * pull.residual;
                 for j in i..7 {
                     a[slot] += scaled * pull.jacobian[j];
                     slot += 1;
@@ -139,8 +139,8 @@ impl Problem<'_> {
                 slot += 1;
             }
         }
-        // What the points do not determine stays as it is (Levenberg 1944): 1e-4 halves the speed
-        // of weak but real directions, below 1e-8 a sphere spins.
+        // What the points do not determine stays as it is (Levenberg 1944). The damping is far below
+        // the curvature of weak but real directions, which more would slow down.
         let damping = 1e-6 * normal.trace() / 7.0;
         let damped = normal + Matrix7::identity() * damping;
         let step = -damped.cholesky()?.solve(&Vector7::from_column_slice(&g));

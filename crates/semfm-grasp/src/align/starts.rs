@@ -6,8 +6,8 @@ use super::model::AlignModel;
 use super::observation::Observation;
 use super::sim3::Sim3;
 
-/// How far around an initial pose the search looks, in degrees: the axes of a cube's faces at the
-/// first angle, those of its corners at the second. The fine search converges from about 25°.
+/// How far around an initial pose the search looks, in degrees: about the axes of a cube's faces by
+/// the first angle, of its corners by the second. Guesses 25° off are what this must mend.
 const AROUND_INIT: [f64; 2] = [22.0, 38.0];
 
 /// Share of the points that each border of a robust extent leaves outside.

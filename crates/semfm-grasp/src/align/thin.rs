@@ -30,8 +30,8 @@ pub(super) struct ThinPoint {
 /// The points are listed cell by cell, cells in the order of their first points, and every so many
 /// is taken: each is as likely as any other, and they are spread like the cloud. One point for each
 /// cell would be more even, but biased: noise that crosses into a cell of its own would count as
-/// much as the many that stayed, which moves a surface by a third of its noise (measured: scales off
-/// by five standard deviations).
+/// much as the many that stayed (measured on thirty views of ten objects: scales too small by 1.4
+/// standard deviations on average, against .4 now).
 pub(super) fn thin(points: &[DVec3], n_wanted: usize) -> Vec<ThinPoint> {
     let n_cells = N_CELLS.min(points.len() / PER_CELL).max(1);
     let grid = Grid::with_about(points, n_cells);
