@@ -244,7 +244,7 @@ mod tests {
         let path = write(&results, &dataset, folder.path(), &settings, &Task::default()).unwrap();
         let page = std::fs::read_to_string(path).unwrap();
         for words in [
-            "stand-in “m”, 1 views, IoU 1.00, inconsistency .25",
+            "stand-in “m”, 1 view, IoU 1.00, inconsistency .25",
             "alt=\"answer in view 1 of tools_1_s0\"",
             "alt=\"lifted region on tools_1_s0, IoU 1.00\"",
             "no model was asked in this run",

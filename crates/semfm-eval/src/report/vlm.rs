@@ -66,10 +66,11 @@ fn strip(album: &Album<'_>, row: &Row, settings: &ReportSettings) -> Option<Stri
     let inconsistency =
         vlm.inconsistency.map(|x| format!(", inconsistency {}", number(Some(x), 2)));
     let title = format!(
-        "{} → {}: {who}, {} views, IoU {}{}",
+        "{} → {}: {who}, {} {}, IoU {}{}",
         row.source,
         row.target,
         vlm.n_views,
+        if vlm.n_views == 1 { "view" } else { "views" },
         number(row.iou, 2),
         inconsistency.unwrap_or_default()
     );
