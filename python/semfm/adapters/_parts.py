@@ -1,0 +1,124 @@
+"""What every viewer is given: surfaces and points, named, painted and placed."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass, field
+from typing import Any, Optional, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._paint import colors_of, position_colors, weight_colors, weights_of
+from .._semfm import Mesh, MeshFile, PreparedObject, Region, SemanticCloud, Shape, Transfer
+from ..errors import InvalidInput
+
+Floats = NDArray[np.float64]
+
+# The gap between the two objects of a pair, as a share of the larger one's width.
+GAP = 0.25
+
+
+@dataclass
+class Part:
+    """One surface, or a set of points where there are no faces.
+
+    `colors` are sRGB in 0..1, one row per vertex; `layers` further colours and `scalars` further
+    numbers by name, for viewers that can switch. `offset` is where a viewer puts it.
+    """
+
+    name: str
+    vertices: Floats
+    faces: Optional[NDArray[np.uint32]] = None
+    colors: Optional[Floats] = None
+    scalars: dict[str, Floats] = field(default_factory=dict)
+    layers: dict[str, Floats] = field(default_factory=dict)
+    offset: Floats = field(default_factory=lambda: np.zeros(3))
+
+
+def parts_of(
+    thing: Any,
+    region: Optional[Union[Region, ArrayLike]] = None,
+    colors: Optional[ArrayLike] = None,
+) -> list[Part]:
+    """The parts of an object: one, or source and target of a `Transfer`."""
+    if region is not None and colors is not None:
+        raise InvalidInput("region and colors: expected one of them, found both", place="region")
+    if isinstance(thing, Transfer):
+        if region is not None or colors is not None:
+            raise InvalidInput(
+                "region and colors: expected none with a Transfer, which has its own",
+                place="region",
+            )
+        return sides(thing)
+    if isinstance(thing, SemanticCloud):
+        if region is not None:
+            raise InvalidInput("region: expected none with a SemanticCloud", place="region")
+        painted = None if colors is None else colors_of(colors, thing.n_points)
+        views = {"n_views": thing.n_views.astype(np.float64)}
+        return [Part("cloud", thing.points, colors=painted, scalars=views)]
+    return [surface(thing, region, colors)]
+
+
+def surface(
+    thing: Any, region: Optional[Union[Region, ArrayLike]], colors: Optional[ArrayLike]
+) -> Part:
+    """One mesh with its region or colours."""
+    mesh = mesh_of(thing)
+    part = Part("mesh", mesh.vertices, mesh.faces)
+    if region is not None:
+        part.scalars["region"] = weights_of(region, mesh.n_vertices)
+        part.colors = weight_colors(part.scalars["region"])
+    elif colors is not None:
+        part.colors = colors_of(colors, mesh.n_vertices)
+    elif isinstance(thing, MeshFile) and thing.vertex_colors is not None:
+        part.colors = colors_of(thing.vertex_colors, mesh.n_vertices)
+    return part
+
+
+def mesh_of(thing: Any) -> Mesh:
+    """The mesh as given of an object of ours."""
+    if isinstance(thing, Mesh):
+        return thing
+    if isinstance(thing, (PreparedObject, MeshFile)):
+        return thing.mesh
+    if isinstance(thing, Shape):
+        return thing.original
+    raise TypeError(
+        "expected a Mesh, MeshFile, Shape, PreparedObject, SemanticCloud or Transfer, "
+        f"found {type(thing).__name__}"
+    )
+
+
+def sides(transfer: Transfer) -> list[Part]:
+    """Source and target with region and matched places, the target beside the source along x."""
+    source = surface(transfer.source, transfer.source_region, None)
+    target = surface(transfer.target, transfer.weights, None)
+    source.name, target.name = "source", "target"
+    places = position_colors(source.vertices)
+    source.layers["places"], target.layers["places"] = places, transfer.point_map.pull_back(places)
+    target.scalars["source_of"] = transfer.point_map.source_of.astype(np.float64)
+    boxes = [
+        np.array([part.vertices.min(axis=0), part.vertices.max(axis=0)])
+        for part in (source, target)
+    ]
+    widths = [box[1, 0] - box[0, 0] for box in boxes]
+    target.offset = boxes[0].mean(axis=0) - boxes[1].mean(axis=0)
+    target.offset[0] += sum(widths) / 2 + GAP * max(widths)
+    return [source, target]
+
+
+def library(name: str, install: str) -> Any:
+    """A library that is needed now, or an `ImportError` that says why and how to get it."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError) as error:
+        raise ImportError(
+            f"this needs {name}, which cannot be imported ({error}): pip install {install}"
+        ) from error
+
+
+def color_bytes(colors: Floats) -> NDArray[np.uint8]:
+    """(n, 4) RGBA bytes of (n, 3) fractions."""
+    opaque = np.full((len(colors), 1), 255, dtype=np.uint8)
+    return np.hstack([np.rint(colors * 255).astype(np.uint8), opaque])
