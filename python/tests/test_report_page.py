@@ -4,19 +4,15 @@ tables and gallery can be sorted. Needs `chromium` and the built `semfm-cli`."""
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from browser import browse, browser, semfm_cli  # noqa: F401
 
 pytestmark = pytest.mark.full
-
-ROOT = Path(__file__).resolve().parents[2]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 #: Appended to a copy of the page: clicks, and writes down what came of it.
 PROBE = """
@@ -57,44 +53,13 @@ addEventListener('load', () => {
 
 
 @pytest.fixture(scope="module")
-def browser() -> str:
-    for name in BROWSERS:
-        if found := shutil.which(name):
-            return found
-    pytest.skip(f"no browser: none of {', '.join(BROWSERS)} is on the PATH")
-
-
-@pytest.fixture(scope="module")
 def page(tmp_path_factory) -> Path:
-    built = [ROOT / "target" / profile / "semfm-cli" for profile in ("debug", "release")]
-    program = os.environ.get("SEMFM_CLI") or next((str(p) for p in built if p.is_file()), None)
-    if program is None:
-        pytest.skip("no semfm-cli: neither $SEMFM_CLI nor in target/")
+    program = semfm_cli()
     out = tmp_path_factory.mktemp("report")
     small = "--synthetic --level easy --seeds 0 --objects 2 --methods fused,wks,whole --quiet".split()
     done = subprocess.run([program, "eval", *small, "-o", out], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return out / "index.html"
-
-
-def browse(browser: str, page: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Opens a page without a screen; the console comes on stderr."""
-    profile = page.parent / "profile"
-    command = [
-        browser,
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-dev-shm-usage",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--enable-logging=stderr",
-        f"--user-data-dir={profile}",
-        "--virtual-time-budget=20000",
-        *options,
-        page.as_uri(),
-    ]
-    return subprocess.run(command, capture_output=True, text=True, timeout=180)
 
 
 class Outline(HTMLParser):
