@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use faer::Mat;
+use semfm::Task;
 use semfm::fmap::descriptors::normalised_coefficients;
 use semfm::fmap::fit::{FitSettings, fit};
 use semfm::fmap::zoomout::{MapSide, ZoomOutSettings, point_map, zoomout};
@@ -12,7 +13,6 @@ use semfm::geom::descriptors::{WksSettings, landmark_wks, wks};
 use semfm::geom::math::DVec3;
 use semfm::geom::sampling::farthest_points;
 use semfm::geom::{Eigenbasis, PointIndex};
-use semfm::{Task, TransferSettings};
 
 use super::shape::{K, MatchingShape};
 use crate::{Error, Result};
@@ -29,7 +29,7 @@ const TRUE_K: usize = 20;
 /// How a map is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MapMethod {
-    /// 100 wave kernel signatures, Laplacian commutativity, k = 50.
+    /// 100 wave kernel signatures, commutation with them and the Laplacian, k = 50.
     Wks,
     /// The same at k = 30, then ZoomOut to 200.
     WksZoomOut,
@@ -62,13 +62,14 @@ impl MapMethod {
         self,
         source: &MatchingShape,
         target: &MatchingShape,
+        settings: &FitSettings,
         task: &Task,
     ) -> Result<PointMap> {
         let map = match self {
-            Self::Wks => described(source, target, 50, &[], task)?,
-            Self::WksZoomOut => described(source, target, 30, &[], task)?,
+            Self::Wks => described(source, target, 50, &[], settings, task)?,
+            Self::WksZoomOut => described(source, target, 30, &[], settings, task)?,
             Self::Landmarks | Self::LandmarksZoomOut => {
-                described(source, target, 30, &landmarks(source, target), task)?
+                described(source, target, 30, &landmarks(source, target), settings, task)?
             }
             Self::TrueZoomOut => true_map(source, target)?,
         };
@@ -130,6 +131,7 @@ fn described(
     target: &MatchingShape,
     k: usize,
     landmarks: &[(u32, u32)],
+    settings: &FitSettings,
     task: &Task,
 ) -> Result<FunctionalMap> {
     let (source, target) = (shortened(basis_of(source), k), shortened(basis_of(target), k));
@@ -151,11 +153,7 @@ fn described(
     let a = describe(&source, landmarks.iter().map(|pair| pair.0).collect())?;
     let b = describe(&target, landmarks.iter().map(|pair| pair.1).collect())?;
     let k = a.nrows().min(b.nrows());
-    let settings = FitSettings {
-        laplacian: TransferSettings::of(semfm::Method::Wks).fit.laplacian,
-        descriptors: 0.0,
-    };
-    Ok(fit((a.subrows(0, k), b.subrows(0, k)), &source, &target, &settings, task)?.map)
+    Ok(fit((a.subrows(0, k), b.subrows(0, k)), &source, &target, settings, task)?.map)
 }
 
 /// True pairs of working vertices, far apart on the source.
