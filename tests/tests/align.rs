@@ -36,7 +36,7 @@ impl Scene {
         let truth = Sim3 { scale, rotation, translation };
         let folder = tempfile::tempdir().unwrap();
         let scene = Self { folder, mesh, truth };
-        write_mesh(&scene.at("mug.obj"), &scene.mesh).unwrap();
+        write_mesh(scene.at("mug.obj"), &scene.mesh).unwrap();
         scene.render();
         scene
     }

@@ -88,11 +88,11 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<Aligned> {
     }
     let camera_from_object = similarity(path, "camera_from_object", file.camera_from_object)?;
     let scale = camera_from_object.scale;
-    if let Some(told) = file.scale.filter(|told| !((told / scale - 1.0).abs() <= SCALE_TOLERANCE)) {
+    if let Some(told) = file.scale.filter(|told| (told / scale - 1.0).abs() > SCALE_TOLERANCE) {
         return Err(fault("scale", format!("{scale}, the matrix's"), told.to_string()));
     }
     for (place, number) in [("scale_std", file.scale_std), ("residual_m", file.residual_m)] {
-        if let Some(number) = number.filter(|x| !(*x >= 0.0)) {
+        if let Some(number) = number.filter(|x| *x < 0.0) {
             return Err(fault(place, "a number of at least 0".into(), number.to_string()));
         }
     }

@@ -413,11 +413,11 @@ mod tests {
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         for (bytes, place) in [
             (text(xyz("ascii", 2, "1 2 3\n")), "data"),
-            (text(xyz("ascii", 1, "1 2 3\n4 5 6\n")), "line 11"),
-            (text(xyz("ascii", 1, "1 2\n")), "line 10"),
-            (text(xyz("ascii", 1, "1 2 q\n")), "line 10"),
+            (text(xyz("ascii", 1, "1 2 3\n4 5 6\n")), "line 12"),
+            (text(xyz("ascii", 1, "1 2\n")), "line 11"),
+            (text(xyz("ascii", 1, "1 2 q\n")), "line 11"),
             (text(xyz("binary", 4_000_000_000, "123")), "data"),
-            (text(xyz("magic", 1, "")), "line 9"),
+            (text(xyz("magic", 1, "")), "line 10"),
             (text(header("x y q", "4 4 4", "F F F", 1, "ascii")), "line 3"),
             (text(header("x y z", "4 4", "F F F", 1, "ascii")), "header, SIZE"),
             (text(header("x y z", "4 4 3", "F F F", 1, "ascii")), "line 3, field `z`"),
