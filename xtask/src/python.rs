@@ -52,8 +52,7 @@ pub fn stubs(workspace: &Workspace) -> Result<()> {
 }
 
 /// What the package is made of; `typed` is the end of `py.typed`.
-const SOURCES: [&str; 10] =
-    ["py", "pyi", "rs", "toml", "typed", "md", "html", "css", "js", "wgsl"];
+const SOURCES: [&str; 10] = ["py", "pyi", "rs", "toml", "typed", "md", "html", "css", "js", "wgsl"];
 
 /// Extras and content of the package, so that nothing is installed twice.
 fn stamp_of(workspace: &Workspace, extras: &str) -> Result<String> {

@@ -80,7 +80,7 @@ pub struct GraspOptions {
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     scene: Vec<PathBuf>,
     /// Distance that the hand keeps from the points of a scene, metres
-    #[arg(long, default_value_t = SCENE_MARGIN, value_name = "METRES", help_heading = "Scene")]
+    #[arg(long, default_value_t = SCENE_MARGIN, allow_negative_numbers = true, value_name = "METRES", help_heading = "Scene")]
     scene_margin: f64,
     /// A table: a point of it and its normal, away from the table
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse_table, allow_hyphen_values = true, help_heading = "Scene")]
@@ -122,7 +122,7 @@ struct MetricOptions {
     #[arg(long, value_name = "aligned.json", help_heading = "Metres")]
     aligned: Option<PathBuf>,
     /// Metres per unit of the mesh
-    #[arg(long, value_name = "S", help_heading = "Metres")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, help_heading = "Metres")]
     scale: Option<f64>,
     /// The mesh is in metres already
     #[arg(long, help_heading = "Metres")]
