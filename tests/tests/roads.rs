@@ -62,7 +62,9 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     assert!(iou > 0.6, "IoU {iou}");
 
     let report = json(&out.join("report.json"));
-    for key in ["settings", "seeds", "stages_ms", "anchors", "map", "confidence", "verdict"] {
+    for key in
+        ["settings", "seeds", "stages_ms", "anchors", "map", "confidence", "verdict", "evidence"]
+    {
         assert!(!report[key].is_null(), "report.json lacks {key}");
     }
     let map: Vec<u32> =

@@ -161,7 +161,7 @@ mod tests {
         let points: Vec<DVec3> = (0..9).map(|i| DVec3::X * f64::from(i)).collect();
         let graph = NeighbourGraph::new(&points, 2, |i, j| (i as f64 - j as f64).powi(2)).unwrap();
         let (stiffness, degrees) = graph.laplacian(0.5).unwrap();
-        let mut sums = vec![0.0; 9];
+        let mut sums = [0.0; 9];
         stiffness.triplet_iter().for_each(|t| sums[t.row] += t.val);
         assert!(sums.iter().all(|sum: &f64| sum.abs() < 1e-12));
         assert!(degrees.iter().all(|&d| d > 0.0));

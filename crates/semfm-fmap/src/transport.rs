@@ -524,6 +524,19 @@ mod tests {
     }
 
     #[test]
+    fn votes_go_back_along_the_same_masses() {
+        let (a, b) = (cloud(40, 3, 1.0), cloud(30, 4, 1.0));
+        let (plan, _) = both_ways(&a, &b, &TransportSettings::default());
+        let function: Vec<f64> = (0..30).map(|i| f64::from(i) / 30.0).collect();
+        for (j, found) in plan.vote_back(&function).into_iter().enumerate() {
+            let all: f64 = (0..30).map(|i| plan.mass(i, j)).sum();
+            let mean: f64 = (0..30).map(|i| plan.mass(i, j) * function[i]).sum::<f64>() / all;
+            assert!((found - mean).abs() < 1e-6, "{found} for {mean}");
+        }
+        assert!(plan.vote_back(&[1.0; 30]).iter().all(|x| (x - 1.0).abs() < 1e-9));
+    }
+
+    #[test]
     fn a_balanced_plan_has_the_given_masses() {
         let (a, b) = (cloud(40, 3, 1.0), cloud(30, 4, 1.0));
         let settings = TransportSettings { blur: 0.1, kl_weight: f64::INFINITY, iterations: 500 };

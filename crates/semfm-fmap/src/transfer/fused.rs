@@ -3,7 +3,8 @@
 //! The transport plan between the clouds says for each sample of either object which sample of
 //! the other it resembles most, given that everything must go somewhere. Those matches, both ways,
 //! start a bidirectional ZoomOut (10 → 30) whose search runs in the basis and the features at once;
-//! the map carries the region, and a little heat takes out the specks. Anchors are not needed.
+//! the map carries the region, a little heat takes out the specks, and the vote is spread along the
+//! target's own features ([`propagation`](crate::propagation)). Anchors are not needed.
 
 use super::{Matched, Pair, Rule, Stages};
 use crate::Result;

@@ -602,6 +602,12 @@ mod tests {
         );
         let error = transfer(pair(&source, &other), &region, &settings, &task).unwrap_err();
         assert!(error.to_string().contains("feature dimension"), "{error}");
+        let backwards = TransferSettings {
+            propagation: PropagationSettings { weight: -1.0, ..PropagationSettings::default() },
+            ..settings.clone()
+        };
+        let error = transfer(pair(&source, &target), &region, &backwards, &task).unwrap_err();
+        assert!(error.to_string().contains("propagation"), "{error}");
         task.cancel();
         assert!(matches!(
             transfer(pair(&source, &target), &region, &settings, &task),
