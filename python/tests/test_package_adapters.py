@@ -103,9 +103,9 @@ def test_open3d_and_back(sphere, cap, carried):
     assert np.array_equal(np.asarray(cloud.points), carried.source.cloud.points)
 
 
-def test_polyscope_has_structures_and_quantities():
+def test_polyscope_has_structures_and_quantities(tmp_path):
     required("polyscope")
-    # In a process of its own: polyscope keeps one global state and may need a screen.
+    # In a process and a folder of its own: polyscope keeps one global state and leaves files.
     code = """
 import numpy as np, polyscope, semfm, semfm.zoo
 from semfm.adapters import to_polyscope
@@ -126,7 +126,8 @@ assert target.get_transform()[0, 3] != 0 and np.array_equal(source.get_transform
 cloud = to_polyscope(carried.source.cloud)
 assert polyscope.has_point_cloud("cloud") and cloud.n_points() == len(carried.source.cloud)
 """
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    command = [sys.executable, "-c", code]
+    run = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     if run.returncode == 77:
         pytest.skip(run.stdout.strip())
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,4 @@
-"""The notebook is its script's, and runs from top to bottom with a picture wherever one is drawn."""
+"""The notebook is its script's, and runs from top to bottom with all its pictures."""
 
 from __future__ import annotations
 

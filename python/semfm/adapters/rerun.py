@@ -80,7 +80,7 @@ def geometry(rerun: Any, part: Part) -> Any:
 def vertex_normals(
     vertices: np.ndarray[Any, np.dtype[np.float64]], faces: np.ndarray[Any, np.dtype[np.uint32]]
 ) -> Any:
-    """(n, 3) unit normals, by area; zero where no triangle has any. Without them there is no shade."""
+    """(n, 3) unit normals, by area: without them there is no shade."""
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices)

@@ -1,15 +1,15 @@
 """Pictures of meshes, regions, maps and transfers with matplotlib: ``pip install 'semfm[viz]'``.
 
-Surfaces are drawn by `semfm.render`, which hides what is hidden and shades what is curved, and shown
-in axes of matplotlib, so that titles, legends, colour bars and ``savefig`` work as ever::
+Surfaces are drawn by `semfm.render`, which hides what is hidden and shades what is curved, and
+shown in axes of matplotlib, so that titles, legends, colour bars and ``savefig`` work as ever::
 
     import semfm.plot
 
     figure = semfm.plot.transfer(carried)
     figure.savefig("carried.png", dpi=150)
 
-Functions about one surface draw into the axes they are given and return them; functions about a pair
-make a figure and return it. Nothing is shown on a screen until the caller says so.
+Functions about one surface draw into the axes they are given and return them; functions about a
+pair make a figure and return it. Nothing is shown on a screen until the caller says so.
 """
 
 try:

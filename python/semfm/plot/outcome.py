@@ -152,7 +152,7 @@ def part_color(number: int) -> NDArray[np.float64]:
 def part_paint(
     mesh: Mesh, cloud: SemanticCloud, clusters: Clusters, chosen: NDArray[np.uint32]
 ) -> Colors:
-    """Vertices by the part of the nearest point of the cloud: chosen parts coloured, others grey."""
+    """Vertices by the part of the nearest point of the cloud: those not chosen stay grey."""
     label_colors = PLAIN * np.linspace(1.0, 0.75, clusters.n_clusters)[:, None]
     for number, label in enumerate(chosen):
         label_colors[label] = part_color(number)

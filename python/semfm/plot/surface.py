@@ -55,10 +55,10 @@ def best_camera(
     """
     found = as_mesh(mesh)
     faces = np.asarray(found.faces)
-    marked = np.zeros(len(faces), dtype=bool)
+    inside = np.zeros(found.n_vertices)
     if weights is not None:
-        inside = np.asarray(weights_of(weights, found.n_vertices) >= 0.5)
-        marked = inside[faces].any(axis=1)
+        inside = weights_of(weights, found.n_vertices)
+    marked: NDArray[np.bool_] = np.any(inside[faces] >= 0.5, axis=1)
     areas = face_areas(found)
     shown = []
     for view in render(found, rig(found, count=N_SCOUTS, size=SCOUT), supersampling=1):
