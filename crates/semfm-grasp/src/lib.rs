@@ -25,6 +25,7 @@ mod obstacle;
 pub mod rejection;
 pub mod scene;
 mod score;
+mod search;
 pub mod select;
 pub mod settings;
 mod solid;

@@ -12,7 +12,7 @@ use crate::solid::Solid;
 /// diagonal, where objects made by people have their edges.
 const INSIDE_RAYS: [DVec3; 3] = [
     DVec3::new(0.5377, 0.2713, 0.7983),
-    DVec3::new(-0.7071, 0.6123, -0.3536),
+    DVec3::new(-0.7019, 0.6177, -0.3545),
     DVec3::new(0.1736, -0.9397, 0.2949),
 ];
 

@@ -138,10 +138,10 @@ fn null_vector(rows: &mut [Wrench; 5]) -> Option<Wrench> {
     let mut columns = [0, 1, 2, 3, 4, 5];
     for k in 0..5 {
         let (mut best, mut place) = (0.0, (k, k));
-        for r in k..5 {
-            for c in k..6 {
-                if rows[r][columns[c]].abs() > best {
-                    (best, place) = (rows[r][columns[c]].abs(), (r, c));
+        for (r, row) in rows.iter().enumerate().skip(k) {
+            for (c, &column) in columns.iter().enumerate().skip(k) {
+                if row[column].abs() > best {
+                    (best, place) = (row[column].abs(), (r, c));
                 }
             }
         }

@@ -1,0 +1,291 @@
+//! The search behind [`find_grasps`](crate::find_grasps): each candidate through every stage, then
+//! the neighbours of what survived.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use semfm_geom::Task;
+use semfm_geom::math::DVec3;
+
+use crate::Result;
+use crate::antipodal::antipodal;
+use crate::candidate::Candidate;
+use crate::closure::widest_angle;
+use crate::collision::{Collision, Fit};
+use crate::contact::{Closing, TOUCH_GAP, close};
+use crate::gpg::Gpg;
+use crate::grasp::Grasp;
+use crate::hand::Hand;
+use crate::object::{GraspObject, Region, Surface};
+use crate::rejection::{Miss, Reason, Rejected};
+use crate::scene::Scene;
+use crate::score::Scorer;
+use crate::select::suppress;
+use crate::settings::GraspSettings;
+use crate::spread::neighbours;
+
+/// Contacts must lie inside the friction cone by this share of its half-angle: another program
+/// computes other normals.
+const CONE_SHARE: f64 = 0.97;
+
+/// What one seed, or all of them, gave.
+#[derive(Default)]
+pub(crate) struct Sampled {
+    grasps: Vec<Grasp>,
+    pub(crate) rejected: Rejected,
+    pub(crate) nearest: Option<Near>,
+    pub(crate) n_candidates: usize,
+}
+
+/// What stays of the candidates: grasps apart from each other, best first.
+pub(crate) struct Found {
+    pub(crate) kept: Vec<Grasp>,
+    pub(crate) n_survivors: usize,
+    pub(crate) sampled: Sampled,
+}
+
+/// A refused candidate, as far as it came.
+#[derive(Clone)]
+pub(crate) struct Near {
+    reason: Reason,
+    by: f64,
+    candidate: Candidate,
+    closing: Option<Closing>,
+}
+
+pub(crate) struct Search<'a> {
+    object: &'a GraspObject,
+    region: &'a Region,
+    hand: &'a Hand,
+    settings: &'a GraspSettings,
+    collision: Collision<'a>,
+    scorer: Scorer<'a>,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(
+        object: &'a GraspObject,
+        region: &'a Region,
+        hand: &'a Hand,
+        scene: &'a Scene,
+        settings: &'a GraspSettings,
+    ) -> Self {
+        let down = scene.table().map(|table| -table.normal);
+        let scorer = Scorer::new(object, hand, settings, down);
+        let collision = Collision::new(object, scene, hand, settings);
+        Self { object, region, hand, settings, collision, scorer }
+    }
+
+    pub(crate) fn run(&self, task: &Task) -> Result<Sampled> {
+        let n_samples = self.settings.n_samples;
+        let done = AtomicUsize::new(0);
+        let parts: Vec<Sampled> = (0..n_samples)
+            .into_par_iter()
+            .map_init(
+                || {
+                    let gpg = Gpg::new(self.object, self.hand, self.settings.friction);
+                    (gpg, Vec::new())
+                },
+                |(gpg, candidates), i| {
+                    candidates.clear();
+                    let sampled = self.sample(i as u64, gpg, candidates);
+                    task.step("examine", done.fetch_add(1, Ordering::Relaxed) + 1, n_samples)?;
+                    Ok(sampled)
+                },
+            )
+            .collect::<Result<_>>()?;
+        let mut all = Sampled::default();
+        parts.into_iter().for_each(|part| all.absorb(part));
+        Ok(all)
+    }
+
+    /// One seed of the region: on a mesh, antipodal pairs and GPG take turns.
+    fn sample(&self, i: u64, gpg: &mut Gpg<'_>, candidates: &mut Vec<Candidate>) -> Sampled {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        rng.set_stream(i + 1);
+        let seed = self.region.draw(self.object, &mut rng);
+        let on_mesh = matches!(self.object.surface(), Surface::Mesh { .. });
+        let mut sampled = Sampled::default();
+        if on_mesh && i.is_multiple_of(2) {
+            let friction = self.settings.friction;
+            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates);
+        } else {
+            let refused = gpg.grow(&seed, candidates);
+            sampled.n_candidates += refused;
+            sampled.rejected.add(Reason::ForceClosure, refused);
+        }
+        if candidates.is_empty() && sampled.n_candidates == 0 {
+            sampled.n_candidates = 1;
+            sampled.rejected.add(Reason::NoContact, 1);
+        }
+        sampled.n_candidates += candidates.len();
+        for candidate in candidates.iter() {
+            sampled.settle(self.examine(candidate));
+        }
+        sampled
+    }
+
+    /// Merges near grasps and tries the neighbours of those that stay, and theirs again.
+    pub(crate) fn spread(&self, mut sampled: Sampled, task: &Task) -> Result<Found> {
+        let separation = self.settings.separation;
+        let mut n_survivors = sampled.grasps.len();
+        let mut kept = suppress(std::mem::take(&mut sampled.grasps), separation);
+        let mut frontier = kept.clone();
+        let rounds = self.settings.spread_rounds;
+        for round in 0..rounds {
+            task.step("spread", round, rounds)?;
+            let mut part = Sampled::default();
+            let candidates = neighbours(&frontier, &kept, separation);
+            part.n_candidates = candidates.len();
+            let results: Vec<_> = candidates
+                .par_iter()
+                .map(|candidate| task.check().map(|()| self.examine(candidate)))
+                .collect::<std::result::Result<_, _>>()?;
+            results.into_iter().for_each(|result| part.settle(result));
+            n_survivors += part.grasps.len();
+            let before = kept.clone();
+            kept.append(&mut part.grasps);
+            kept = suppress(kept, separation);
+            frontier = kept.iter().filter(|grasp| !before.contains(grasp)).cloned().collect();
+            sampled.absorb(part);
+        }
+        Ok(Found { kept, n_survivors, sampled })
+    }
+
+    /// The stages, cheap ones first.
+    pub(crate) fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
+        let near = |closing: Option<&Closing>| {
+            let closing = closing.cloned();
+            move |(reason, by)| Box::new(Near { reason, by, candidate: *candidate, closing })
+        };
+        self.approach(candidate).map_err(near(None))?;
+        let compliance = self.settings.compliance;
+        let Candidate { tcp, seed } = candidate;
+        let closing = close(self.object, self.region, self.hand, tcp, *seed, compliance)
+            .ok_or((Reason::NoContact, 0.0))
+            .map_err(near(None))?;
+        let some = || near(Some(&closing));
+        let angle = self.contacts(&closing).map_err(some())?;
+        self.width(&closing).map_err(some())?;
+        self.collision.above_table(&closing).map_err(some())?;
+        let fit = self.collision.fit(&closing).map_err(some())?;
+        Ok(self.grasp(&closing, &fit, angle))
+    }
+
+    fn approach(&self, candidate: &Candidate) -> std::result::Result<(), (Reason, f64)> {
+        let Some(cone) = self.settings.limits.approach else { return Ok(()) };
+        let beyond = (candidate.tcp.rotation * DVec3::Z).angle_between(cone.axis) - cone.half_angle;
+        if beyond > 0.0 { Err((Reason::Approach, beyond)) } else { Ok(()) }
+    }
+
+    fn width(&self, closing: &Closing) -> std::result::Result<(), (Reason, f64)> {
+        let opening = self.hand.opening();
+        let asked = self.settings.limits.width.clone().unwrap_or(0.0..=f64::INFINITY);
+        let least = opening.start().max(*asked.start());
+        let most = (opening.end() - 2.0 * TOUCH_GAP).min(*asked.end());
+        let beyond = (least - closing.width).max(closing.width - most);
+        if beyond > 0.0 { Err((Reason::Width, beyond)) } else { Ok(()) }
+    }
+
+    /// Patches, force closure and region; returns the widest contact angle.
+    fn contacts(&self, closing: &Closing) -> std::result::Result<f64, (Reason, f64)> {
+        let limits = &self.settings.limits;
+        let bare = limits.pad_in_contact - self.scorer.pad_share(closing);
+        if bare > 0.0 {
+            return Err((Reason::Contact, bare));
+        }
+        let angle = widest_angle(&closing.patches, closing.tcp.rotation * DVec3::Y);
+        let beyond = angle - CONE_SHARE * self.settings.friction.atan();
+        if beyond > 0.0 {
+            return Err((Reason::ForceClosure, beyond));
+        }
+        let [left, right] = &closing.patches;
+        let outside = limits.pad_in_region - left.region.min(right.region);
+        if outside > 1e-9 { Err((Reason::Region, outside)) } else { Ok(angle) }
+    }
+
+    fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
+        let score = self.scorer.score(closing, fit, angle);
+        Grasp {
+            object_from_tcp: closing.tcp,
+            width: fit.width,
+            opening: fit.opening,
+            contacts: closing.patches.map(|patch| patch.contact),
+            normals: closing.patches.map(|patch| patch.normal),
+            epsilon: score.epsilon,
+            score: score.score,
+            terms: score.terms,
+        }
+    }
+
+    /// A refused candidate as a grasp, with what is known of it.
+    pub(crate) fn miss(&self, near: Near) -> Miss {
+        let Near { reason, by, candidate, closing } = near;
+        let widest = *self.hand.opening().end();
+        let by = match (&closing, reason) {
+            (Some(closing), reason)
+                if reason >= Reason::Collision && reason != Reason::Clearance =>
+            {
+                self.collision.back_off(closing)
+            }
+            _ => by,
+        };
+        let seed = candidate.seed;
+        let at = |y: f64| candidate.tcp * (DVec3::Y * y);
+        let closing_axis = candidate.tcp.rotation * DVec3::Y;
+        let (tcp, width, contacts, normals) = closing.map_or_else(
+            || {
+                let ends = [at(seed[0]), at(seed[1])];
+                (candidate.tcp, seed[1] - seed[0], ends, [-closing_axis, closing_axis])
+            },
+            |closing| {
+                let patches = closing.patches;
+                (closing.tcp, closing.width, patches.map(|p| p.contact), patches.map(|p| p.normal))
+            },
+        );
+        let grasp = Grasp {
+            object_from_tcp: tcp,
+            width,
+            opening: widest,
+            contacts,
+            normals,
+            epsilon: 0.0,
+            score: 0.0,
+            terms: Vec::new(),
+        };
+        Miss { reason, by, grasp }
+    }
+}
+
+impl Sampled {
+    fn settle(&mut self, result: std::result::Result<Grasp, Box<Near>>) {
+        match result {
+            Ok(grasp) => self.grasps.push(grasp),
+            Err(near) => {
+                self.rejected.add(near.reason, 1);
+                self.consider(*near);
+            }
+        }
+    }
+
+    fn absorb(&mut self, part: Self) {
+        self.grasps.extend(part.grasps);
+        self.rejected.merge(&part.rejected);
+        self.n_candidates += part.n_candidates;
+        if let Some(near) = part.nearest {
+            self.consider(near);
+        }
+    }
+
+    /// Keeps what came farthest, of that what missed by least, of that the first.
+    fn consider(&mut self, near: Near) {
+        let nearer = self.nearest.as_ref().is_none_or(|best| {
+            near.reason > best.reason || (near.reason == best.reason && near.by < best.by)
+        });
+        if nearer {
+            self.nearest = Some(near);
+        }
+    }
+}
