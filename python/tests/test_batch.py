@@ -157,7 +157,9 @@ def test_failures_are_recorded_and_retried(small):
     summary = carried(small)
     assert (summary.n_done, summary.n_failed) == (6, 3)
     found = by_name(small)
-    assert found["no mesh"]["error_type"] == "FileError" and "nowhere.ply" in found["no mesh"]["error"]
+    assert (
+        found["no mesh"]["error_type"] == "FileError" and "nowhere.ply" in found["no mesh"]["error"]
+    )
     assert found["no numpy"]["error_type"] == "FormatError"
     assert found["short"]["error_type"] == "InvalidInput" and "(3, 21)" in found["short"]["error"]
     assert found["short"]["vertices"] is None
