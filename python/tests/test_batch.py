@@ -16,6 +16,7 @@ from batch_library import Deadly, library, settings
 
 import semfm
 import semfm.batch
+import semfm.zoo
 from semfm.batch import pool, shards
 from semfm.batch.manifest import rows_of
 
@@ -156,7 +157,9 @@ def test_failures_are_recorded_and_retried(small):
     summary = carried(small)
     assert (summary.n_done, summary.n_failed) == (6, 3)
     found = by_name(small)
-    assert found["no mesh"]["error_type"] == "FileError" and "nowhere.ply" in found["no mesh"]["error"]
+    assert (
+        found["no mesh"]["error_type"] == "FileError" and "nowhere.ply" in found["no mesh"]["error"]
+    )
     assert found["no numpy"]["error_type"] == "FormatError"
     assert found["short"]["error_type"] == "InvalidInput" and "(3, 21)" in found["short"]["error"]
     assert found["short"]["vertices"] is None
@@ -200,8 +203,8 @@ def test_a_killed_worker_costs_no_row_but_one_that_always_kills(small):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and named pipes")
 def test_a_hanging_object_is_given_up(small, monkeypatch):
     monkeypatch.setattr(pool, "GRACE_S", 0.2)
-    os.mkfifo(small.folder / "endless.ply")
-    small.rows.insert(0, {"name": "hangs", "mesh": "endless.ply", "features": "object-000.npy"})
+    os.mkfifo(small.folder / "endless.npy")
+    small.rows.insert(0, {"name": "hangs", "mesh": "object-000.ply", "features": "endless.npy"})
     small.write()
     summary = carried(small, timeout_s=1.5)
     assert summary.errors == {"timeout": 1} and summary.n_done == 6
@@ -272,10 +275,10 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_worker(small):
     )
     rows = small.folder / "rows.jsonl"
     rows.write_text("".join(json.dumps(row) + "\n" for row in many.rows))
-    os.mkfifo(small.folder / "endless.ply")
+    os.mkfifo(small.folder / "endless.npy")
     with rows.open("a") as file:
         for i in range(2):
-            row = {"name": f"hangs-{i}", "mesh": "endless.ply", "features": "object-000.npy"}
+            row = {"name": f"hangs-{i}", "mesh": "object-000.ply", "features": "endless.npy"}
             file.write(json.dumps(row) + "\n")
     run = subprocess.Popen(
         [sys.executable, "-c", code, str(TESTS), str(rows)],

@@ -60,13 +60,17 @@ def test_a_worker_killed_in_the_middle_costs_no_answer(many):
     kept = ("name", "verdict", "confidence", "vertices", "weights", "mesh_hash", "hypotheses")
     both = [
         sorted(
-            ({key: record[key] for key in kept} for record in semfm.batch.records(many.folder / out)),
+            (
+                {key: record[key] for key in kept}
+                for record in semfm.batch.records(many.folder / out)
+            ),
             key=lambda record: record["name"],
         )
         for out in ("ray", "local")
     ]
     assert both[0] == both[1]
-    assert semfm.batch.transfer(*here, many.folder / "ray", runner="ray", **options).n_skipped == COUNT
+    again = semfm.batch.transfer(*here, many.folder / "ray", runner="ray", **options)
+    assert again.n_skipped == COUNT
 
 
 def test_a_row_that_always_kills_is_recorded(many, tmp_path):

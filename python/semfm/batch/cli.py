@@ -106,7 +106,9 @@ def _parser() -> argparse.ArgumentParser:
     files = parser.add_argument_group("files and talk")
     add = files.add_argument
     cache = files.add_mutually_exclusive_group()
-    cache.add_argument("--cache", metavar="FOLDER", help="of prepared shapes; OUT/shapes if not given")
+    cache.add_argument(
+        "--cache", metavar="FOLDER", help="of prepared shapes; OUT/shapes if not given"
+    )
     cache.add_argument("--no-cache", dest="cache", action="store_false", default=None)
     add("--format", choices=shards.FORMATS)
     add("--shard-size", type=int, default=256, metavar="N", help="records in a file")

@@ -150,7 +150,9 @@ def transfer(
     start = time.monotonic()
     _check(runner, address, workers, threads, attempts, shard_size, timeout_s)
     format = shards.chosen_format(format)
-    rows = read_manifest(manifest) if isinstance(manifest, (str, os.PathLike)) else rows_of(manifest)
+    rows = (
+        read_manifest(manifest) if isinstance(manifest, (str, os.PathLike)) else rows_of(manifest)
+    )
     out = os.fspath(out)
     demonstration = _demonstration(
         source,
@@ -285,7 +287,12 @@ def _check(
         raise InvalidInput(f"runner: expected local or ray, found {runner!r}", place="runner")
     if address is not None and runner != "ray":
         raise InvalidInput("address: expected none without runner='ray'", place="address")
-    counts = {"workers": workers, "threads": threads, "attempts": attempts, "shard_size": shard_size}
+    counts = {
+        "workers": workers,
+        "threads": threads,
+        "attempts": attempts,
+        "shard_size": shard_size,
+    }
     for name, count in counts.items():
         if count is not None and count < 1:
             raise InvalidInput(f"{name}: expected at least 1, found {count}", place=name)

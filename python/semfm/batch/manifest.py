@@ -152,7 +152,14 @@ def _row(name: str, texts: Mapping[str, Optional[str]], folder: str) -> Row:
     for column, text in texts.items():
         paths[column] = None if text is None else os.path.join(folder, text)
         digest.update(f"{column}={text}\n{_stamp(paths[column])}\n".encode())
-    return Row(name, str(paths["mesh"]), *(paths[c] for c in FILES[1:]), key=digest.hexdigest())
+    return Row(
+        name,
+        str(paths["mesh"]),
+        embeddings=paths["embeddings"],
+        features=paths["features"],
+        cloud=paths["cloud"],
+        key=digest.hexdigest(),
+    )
 
 
 def _stamp(path: Optional[str]) -> str:

@@ -94,9 +94,7 @@ class Demonstration:
                 self.source, target, settings=self.settings, seed=self.seed, progress=tick
             )
             carried = matching.transfer(self.region)
-            return answer(
-                row, carried, point_map=self.point_maps, seconds=time.monotonic() - start
-            )
+            return answer(row, carried, point_map=self.point_maps, seconds=time.monotonic() - start)
         except TimeoutError as error:
             return failure(row, error, seconds=time.monotonic() - start, code="timeout")
         except Cancelled:
