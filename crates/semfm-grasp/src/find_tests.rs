@@ -20,7 +20,7 @@ fn hand() -> Hand {
 }
 
 fn few(n_samples: usize) -> GraspSettings {
-    GraspSettings { n_samples, ..GraspSettings::default() }
+    GraspSettings { n_samples, spread_rounds: 0, ..GraspSettings::default() }
 }
 
 fn search(mesh: &Mesh, scene: &Scene, settings: &GraspSettings) -> Grasps {
@@ -140,13 +140,23 @@ fn the_seed_decides_and_the_number_of_threads_does_not() {
     let mesh = joined(&bar(), &moved(&cylinder(0.02, 0.1, 24), |p| p + 0.06 * DVec3::Z));
     let run = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = GraspSettings { seed, ..few(80) };
+        let settings = GraspSettings { seed, spread_rounds: 1, ..few(40) };
         pool.install(|| search(&mesh, &Scene::new(), &settings))
     };
     let (one, three, other) = (run(1, 7), run(3, 7), run(1, 8));
     assert_eq!(one.grasps, three.grasps);
     assert_eq!(one.rejected, three.rejected);
     assert!(one.grasps != other.grasps);
+}
+
+#[test]
+fn each_round_of_spreading_finds_more() {
+    let survivors = |spread_rounds| {
+        let settings = GraspSettings { spread_rounds, ..few(20) };
+        search(&bar(), &Scene::new(), &settings).n_survivors
+    };
+    let (none, one) = (survivors(0), survivors(1));
+    assert!(none > 0 && one > none + 5, "{none}, then {one}");
 }
 
 #[test]
