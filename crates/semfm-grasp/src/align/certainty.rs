@@ -13,12 +13,8 @@ pub(super) struct Certainty {
     pub residual_m: f64,
     /// Weighted share of the points that lie on the model.
     pub inlier_share: f64,
-    /// Standard deviation of the scale relative to itself.
-    pub growth_std: f64,
-    /// Standard deviation of the rotation about its least certain axis, radians.
-    pub rotation_std: f64,
-    /// Standard deviation of the position in its least certain direction, metres.
-    pub position_std: f64,
+    /// Of turn, shift and growth in the model's inner frame (7 × 7).
+    covariance: Matrix7,
 }
 
 impl Certainty {
@@ -37,27 +33,61 @@ impl Certainty {
             a += outer * (weight * (1.0 - 3.0 * x) / (1.0 + x));
             b += outer * (weight * pull.residual).powi(2);
         });
-        let share = weights / ids.len().max(1) as f64;
-        let covariance = sandwich(a, b);
-        let turns = SymmetricEigen::new(covariance.fixed_view::<3, 3>(0, 0).into_owned());
-        let shifts = SymmetricEigen::new(covariance.fixed_view::<3, 3>(3, 3).into_owned());
-        let variance = turns.eigenvalues.max();
-        let mut rotation_std = variance.max(0.0).sqrt();
-        if rotation_std > DOUBTED {
-            let axis = turns.eigenvectors.column(turns.eigenvalues.imax()).into_owned();
-            // What else moves along when the rotation does, at the least cost.
-            let along = covariance.fixed_view::<7, 3>(0, 0) * axis / variance;
-            rotation_std = rotation_std.max(measured_std(problem, pose, ids, width, &along));
-        }
         Self {
             residual_m: if weights > 0.0 { (squares / weights).sqrt() } else { f64::INFINITY },
-            inlier_share: share,
-            growth_std: covariance[(6, 6)].max(0.0).sqrt(),
-            rotation_std,
-            position_std: pose.scale * shifts.eigenvalues.max().max(0.0).sqrt(),
+            inlier_share: weights / ids.len().max(1) as f64,
+            covariance: sandwich(a, b),
         }
     }
+
+    /// Unit directions in which the pose is hardly determined, the weakest first; four at most: a
+    /// flat face leaves as many.
+    pub fn weak(&self) -> Vec<Vector7> {
+        let eigen = SymmetricEigen::new(self.covariance);
+        let mut order: Vec<usize> =
+            (0..7).filter(|&i| eigen.eigenvalues[i] > WEAK * WEAK).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        order.iter().take(4).map(|&i| eigen.eigenvectors.column(i).into_owned()).collect()
+    }
+
+    /// Takes over what is known from elsewhere: the standard deviation along a unit direction.
+    pub fn know(&mut self, direction: &Vector7, std: f64) {
+        let variance = (direction.transpose() * self.covariance * direction)[(0, 0)];
+        let rest = Matrix7::identity() - direction * direction.transpose();
+        self.covariance = rest * self.covariance * rest
+            + direction * direction.transpose() * variance.min(std * std);
+    }
+
+    /// Standard deviation of the scale relative to itself.
+    pub fn growth_std(&self) -> f64 {
+        self.covariance[(6, 6)].max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the position in its least certain direction, in radii.
+    pub fn shift_std(&self) -> f64 {
+        let block = self.covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        SymmetricEigen::new(block).eigenvalues.max().max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the rotation about its least certain axis, radians; put to the test
+    /// where it is not small.
+    pub fn rotation_std(&self, problem: &Problem<'_>, pose: &Sim3, ids: &[u32], width: f64) -> f64 {
+        let turns = SymmetricEigen::new(self.covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        let variance = turns.eigenvalues.max();
+        let told = variance.max(0.0).sqrt();
+        if told <= DOUBTED {
+            return told;
+        }
+        let axis = turns.eigenvectors.column(turns.eigenvalues.imax()).into_owned();
+        // What else moves along when the rotation does, at the least cost.
+        let along = self.covariance.fixed_view::<7, 3>(0, 0) * axis / variance;
+        told.max(measured_std(problem, pose, ids, width, &along))
+    }
 }
+
+/// A standard deviation (radian, radius, logarithm) beyond which a direction is weak: the silhouette
+/// knows more.
+const WEAK: f64 = 0.015;
 
 /// A standard deviation of the rotation (radians) above which the quadratic model of the cost is put
 /// to the test.

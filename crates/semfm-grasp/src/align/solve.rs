@@ -109,11 +109,17 @@ impl Problem<'_> {
     ) -> Option<(Sim3, f64)> {
         let mut pulls = Vec::with_capacity(ids.len());
         self.pulls(pose, ids, width, matching, |_, pull| pulls.push(pull));
-        self.follow(pose, &pulls, width)
+        self.follow(pose, &pulls, width, &[])
     }
 
-    /// The step that given matches ask for.
-    pub fn follow(&self, pose: &Sim3, pulls: &[Pull], width: f64) -> Option<(Sim3, f64)> {
+    /// The step that given matches ask for; there is none along the directions (unit) that are held.
+    pub fn follow(
+        &self,
+        pose: &Sim3,
+        pulls: &[Pull],
+        width: f64,
+        held: &[Vector7],
+    ) -> Option<(Sim3, f64)> {
         let (mut a, mut g, mut total) = ([0.0f64; 28], [0.0f64; 7], 0.0);
         for pull in pulls {
             let weight = geman_mcclure(pull.squared, width) * pull.agreement;
@@ -142,7 +148,10 @@ impl Problem<'_> {
         // What the points do not determine stays as it is (Levenberg 1944). The damping is far below
         // the curvature of weak but real directions, which more would slow down.
         let damping = 1e-6 * normal.trace() / 7.0;
-        let damped = normal + Matrix7::identity() * damping;
+        let mut damped = normal + Matrix7::identity() * damping;
+        for direction in held {
+            damped += direction * direction.transpose() * (1e6 * normal.trace());
+        }
         let step = -damped.cholesky()?.solve(&Vector7::from_column_slice(&g));
         let (turn, shift) =
             (DVec3::new(step[0], step[1], step[2]), DVec3::new(step[3], step[4], step[5]));

@@ -4,13 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use super::Alignment;
 
-/// Visibility from which on a pose is accepted, and below which it is refused. True poses of
-/// single views lie above .85 even with a fifth of clutter; poses hidden inside or behind the
-/// observation, or far too large, below .5.
+/// Visibility from which on a pose is accepted, and below which it is refused. Right poses of 52
+/// single views of 26 objects, without and with a fifth of clutter, have .977 and more; models forced
+/// to hide in a patch or to stick out have little.
 const VISIBILITY: [f64; 2] = [0.75, 0.5];
 
-/// The same for the share of the observed points that lie on the model. A cloud with a piece of
-/// table has about .5; a small model that hides in a flat patch explains less than a quarter.
+/// The same for the share of the observed points that lie on the model: in those views .79 and more
+/// without clutter, .61 and more where a fifth of the points belongs to nothing.
 const INLIERS: [f64; 2] = [0.6, 0.3];
 
 /// Relative standard deviation of the scale up to which a grasp's opening can rely on it.
