@@ -202,7 +202,7 @@ pub fn align_model(
         stages_ms: Vec::new(),
     };
     let at_bound = pose.scale <= scales[0] * 1.0001 || pose.scale >= scales[1] / 1.0001;
-    (found.verdict, found.reasons) = verdict::judge(&found, at_bound);
+    (found.verdict, found.reasons) = verdict::judge(&found, weak.len(), at_bound);
     found.stages_ms = vec![
         ("search", searched),
         ("polish", polished),

@@ -34,8 +34,12 @@ pub enum Verdict {
     Refuse,
 }
 
-/// The verdict on an alignment, and the reasons against accepting it.
-pub(super) fn judge(a: &Alignment, at_bound: bool) -> (Verdict, Vec<String>) {
+/// So many weak directions are left by a flat face: its outline alone tells the rest.
+const FLAT: usize = 3;
+
+/// The verdict on an alignment, and the reasons against accepting it. `n_weak` directions were
+/// settled by the outline; the scale may stand at the border of its range.
+pub(super) fn judge(a: &Alignment, n_weak: usize, at_bound: bool) -> (Verdict, Vec<String>) {
     let (mut refuse, mut check) = (Vec::new(), Vec::new());
     for (name, value, [accepted, refused]) in [
         ("of the model's visible side was seen", a.visibility, VISIBILITY),
@@ -62,6 +66,11 @@ pub(super) fn judge(a: &Alignment, at_bound: bool) -> (Verdict, Vec<String>) {
         } else {
             format!("the rotation about some axis is known to ±{degrees:.0}° only")
         });
+    }
+    if n_weak >= FLAT {
+        check.push(
+            "what was seen is flat or nearly so: only its outline tells place and scale".into(),
+        );
     }
     if a.rival > RIVAL {
         check.push("another pose explains as much".into());
