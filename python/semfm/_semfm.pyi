@@ -28,6 +28,55 @@ _Cache = Union[bool, _Path]
 
 __version__: str
 
+class Alignment:
+    """Pose and scale of an object before a camera, and how far to trust them: see `align`."""
+    @property
+    def camera_from_object(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: from the mesh's frame and units to the camera's frame in metres; the
+        scale is included.
+        """
+        ...
+    @property
+    def inlier_share(self) -> float:
+        """float: share of the observed points that lie on the model."""
+        ...
+    @property
+    def position_std(self) -> float:
+        """float: standard deviation of the position in its least certain direction, metres."""
+        ...
+    @property
+    def reasons(self) -> list[str]:
+        """list of str: what speaks against accepting the pose."""
+        ...
+    @property
+    def residual_m(self) -> float:
+        """float: root mean square distance of the points that lie on the model, metres."""
+        ...
+    @property
+    def rigid(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: the same once the object is measured in metres, for `find_grasps`."""
+        ...
+    @property
+    def rotation_std(self) -> float:
+        """float: standard deviation of the rotation about its least certain axis, radians."""
+        ...
+    @property
+    def scale(self) -> float:
+        """float: metres per unit of the mesh."""
+        ...
+    @property
+    def scale_std(self) -> float:
+        """float: standard deviation of the scale."""
+        ...
+    @property
+    def verdict(self) -> str:
+        """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
+        ...
+    @property
+    def visibility(self) -> float:
+        """float: of the model's side that faces the camera, the share that was seen where it is."""
+        ...
+
 class Anchors:
     """The paired parts of two objects, by falling cosine.
 
@@ -612,6 +661,165 @@ class FunctionalMap:
         -------
         FunctionalMap
         """
+        ...
+
+class Grasp:
+    """One parallel-jaw grasp, in the frame of the object scaled to metres."""
+    @property
+    def contacts(self) -> NDArray[numpy.float64]:
+        """(2, 3) float64 array: one contact for each pad, metres."""
+        ...
+    @property
+    def epsilon(self) -> float:
+        """float: Ferrari and Canny's ε."""
+        ...
+    @property
+    def normals(self) -> NDArray[numpy.float64]:
+        """(2, 3) float64 array: the object's unit normal at each contact."""
+        ...
+    @property
+    def object_from_tcp(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: the hand's TCP frame in the object's frame."""
+        ...
+    @property
+    def opening(self) -> float:
+        """float: distance between the pads on the way in, metres."""
+        ...
+    @property
+    def score(self) -> float:
+        """float: weighted mean of the terms, 0 to 1."""
+        ...
+    @property
+    def terms(self) -> dict[str, Any]:
+        """dict: the terms of the score, each 0 to 1."""
+        ...
+    @property
+    def width(self) -> float:
+        """float: distance between the closed pads, metres."""
+        ...
+
+class Grasps:
+    """Grasps of an object, best first, and what became of the other candidates: see `find_grasps`.
+
+    A sequence of `Grasp`.
+    """
+    def __len__(self) -> int: ...
+    @property
+    def camera_from_tcp(self) -> Optional[NDArray[numpy.float64]]:
+        """(g, 4, 4) float64 array, optional: the same in the camera's frame, where one is known."""
+        ...
+    @property
+    def gripper(self) -> Gripper:
+        """Gripper: the hand."""
+        ...
+    @property
+    def n_candidates(self) -> int:
+        """int: hand poses examined."""
+        ...
+    @property
+    def nearest_miss(self) -> Optional[Any]:
+        """object, optional: what the nearest miss failed, by how much, and the unit (str,
+        float, str).
+        """
+        ...
+    @property
+    def object_from_tcp(self) -> NDArray[numpy.float64]:
+        """(g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres."""
+        ...
+    @property
+    def rejected(self) -> dict[str, Any]:
+        """dict: candidates refused, by the first thing that each failed."""
+        ...
+    @property
+    def scores(self) -> NDArray[numpy.float64]:
+        """(g,) float64 array: scores, falling."""
+        ...
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `grasps.json`.
+
+        Returns
+        -------
+        dict
+        """
+        ...
+    @property
+    def widths(self) -> NDArray[numpy.float64]:
+        """(g,) float64 array: distances between the closed pads, metres."""
+        ...
+    def write(self, path: _Path, *, format: Optional[str] = 'json') -> None:
+        """Writes the grasps, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        format : str, optional
+            ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
+        """
+        ...
+
+class Gripper:
+    """A parallel-jaw gripper: +z along the approach, y along the closing direction, origin between the
+    finger pads (TCP), metres.
+
+    Parameters
+    ----------
+    name_or_path : path
+        ``"franka"``, ``"robotiq-2f85"``, ``"robotiq-2f140"``, or a URDF file.
+    packages : dict, optional
+        Folders of the packages that a URDF names (``package://NAME/…``).
+
+    Examples
+    --------
+    >>> import semfm
+    >>> hand = semfm.Gripper("franka")
+    >>> hand.opening
+    (0.0, 0.08)
+    >>> hand.joints_at(0.04)
+    {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
+    """
+    def __init__(self, name_or_path: _Path, *, packages: Optional[Mapping[str, Any]] = None) -> None: ...
+    def flange_from_tcp(self, width: float) -> NDArray[numpy.float64]:
+        """The TCP in the flange's frame.
+
+        Parameters
+        ----------
+        width : float
+            Distance between the pads, metres; outside of the opening, the nearest inside.
+
+        Returns
+        -------
+        (4, 4) float64 array
+        """
+        ...
+    def joints_at(self, width: float) -> dict[str, Any]:
+        """Positions of the joints that open and close the hand.
+
+        Parameters
+        ----------
+        width : float
+            Distance between the pads, metres.
+
+        Returns
+        -------
+        dict
+            Metres or radians; empty where the joints are not known by name.
+        """
+        ...
+    @property
+    def name(self) -> str:
+        """str: as in the URDF, or of the built-in set."""
+        ...
+    @property
+    def notes(self) -> list[str]:
+        """list of str: what was replaced or left out when the URDF was read."""
+        ...
+    @property
+    def opening(self) -> tuple[float, float]:
+        """tuple of float, float: distances between the pads that the joints can reach, metres."""
+        ...
+    @property
+    def pad(self) -> tuple[float, float]:
+        """tuple of float, float: the pads' sides across (x) and along (z) the approach, metres."""
         ...
 
 class HeatGeodesics:
@@ -1600,6 +1808,34 @@ class View:
         """(height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view."""
         ...
 
+def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = Ellipsis, init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
+    """Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        In any units.
+    points : (n, 3) array_like
+        What the camera saw of the object, metres, in the camera's frame.
+    viewpoint : tuple of float, float, float, optional
+        Where the camera stands; None for a cloud merged from many views, of which nothing can be
+        said about what should have been seen.
+    init : (4, 4) array_like, optional
+        A guess of `Alignment.camera_from_object`.
+    scale_range : tuple of float, float, optional
+        Least and greatest scale, metres per unit.
+    n_starts : int, optional
+        Rotations to start from where there is no guess.
+    seed : int, optional
+    progress : progress, optional
+
+    Returns
+    -------
+    Alignment
+        A pose that cannot be trusted has the verdict ``"refuse"``; it is no error.
+    """
+    ...
+
 def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Camera:
     """One camera that looks along ``-direction`` at the whole object: for pictures of results.
 
@@ -1729,6 +1965,70 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     Returns
     -------
     (n,) uint32 array
+    """
+    ...
+
+def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+    """Parallel-jaw grasps whose pads close inside a region.
+
+    Every grasp that comes back was checked: the open hand on its way in and where it closes meets
+    neither object nor scene, the contacts are in force closure, and the pads lie in the region.
+    Nothing found is an answer: see `Grasps.rejected` and `Grasps.nearest_miss`.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        The object.
+    region : Region
+        Where the pads shall close; of the mesh.
+    gripper : Gripper or path
+        A hand, or what `Gripper` takes.
+    scale : float
+        Metres per unit of the mesh; 1 for a mesh in metres.
+    camera_from_object : (4, 4) array_like, optional
+        Rigid pose of the object, scaled to metres, before a camera. Scene, table and directions
+        are then given in the camera's frame, else in the object's in metres.
+    table : object, optional
+        A table top as a pair: a point of it, and its normal, away from the table.
+    scene_meshes : list of mesh_like, optional
+        What the hand must not touch, metres.
+    scene_points : (p, 3) array_like, optional
+        Points that it must keep `scene_margin` away from, metres.
+    scene_margin : float, optional
+    top : int, optional
+        Grasps to return.
+    n_samples : int, optional
+        Points of the region from which candidates are grown.
+    friction : float, optional
+        Coulomb coefficient between pad and object.
+    width_range : tuple of float, float, optional
+        Least and largest distance between the closed pads, metres.
+    approach : (3,) array_like, optional
+        Middle of the allowed directions of approach.
+    approach_cone : float, optional
+        Half-angle of the allowed directions around `approach`, radians; π/4 by default.
+    demonstrated_approach : (3,) array_like, optional
+        The direction in which the demonstrator's hand came; agreement raises the score.
+    clearance : float, optional
+        Least distance of the open hand to everything, metres.
+    pad_in_region : float, optional
+        Share of each pad's contact that must lie in the region.
+    seed : int, optional
+    progress : progress, optional
+
+    Returns
+    -------
+    Grasps
+
+    Examples
+    --------
+    >>> import semfm
+    >>> import semfm.zoo
+    >>> ball = semfm.zoo.icosphere(3)
+    >>> everywhere = semfm.Region([1.0] * ball.n_vertices)
+    >>> grasps = semfm.find_grasps(ball, everywhere, "franka", scale=0.03, n_samples=100)
+    >>> bool(abs(grasps[0].width - 0.06) < 0.002)
+    True
     """
     ...
 

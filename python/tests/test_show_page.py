@@ -42,7 +42,8 @@ addEventListener('load', () => setTimeout(() => {
 def demo(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("show")
     program = semfm_cli()
-    for arguments in (["demo", "-q", "-o", out], ["show", out / "transfer", "-o", out / "page.html"]):
+    page = ["show", out / "transfer", "-o", out / "page.html"]
+    for arguments in (["demo", "-q", "-o", out], page):
         done = subprocess.run([program, *arguments], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     return out

@@ -171,8 +171,7 @@ def test_denied_access_ends_the_run_at_once_and_keeps_rows(endpoint, mallets, tm
 def test_no_file_holds_the_key(endpoint, mallets, tmp_path, capfd):
     """Through the real program, with the client's own logging at its loudest."""
     endpoint.acts = [f"The key is {KEY}.", status(500, KEY), says(EVERYTHING, 1)]
-    root = Path(__file__).resolve().parents[1]
-    environment = {**os.environ, "OPENAI_LOG": "debug", "PYTHONPATH": str(root)}
+    environment = {**os.environ, "OPENAI_LOG": "debug"}
     arguments = many(mallets, tmp_path, "--views", "1", "--cache", str(tmp_path / "replies"))
     arguments += ["--pictures", str(tmp_path / "pictures")]
     run = subprocess.run(

@@ -111,7 +111,7 @@ impl Alignment {
 ///     In any units.
 /// points : (n, 3) array_like
 ///     What the camera saw of the object, metres, in the camera's frame.
-/// viewpoint : (3,) array_like or None, optional
+/// viewpoint : tuple of float, float, float, optional
 ///     Where the camera stands; None for a cloud merged from many views, of which nothing can be
 ///     said about what should have been seen.
 /// init : (4, 4) array_like, optional
@@ -121,7 +121,7 @@ impl Alignment {
 /// n_starts : int, optional
 ///     Rotations to start from where there is no guess.
 /// seed : int, optional
-/// progress : bool or callable, optional
+/// progress : progress, optional
 ///
 /// Returns
 /// -------

@@ -1,5 +1,6 @@
 //! `Grasps`: ranked, collision-free hand poses in a region.
 
+use std::f64::consts::FRAC_PI_4;
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
@@ -68,7 +69,7 @@ impl Grasp {
         self.grasp.score
     }
 
-    /// dict of str to float: the terms of the score, each 0 to 1.
+    /// dict: the terms of the score, each 0 to 1.
     #[getter]
     fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let terms = PyDict::new(py);
@@ -137,7 +138,7 @@ impl Grasps {
         stack(py, self.found.grasps.iter().map(|grasp| grasp.object_from_tcp))
     }
 
-    /// (g, 4, 4) float64 array or None: the same in the camera's frame, where one is known.
+    /// (g, 4, 4) float64 array, optional: the same in the camera's frame, where one is known.
     #[getter]
     fn camera_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let poses = |camera: Pose| {
@@ -170,7 +171,7 @@ impl Grasps {
         self.found.n_candidates
     }
 
-    /// dict of str to int: candidates refused, by the first thing that each failed.
+    /// dict: candidates refused, by the first thing that each failed.
     #[getter]
     fn rejected<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rejected = PyDict::new(py);
@@ -180,7 +181,8 @@ impl Grasps {
         Ok(rejected)
     }
 
-    /// tuple of str, float, str or None: what the nearest miss failed, by how much, and the unit.
+    /// object, optional: what the nearest miss failed, by how much, and the unit (str,
+    /// float, str).
     #[getter]
     fn nearest_miss(&self) -> Option<(&'static str, f64, &'static str)> {
         let miss = self.found.nearest_miss.as_ref()?;
@@ -202,8 +204,8 @@ impl Grasps {
     /// Parameters
     /// ----------
     /// path : path
-    /// format : {"json", "ros2", "isaac"}, optional
-    ///     `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
+    /// format : str, optional
+    ///     ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
     #[pyo3(signature = (path, *, format="json"))]
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<()> {
         match format {
@@ -281,15 +283,15 @@ pub fn _restore_grasps(
 ///     The object.
 /// region : Region
 ///     Where the pads shall close; of the mesh.
-/// gripper : Gripper, str or path
+/// gripper : Gripper or path
 ///     A hand, or what `Gripper` takes.
 /// scale : float
 ///     Metres per unit of the mesh; 1 for a mesh in metres.
 /// camera_from_object : (4, 4) array_like, optional
 ///     Rigid pose of the object, scaled to metres, before a camera. Scene, table and directions
 ///     are then given in the camera's frame, else in the object's in metres.
-/// table : tuple of (3,) array_like and (3,) array_like, optional
-///     A point of a table top and its normal, away from the table.
+/// table : object, optional
+///     A table top as a pair: a point of it, and its normal, away from the table.
 /// scene_meshes : list of mesh_like, optional
 ///     What the hand must not touch, metres.
 /// scene_points : (p, 3) array_like, optional
@@ -306,7 +308,7 @@ pub fn _restore_grasps(
 /// approach : (3,) array_like, optional
 ///     Middle of the allowed directions of approach.
 /// approach_cone : float, optional
-///     Half-angle of the allowed directions around `approach`, radians.
+///     Half-angle of the allowed directions around `approach`, radians; π/4 by default.
 /// demonstrated_approach : (3,) array_like, optional
 ///     The direction in which the demonstrator's hand came; agreement raises the score.
 /// clearance : float, optional
@@ -314,7 +316,7 @@ pub fn _restore_grasps(
 /// pad_in_region : float, optional
 ///     Share of each pad's contact that must lie in the region.
 /// seed : int, optional
-/// progress : bool or callable, optional
+/// progress : progress, optional
 ///
 /// Returns
 /// -------
@@ -332,7 +334,7 @@ pub fn _restore_grasps(
 #[pyfunction]
 #[pyo3(signature = (mesh, region, gripper, *, scale, camera_from_object=None, table=None,
     scene_meshes=None, scene_points=None, scene_margin=0.005, top=20, n_samples=1000, friction=0.5,
-    width_range=None, approach=None, approach_cone=0.785_398_163_397_448_3,
+    width_range=None, approach=None, approach_cone=None,
     demonstrated_approach=None, clearance=0.0, pad_in_region=0.5, seed=0, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn find_grasps(
@@ -351,7 +353,7 @@ pub fn find_grasps(
     friction: f64,
     width_range: Option<(f64, f64)>,
     approach: Option<&Bound<'_, PyAny>>,
-    approach_cone: f64,
+    approach_cone: Option<f64>,
     demonstrated_approach: Option<&Bound<'_, PyAny>>,
     clearance: f64,
     pad_in_region: f64,
@@ -372,7 +374,7 @@ pub fn find_grasps(
     let mut settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
     settings.demonstrated_approach = direction(demonstrated_approach, "demonstrated_approach")?;
     settings.limits.approach = direction(approach, "approach")?
-        .map(|axis| ApproachCone { axis, half_angle: approach_cone });
+        .map(|axis| ApproachCone { axis, half_angle: approach_cone.unwrap_or(FRAC_PI_4) });
     settings.limits.width = width_range.map(|(least, most)| least..=most);
     settings.limits.clearance = clearance;
     settings.limits.pad_in_region = pad_in_region;

@@ -15,9 +15,9 @@ use crate::work::run;
 ///
 /// Parameters
 /// ----------
-/// name_or_path : str or path
+/// name_or_path : path
 ///     ``"franka"``, ``"robotiq-2f85"``, ``"robotiq-2f140"``, or a URDF file.
-/// packages : dict of str to path, optional
+/// packages : dict, optional
 ///     Folders of the packages that a URDF names (``package://NAME/…``).
 ///
 /// Examples
@@ -106,7 +106,7 @@ impl Gripper {
     ///
     /// Returns
     /// -------
-    /// dict of str to float
+    /// dict
     ///     Metres or radians; empty where the joints are not known by name.
     fn joints_at<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyDict>> {
         let joints = PyDict::new(py);
