@@ -3,6 +3,7 @@
 //! Without a driver these tests say that they were skipped; with `SEMFM_DEMAND_GPU=1`, as in CI,
 //! they fail.
 #![cfg(feature = "gpu")]
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "tests that say what they skipped")]
 
 mod shapes;
 
