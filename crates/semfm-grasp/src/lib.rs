@@ -22,6 +22,7 @@ pub mod gripper;
 pub mod hand;
 pub mod object;
 mod obstacle;
+mod pose_grid;
 pub mod rejection;
 pub mod scene;
 mod score;

@@ -1,8 +1,10 @@
 //! The search behind [`find_grasps`](crate::find_grasps): each candidate through every stage, then
 //! the neighbours of what survived.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use parry3d_f64::math::Pose;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -145,10 +147,15 @@ impl<'a> Search<'a> {
                 .collect::<std::result::Result<_, _>>()?;
             results.into_iter().for_each(|result| part.settle(result));
             n_survivors += part.grasps.len();
-            let before = kept.clone();
+            let bits = |grasp: &Grasp| {
+                let Pose { translation, rotation } = grasp.object_from_tcp;
+                (translation.to_array().map(f64::to_bits), rotation.to_array().map(f64::to_bits))
+            };
+            let before: HashSet<_> = kept.iter().map(bits).collect();
             kept.append(&mut part.grasps);
             kept = suppress(kept, separation);
-            frontier = kept.iter().filter(|grasp| !before.contains(grasp)).cloned().collect();
+            frontier =
+                kept.iter().filter(|grasp| !before.contains(&bits(grasp))).cloned().collect();
             sampled.absorb(part);
         }
         Ok(Found { kept, n_survivors, sampled })

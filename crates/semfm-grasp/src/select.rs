@@ -4,6 +4,7 @@ use parry3d_f64::math::Pose;
 use semfm_geom::math::DQuat;
 
 use crate::grasp::Grasp;
+use crate::pose_grid::PoseGrid;
 use crate::settings::Separation;
 
 /// Half a turn about the approach: a gripper with two equal fingers is the same hand.
@@ -21,19 +22,15 @@ pub fn hand_distance(a: &Pose, b: &Pose) -> (f64, f64) {
 /// best first, ties in the given order.
 pub(crate) fn suppress(mut grasps: Vec<Grasp>, separation: Separation) -> Vec<Grasp> {
     grasps.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut kept: Vec<Grasp> = Vec::new();
-    for grasp in grasps {
-        let same = |other: &Grasp| {
-            let (a, b) = (&other.object_from_tcp, &grasp.object_from_tcp);
-            // Most are elsewhere: the angle is only for those nearby.
-            a.translation.distance_squared(b.translation) < separation.translation.powi(2)
-                && hand_distance(a, b).1 < separation.rotation
-        };
-        if !kept.iter().any(same) {
-            kept.push(grasp);
+    let mut grid = PoseGrid::new(separation);
+    grasps.retain(|grasp| {
+        let apart = !grid.has_near(&grasp.object_from_tcp);
+        if apart {
+            grid.insert(&grasp.object_from_tcp);
         }
-    }
-    kept
+        apart
+    });
+    grasps
 }
 
 /// `top` of the grasps (best first): the best, then each time the one whose score and distance to

@@ -5,7 +5,7 @@ use semfm_geom::math::{DQuat, DVec3};
 
 use crate::candidate::Candidate;
 use crate::grasp::Grasp;
-use crate::select::hand_distance;
+use crate::pose_grid::PoseGrid;
 use crate::settings::Separation;
 
 /// Neighbours are this much farther away than two grasps must be, so that rounding does not merge
@@ -32,17 +32,15 @@ pub(crate) fn neighbours(
             ]
         })
         .collect();
-    let mut proposed: Vec<Candidate> = Vec::new();
+    let mut grid = PoseGrid::new(separation);
+    kept.iter().for_each(|grasp| grid.insert(&grasp.object_from_tcp));
+    let mut proposed = Vec::new();
     for grasp in frontier {
         let seed = [-grasp.width / 2.0, grasp.width / 2.0];
         for motion in &moves {
             let tcp = grasp.object_from_tcp * *motion;
-            let taken = |other: &Pose| {
-                other.translation.distance_squared(tcp.translation) < separation.translation.powi(2)
-                    && hand_distance(other, &tcp).1 < separation.rotation
-            };
-            let known = kept.iter().any(|g| taken(&g.object_from_tcp));
-            if !known && !proposed.iter().any(|candidate| taken(&candidate.tcp)) {
+            if !grid.has_near(&tcp) {
+                grid.insert(&tcp);
                 proposed.push(Candidate { tcp, seed });
             }
         }
@@ -58,6 +56,7 @@ fn turned(angle: f64, axis: DVec3) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::select::hand_distance;
 
     #[test]
     fn neighbours_keep_their_distance_from_all() {
