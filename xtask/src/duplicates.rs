@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
 use crate::process::cargo;
 use crate::workspace::Workspace;
@@ -14,33 +14,31 @@ use crate::workspace::Workspace;
 /// The same ones as in `deny.toml`.
 const SINGLE: [&str; 6] = ["faer", "glam", "glamx", "nalgebra", "parry3d", "parry3d-f64"];
 
-/// `cargo deny check`, or our own look at `Cargo.lock`.
+/// `cargo deny check`, or our own look at what cargo builds. Not at `Cargo.lock`: that also lists
+/// crates behind features of our dependencies that nobody turned on.
 pub fn check(workspace: &Workspace) -> Result<()> {
     if cargo(workspace, &["deny", "--version"]).works() {
         return cargo(workspace, &["deny", "check", "bans", "licenses", "sources"]).succeed();
     }
     println!("no cargo-deny here: checking duplicate versions only, not licences and sources");
-    let lock = std::fs::read_to_string(workspace.root.join("Cargo.lock")).context("Cargo.lock")?;
-    let doubled = doubled(&lock);
+    let tree = ["tree", "--workspace", "--target", "all", "--prefix", "none", "--format", "{p}"];
+    let doubled = doubled(&cargo(workspace, &tree).output()?);
     ensure!(doubled.is_empty(), "more than one version of {}", doubled.join(", "));
     println!("at most one version each of {}", SINGLE.join(", "));
     Ok(())
 }
 
-/// Those of [`SINGLE`] that the lock file holds in several versions.
-fn doubled(lock: &str) -> Vec<String> {
-    let value = |line: &str, key: &str| -> Option<String> {
-        Some(line.strip_prefix(key)?.strip_prefix(" = \"")?.strip_suffix('"')?.to_owned())
-    };
-    let packages: BTreeSet<(String, String)> = lock
-        .split("[[package]]")
-        .filter_map(|package| {
-            let find = |key| package.lines().find_map(|line| value(line, key));
-            Some((find("name")?, find("version")?))
+/// Those of [`SINGLE`] that a listing (`name vVERSION` a line) holds in several versions.
+fn doubled(tree: &str) -> Vec<String> {
+    let packages: BTreeSet<(&str, &str)> = tree
+        .lines()
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            Some((words.next()?, words.next()?.strip_prefix('v')?))
         })
         .collect();
     let versions = |name: &str| -> Vec<&str> {
-        packages.iter().filter(|(of, _)| of == name).map(|(_, version)| version.as_str()).collect()
+        packages.iter().filter(|(of, _)| *of == name).map(|(_, version)| *version).collect()
     };
     SINGLE
         .iter()
@@ -57,13 +55,8 @@ mod tests {
 
     #[test]
     fn two_versions_are_found() {
-        let package = |name: &str, version: &str| {
-            format!("[[package]]\nname = \"{name}\"\nversion = \"{version}\"\n\n")
-        };
-        let packages =
-            [("glam", "0.33.12"), ("syn", "1.0.0"), ("glam", "0.34.2"), ("syn", "2.0.0")];
-        let lock: String = packages.iter().map(|(name, version)| package(name, version)).collect();
-        assert_eq!(doubled(&lock), ["glam (0.33.12, 0.34.2)"]);
+        let tree = "glam v0.33.12\nsyn v1.0.0\nglam v0.34.2 (*)\nsyn v2.0.0\n\nglam v0.33.12\n";
+        assert_eq!(doubled(tree), ["glam (0.33.12, 0.34.2)"]);
     }
 
     #[test]
