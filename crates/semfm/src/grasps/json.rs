@@ -73,13 +73,17 @@ fn grasp_json(answer: &GraspAnswer<'_>, grasp: &Grasp) -> Value {
     let (position, rotation) = position_and_rotation(pose);
     let terms: Map<String, Value> =
         grasp.terms.iter().map(|&(name, value)| (name.to_owned(), json!(value))).collect();
+    // The robot holds the flange still while the fingers close; a linkage carries the pads along z,
+    // so the open hand has its own TCP, seen here from that of the closed one.
+    let flange_from_tcp = |width: f64| answer.gripper.flange_from_tcp_at(width);
     let hand = |width: f64| -> Vec<Value> {
+        let shift = flange_from_tcp(grasp.width).inverse() * flange_from_tcp(width);
         let parts = answer.gripper.parts_at(width).into_iter();
-        parts.map(|(tcp_from_part, _)| json!(rows(tcp_from_part))).collect()
+        parts.map(|(tcp_from_part, _)| json!(rows(shift * tcp_from_part))).collect()
     };
     json!({
         "object_from_tcp": rows(grasp.object_from_tcp),
-        "flange_from_tcp": rows(answer.gripper.flange_from_tcp_at(grasp.width)),
+        "flange_from_tcp": rows(flange_from_tcp(grasp.width)),
         "camera_from_tcp": answer.camera_from_object.map(|_| rows(pose)),
         "frame": frame,
         "position": position.to_array(),
