@@ -192,6 +192,8 @@ impl Camera {
 ///     Largest zoom beyond the fit of the bounding sphere.
 /// principal_frame : bool, default True
 ///     Pose the cameras in the object's principal frame, else in the file's with z up.
+/// close_ups : int, default 0
+///     Close-ups beside each view, along the silhouette's longer side.
 ///
 /// Returns
 /// -------
@@ -199,11 +201,12 @@ impl Camera {
 #[pyfunction]
 #[pyo3(signature = (
     mesh, *, count=14, size=224, field_of_view=std::f64::consts::FRAC_PI_6, fill=0.8, max_zoom=1.5,
-    principal_frame=true
+    principal_frame=true, close_ups=0
 ))]
 #[pyo3(
-    text_signature = "(mesh, *, count=14, size=224, field_of_view=0.5235987755982988, fill=0.8, max_zoom=1.5, principal_frame=True)"
+    text_signature = "(mesh, *, count=14, size=224, field_of_view=0.5235987755982988, fill=0.8, max_zoom=1.5, principal_frame=True, close_ups=0)"
 )]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn rig(
     mesh: &Bound<'_, PyAny>,
     count: usize,
@@ -212,8 +215,10 @@ pub fn rig(
     fill: f64,
     max_zoom: f64,
     principal_frame: bool,
+    close_ups: usize,
 ) -> PyResult<Vec<Camera>> {
-    let settings = RigSettings { count, size, field_of_view, fill, max_zoom, principal_frame };
+    let settings =
+        RigSettings { count, size, field_of_view, fill, max_zoom, principal_frame, close_ups };
     let held = from_any(mesh, "mesh")?;
     let cameras = run(mesh.py(), None, move |_| Ok(views::rig(&held, &settings)?))?;
     Ok(cameras.into_iter().map(|camera| Camera { camera }).collect())

@@ -100,6 +100,7 @@ pub fn _restore_view(
 /// Colours to render with, owned.
 enum Colors {
     Grey,
+    Normals,
     Vertices(Vec<[f32; 3]>),
     File(Held<semfm::geom::io::MeshFile>),
 }
@@ -118,6 +119,12 @@ enum Colors {
 ///     Colour samples along each side of a pixel, 1 to 8.
 /// background : (3,) array_like, optional
 ///     sRGB, 0 to 1; white where none is given.
+/// occlusion : float, default 0.0
+///     How much what is closed in is darkened, 0 to 1.
+/// edges : float, default 0.0
+///     How dark silhouettes and creases are drawn, 0 to 1.
+/// normals : bool, default False
+///     Draw the surface's directions as colours, instead of light.
 /// progress : progress, optional
 ///
 /// Returns
@@ -132,13 +139,17 @@ enum Colors {
 /// >>> len(views), views[0].rgb.shape
 /// (3, (64, 64, 3))
 #[pyfunction]
-#[pyo3(signature = (mesh, cameras=None, *, colors=None, supersampling=2, background=None, progress=None))]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
+#[pyo3(signature = (mesh, cameras=None, *, colors=None, supersampling=2, background=None, occlusion=0.0, edges=0.0, normals=false, progress=None))]
 pub fn render(
     mesh: &Bound<'_, PyAny>,
     cameras: Option<&Bound<'_, PyAny>>,
     colors: Option<&Bound<'_, PyAny>>,
     supersampling: u32,
     background: Option<&Bound<'_, PyAny>>,
+    occlusion: f64,
+    edges: f64,
+    normals: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<View>> {
     let (held, mut paint) = match mesh.cast::<MeshFile>() {
@@ -154,7 +165,10 @@ pub fn render(
         let values = arrays::floats32(colors, "colors", &rows)?.0;
         paint = Colors::Vertices(values.as_chunks::<3>().0.to_vec());
     }
-    let mut settings = RenderSettings { supersampling, ..Default::default() };
+    if normals {
+        paint = Colors::Normals;
+    }
+    let mut settings = RenderSettings { supersampling, occlusion, edges, ..Default::default() };
     if let Some(background) = background {
         settings.background = arrays::point(background, "background")?.as_vec3().to_array();
     }
@@ -167,6 +181,7 @@ pub fn render(
         let draw = |paint: &Paint<'_>| views::render(&held, paint, &cameras, &settings, task);
         Ok(match &paint {
             Colors::Grey => draw(&Paint::default()),
+            Colors::Normals => draw(&Paint::Normals),
             Colors::Vertices(colors) => draw(&Paint::Vertices(colors)),
             Colors::File(file) => draw(&Paint::Surface(&|face, weights| {
                 let [r, g, b, _] = file.appearance.color_at(face, held.faces()[face], weights);

@@ -1,5 +1,7 @@
 //! The rig: cameras all around an object, posed in the object's own frame.
 
+use std::fmt;
+
 use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 
@@ -30,7 +32,17 @@ pub struct RigSettings {
     pub max_zoom: f64,
     /// Pose the cameras in the object's principal frame (else in the file's, with z up).
     pub principal_frame: bool,
+    /// Close-ups beside each view, spread along the silhouette's longer side: each frames
+    /// [`CLOSE_UP`] of what the view frames, so that thin objects and small handles fill more
+    /// patches.
+    pub close_ups: usize,
 }
+
+/// Share of the whole view's framed square that a close-up frames.
+pub const CLOSE_UP: f64 = 0.55;
+
+/// Close-ups of one view; more would only repeat each other.
+const MAX_CLOSE_UPS: usize = 8;
 
 impl Default for RigSettings {
     fn default() -> Self {
@@ -41,7 +53,19 @@ impl Default for RigSettings {
             fill: 0.8,
             max_zoom: 1.5,
             principal_frame: true,
+            close_ups: 0,
         }
+    }
+}
+
+impl fmt::Display for RigSettings {
+    /// In one line, for the metadata of files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count, close_ups, field_of_view, fill, max_zoom, .. } = self;
+        let frame = if self.principal_frame { "principal frame" } else { "z up" };
+        let degrees = field_of_view.to_degrees();
+        write!(f, "fibonacci {count}, {frame}, {degrees:.1}°, fill {fill}, zoom {max_zoom}")?;
+        if *close_ups > 0 { write!(f, ", {close_ups} close-ups") } else { Ok(()) }
     }
 }
 
@@ -72,6 +96,9 @@ impl RigSettings {
             "more than 0 and less than 3 rad",
             fov.to_string(),
         )?;
+        let close_ups = self.close_ups;
+        let most = format!("at most {MAX_CLOSE_UPS}");
+        allow(close_ups <= MAX_CLOSE_UPS, "close-ups", &most, close_ups.to_string())?;
         let fill = self.fill;
         allow(fill > 0.0 && fill <= 1.0, "fill", "more than 0 and at most 1", fill.to_string())?;
         let zoom = self.max_zoom;
@@ -85,7 +112,8 @@ impl RigSettings {
 }
 
 /// Cameras at Fibonacci-sphere directions around the object, each zoomed and centred on the
-/// silhouette's bounding rectangle by its focal length and principal point.
+/// silhouette's bounding rectangle by its focal length and principal point. The close-ups of a view
+/// follow it.
 ///
 /// ```
 /// use semfm_geom::{Mesh, math::DVec3};
@@ -104,9 +132,13 @@ pub fn rig(mesh: &Mesh, settings: &RigSettings) -> Result<Vec<Camera>> {
     let frame = principal_frame(mesh)?;
     let frame = if settings.principal_frame { frame } else { DMat3::IDENTITY };
     let object = Extent::new(mesh, frame);
-    fibonacci_directions(settings.count)
-        .map(|direction| object.camera(direction, settings))
-        .collect()
+    let mut cameras = Vec::with_capacity(settings.count * (1 + settings.close_ups));
+    for direction in fibonacci_directions(settings.count) {
+        let whole = object.camera(direction, settings)?;
+        cameras.push(whole);
+        cameras.extend(object.close_ups(&whole, settings));
+    }
+    Ok(cameras)
 }
 
 /// One camera that looks along `-direction` at the whole object with `up` upwards in the image
@@ -181,12 +213,7 @@ impl Extent {
         let translation = DVec3::Z * distance - rotation * self.centre;
         let camera_from_object = DAffine3::from_mat3_translation(rotation, translation);
 
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &p in &self.vertices {
-            let p = camera_from_object.transform_point3(p);
-            let slope = p / p.z; // (x/z, y/z, 1)
-            (low, high) = (low.min(slope), high.max(slope));
-        }
+        let (low, high) = self.silhouette(camera_from_object);
         let half = ((high - low) / 2.0).truncate().max_element();
         let half_of_sphere = self.radius / distance;
         let side = f64::from(settings.size);
@@ -203,6 +230,39 @@ impl Extent {
         };
         camera.check("fitted camera")?;
         Ok(camera)
+    }
+
+    /// Bounding rectangle of the silhouette as slopes x/z, y/z (third component 1).
+    fn silhouette(&self, camera_from_object: DAffine3) -> (DVec3, DVec3) {
+        self.vertices
+            .iter()
+            .map(|&p| {
+                let p = camera_from_object.transform_point3(p);
+                p / p.z
+            })
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), slope| {
+                (low.min(slope), high.max(slope))
+            })
+    }
+
+    /// Cameras at the place of `whole` that frame [`CLOSE_UP`] of it each, from one end of the
+    /// silhouette's longer side to the other.
+    fn close_ups(&self, whole: &Camera, settings: &RigSettings) -> Vec<Camera> {
+        let (low, high) = self.silhouette(whole.camera_from_object);
+        let (middle, extent) = ((low + high) / 2.0, high - low);
+        let axis = usize::from(extent.y > extent.x);
+        let (side, focal) = (f64::from(settings.size), whole.fx / CLOSE_UP);
+        // At either end the silhouette keeps the margin that it has in the whole view.
+        let travel = ((extent[axis] - settings.fill * side / focal) / 2.0).max(0.0);
+        let close_up = |k: usize| {
+            let last = settings.close_ups as f64 - 1.0;
+            let along = if last > 0.0 { 2.0 * k as f64 / last - 1.0 } else { 0.0 };
+            let mut centre = middle;
+            centre[axis] += along * travel;
+            let [cx, cy] = [centre.x, centre.y].map(|slope| side / 2.0 - focal * slope);
+            Camera { fx: focal, fy: focal, cx, cy, ..*whole }
+        };
+        (0..settings.close_ups).map(close_up).collect()
     }
 }
 
@@ -242,6 +302,37 @@ mod tests {
         }
         assert!(fills.iter().all(|&fill| fill <= 0.8 + 1e-9), "{fills:?}");
         assert!(fills.iter().filter(|&&fill| fill > 0.8 - 1e-9).count() >= 8, "{fills:?}");
+    }
+
+    #[test]
+    fn close_ups_show_the_whole_length_in_turns_and_larger() {
+        let mesh = knife();
+        let settings = RigSettings { close_ups: 2, ..Default::default() };
+        let cameras = rig(&mesh, &settings).unwrap();
+        assert_eq!(cameras.len(), 3 * 14);
+        for shots in cameras.chunks(3) {
+            let (whole, ends) = (&shots[0], &shots[1..]);
+            let (low, high) = extents(&mesh, whole);
+            let along = usize::from((high - low).y > (high - low).x);
+            let mut seen = [f64::INFINITY, f64::NEG_INFINITY];
+            for camera in ends {
+                assert!((camera.fx * CLOSE_UP / whole.fx - 1.0).abs() < 1e-12);
+                assert_eq!(camera.camera_from_object, whole.camera_from_object);
+                for &p in mesh.vertices() {
+                    let (u, v, _) = camera.project(p);
+                    let place = [u, v][along];
+                    if (0.0..=224.0).contains(&place) {
+                        let (u, v, _) = whole.project(p);
+                        let place = [u, v][along];
+                        seen = [seen[0].min(place), seen[1].max(place)];
+                    }
+                }
+            }
+            // Both ends of the silhouette, the one in one close-up and the other in the other.
+            assert!((seen[0] - low[along]).abs() + (seen[1] - high[along]).abs() < 1e-6);
+        }
+        let too_many = RigSettings { close_ups: 9, ..Default::default() };
+        assert!(rig(&mesh, &too_many).unwrap_err().to_string().contains("close-ups"));
     }
 
     #[test]

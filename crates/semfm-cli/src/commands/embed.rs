@@ -8,11 +8,11 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, write_atomically};
+use semfm::views::Renderer;
 use semfm::views::mcap::EmbeddingsFile;
-use semfm::views::{Renderer, RigSettings};
 use serde::{Deserialize, Serialize};
 
-use super::views::make_views;
+use super::views::{Coloring, ViewSettings, make_views};
 use crate::options::Common;
 use crate::{load, talk};
 
@@ -68,7 +68,7 @@ impl Encoder {
         let scratch = tempfile::tempdir().context("a folder for the views")?;
         let views = scratch.path().join("object.views.mcap");
         // By the CPU on every machine: what is kept must not depend on the driver that was there.
-        make_views(file, colored, &RigSettings::default(), &Renderer::cpu(), &views, common)?;
+        make_views(file, &shown(colored), &Renderer::cpu(), &views, common)?;
         let views_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
         self.run(&views, &path, common)?;
@@ -110,7 +110,7 @@ impl Encoder {
     fn key(&self, file: &MeshFile, colored: bool) -> String {
         let mut words =
             vec![file.mesh.hash().to_string(), self.model.clone(), self.rolls.to_string()];
-        words.push(format!("{:?}", RigSettings::default()));
+        words.push(format!("{:?}", shown(colored)));
         if colored {
             words.push(format!("{:?}", file.appearance));
         }
@@ -120,6 +120,12 @@ impl Encoder {
         }
         blake3::hash(words.join("\n").as_bytes()).to_hex().to_string()
     }
+}
+
+/// How an encoder is shown an object, in its own colours or in grey.
+fn shown(colored: bool) -> ViewSettings {
+    let coloring = if colored { Coloring::Own } else { Coloring::Grey };
+    ViewSettings { coloring, ..Default::default() }
 }
 
 /// Says which encoder made the embeddings that are used.

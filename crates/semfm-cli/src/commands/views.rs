@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
-use clap::Args;
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
 use semfm::geom::io::MeshFile;
 use semfm::picture::write_sheet;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
-use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings, View, rig};
+use semfm::views::{Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View, rig};
 
 use super::Outcome;
 use crate::options::Common;
@@ -25,6 +25,8 @@ pub struct Views {
     output: PathBuf,
     #[command(flatten)]
     rig: RigOptions,
+    #[command(flatten)]
+    look: LookOptions,
     /// Who draws: auto takes a graphics processor where one answers, gpu any graphics driver or
     /// nothing, cpu needs neither
     #[arg(long, default_value_t = RendererChoice::Auto, value_name = "auto|gpu|cpu", help_heading = "Rendering")]
@@ -40,21 +42,111 @@ pub struct Views {
     grey: bool,
 }
 
-/// Where the cameras stand.
+/// Where the cameras stand and what they frame.
 #[derive(Clone, Debug, Args)]
-pub struct RigOptions {
+#[command(next_help_heading = "Cameras")]
+struct RigOptions {
     /// Number of views
-    #[arg(long, default_value_t = RigSettings::default().count, value_name = "N", help_heading = "Rendering")]
-    pub count: usize,
+    #[arg(long, default_value_t = RigSettings::default().count, value_name = "N")]
+    count: usize,
     /// Side of the square images in pixels
-    #[arg(long, default_value_t = RigSettings::default().size, value_name = "PIXELS", help_heading = "Rendering")]
-    pub size: u32,
+    #[arg(long, default_value_t = RigSettings::default().size, value_name = "PIXELS")]
+    size: u32,
+    /// Close-ups beside each view, along the silhouette's longer side
+    #[arg(long, default_value_t = RigSettings::default().close_ups, value_name = "N")]
+    close_ups: usize,
+    /// Angle of view, in degrees
+    #[arg(long, default_value_t = RigSettings::default().field_of_view.to_degrees().round(), value_name = "DEGREES")]
+    fov: f64,
+    /// Share of the image's side that the silhouette fills
+    #[arg(long, default_value_t = RigSettings::default().fill, value_name = "SHARE")]
+    fill: f64,
+    /// Largest zoom beyond the fit of the bounding sphere
+    #[arg(long, default_value_t = RigSettings::default().max_zoom, value_name = "FACTOR")]
+    max_zoom: f64,
+    /// What is upright: the object's principal axis, or z of the file
+    #[arg(long, value_enum, default_value_t = Upright::Principal)]
+    upright: Upright,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Upright {
+    Principal,
+    Z,
 }
 
 impl RigOptions {
-    pub fn settings(&self) -> RigSettings {
-        RigSettings { count: self.count, size: self.size, ..Default::default() }
+    fn settings(&self) -> RigSettings {
+        RigSettings {
+            count: self.count,
+            size: self.size,
+            field_of_view: self.fov.to_radians(),
+            fill: self.fill,
+            max_zoom: self.max_zoom,
+            principal_frame: self.upright == Upright::Principal,
+            close_ups: self.close_ups,
+        }
     }
+}
+
+/// How the surface looks.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Look")]
+struct LookOptions {
+    /// Darken what is closed in (ambient occlusion), 0 to 1
+    #[arg(long, default_value_t = RenderSettings::default().occlusion, value_name = "STRENGTH")]
+    occlusion: f64,
+    /// Draw silhouettes and creases, 0 to 1
+    #[arg(long, default_value_t = RenderSettings::default().edges, value_name = "STRENGTH")]
+    edges: f64,
+    /// Brightness of a surface that the light grazes, 0 to 1
+    #[arg(long, default_value_t = RenderSettings::default().ambient, value_name = "SHARE")]
+    ambient: f64,
+    /// Colour behind the object: R,G,B from 0 to 1, or one number for a grey
+    #[arg(long, default_value = "1", value_delimiter = ',', value_name = "R,G,B")]
+    background: Vec<f32>,
+    /// Draw the surface's directions as colours, instead of light
+    #[arg(long, conflicts_with_all = ["grey", "texture"])]
+    normals: bool,
+}
+
+impl LookOptions {
+    fn settings(&self) -> Result<RenderSettings> {
+        let background = match self.background[..] {
+            [grey] => [grey; 3],
+            [r, g, b] => [r, g, b],
+            _ => {
+                bail!("--background: expected one number or three, found {}", self.background.len())
+            }
+        };
+        Ok(RenderSettings {
+            occlusion: self.occlusion,
+            edges: self.edges,
+            ambient: self.ambient,
+            background,
+            ..Default::default()
+        })
+    }
+}
+
+/// How an object is shown.
+#[derive(Clone, Debug, Default)]
+pub struct ViewSettings {
+    pub rig: RigSettings,
+    pub render: RenderSettings,
+    pub coloring: Coloring,
+}
+
+/// What gives the surface its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coloring {
+    /// Everything in the same grey.
+    #[default]
+    Grey,
+    /// The object's own colours, where it has some.
+    Own,
+    /// The surface's directions.
+    Normals,
 }
 
 impl Views {
@@ -70,8 +162,16 @@ impl Views {
         if let Some(note) = renderer.note().filter(|_| !common.quiet) {
             talk::remark(format_args!("note: {note}"));
         }
-        let settings = self.rig.settings();
-        let views = make_views(&file, !self.grey, &settings, &renderer, &self.output, common)
+        let settings = ViewSettings {
+            rig: self.rig.settings(),
+            render: self.look.settings()?,
+            coloring: match (self.look.normals, self.grey) {
+                (true, _) => Coloring::Normals,
+                (false, true) => Coloring::Grey,
+                (false, false) => Coloring::Own,
+            },
+        };
+        let views = make_views(&file, &settings, &renderer, &self.output, common)
             .with_context(|| self.mesh.display().to_string())?;
         talk::say(self.output.display());
         if let Some(sheet) = &self.sheet {
@@ -86,34 +186,41 @@ impl Views {
 /// Renders an object, writes its views file and hands the views back.
 pub fn make_views(
     file: &MeshFile,
-    colored: bool,
-    settings: &RigSettings,
+    settings: &ViewSettings,
     renderer: &Renderer,
     output: &Path,
     common: &Common,
 ) -> Result<Vec<View>> {
+    let ViewSettings { rig: cameras, render: look, coloring } = settings;
     let task = talk::watched(common.quiet);
-    let cameras = rig(&file.mesh, settings)?;
-    let appearance = Some(&file.appearance).filter(|appearance| colored && !appearance.is_plain());
-    let views = load::with_paint(&file.mesh, appearance, |paint| {
-        renderer.render(&file.mesh, paint, &cameras, &RenderSettings::default(), &task)
+    let shots = rig(&file.mesh, cameras)?;
+    let own = Some(&file.appearance).filter(|own| *coloring == Coloring::Own && !own.is_plain());
+    let views = load::with_paint(&file.mesh, own, |paint| {
+        let paint = if *coloring == Coloring::Normals { &Paint::Normals } else { paint };
+        renderer.render(&file.mesh, paint, &shots, look, &task)
     })?;
+    let colors = match (coloring, own) {
+        (Coloring::Normals, _) => "normals",
+        (_, Some(_)) => "own",
+        (_, None) => "grey",
+    };
     let metadata = ViewsMetadata {
         mesh: MeshIdentity::of(&file.mesh),
-        width: settings.size,
-        height: settings.size,
-        rig: format!("fibonacci {}, principal frame", settings.count),
-        background: "white".into(),
+        width: cameras.size,
+        height: cameras.size,
+        rig: cameras.to_string(),
+        background: look.background.map(|c| c.to_string()).join(","),
         seed: 0,
         more: [
-            ("colors".to_owned(), if appearance.is_some() { "own" } else { "grey" }.to_owned()),
+            ("colors".to_owned(), colors.to_owned()),
+            ("look".to_owned(), look.to_string()),
             ("renderer".to_owned(), renderer.name()),
         ]
         .into(),
     };
-    let colors: Option<Vec<[u8; 3]>> = appearance
-        .and_then(|appearance| appearance.vertex_colors.as_ref())
+    let vertex_colors: Option<Vec<[u8; 3]>> = own
+        .and_then(|own| own.vertex_colors.as_ref())
         .map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect());
-    write_views(output, &views, &file.mesh, colors.as_deref(), &metadata)?;
+    write_views(output, &views, &file.mesh, vertex_colors.as_deref(), &metadata)?;
     Ok(views)
 }

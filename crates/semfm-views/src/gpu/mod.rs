@@ -16,7 +16,7 @@ mod targets;
 use semfm_geom::math::{DAffine3, DMat4, DVec4};
 use semfm_geom::{Mesh, Task};
 
-use crate::render::{CornerNormals, Request, light_direction, shade_hits};
+use crate::render::{Request, light_direction};
 use crate::{Camera, Error, Paint, RenderSettings, Result, View};
 use device::Device;
 use pipelines::{CameraBlock, Corner, Pipelines, buffer};
@@ -65,8 +65,8 @@ impl GpuRenderer {
 
     /// One picture per camera, as [`render`](crate::render()) makes them.
     ///
-    /// Paint that is a function of the place ([`Paint::Surface`]) is asked on the CPU for what the
-    /// driver found to be visible.
+    /// Paint that is a function of the place ([`Paint::Surface`], [`Paint::Normals`]) is asked on the
+    /// CPU for what the driver found to be visible.
     ///
     /// # Errors
     /// As [`render`](crate::render()); [`Error::BeyondGpu`] for images or meshes beyond the driver's
@@ -79,12 +79,13 @@ impl GpuRenderer {
         settings: &RenderSettings,
         task: &Task,
     ) -> Result<Vec<View>> {
-        let request = Request::check(mesh, paint, cameras, settings)?;
+        let request = Request::new(mesh, paint, cameras, settings)?;
         let scene = Scene::new(&self.device, &request)?;
         let mut views = Vec::with_capacity(cameras.len());
         task.step("render", 0, cameras.len())?;
         for alike in cameras.chunk_by(|a, b| (a.width, a.height) == (b.width, b.height)) {
-            self.render_alike(&request, &scene, alike, &mut |view| {
+            self.render_alike(&request, &scene, alike, &mut |mut view| {
+                request.finish(&mut view);
                 views.push(view);
                 Ok(task.step("render", views.len(), cameras.len())?)
             })?;
@@ -102,7 +103,7 @@ impl GpuRenderer {
     ) -> Result<()> {
         let Some(first) = cameras.first() else { return Ok(()) };
         let (size, per_pixel) = ([first.width, first.height], request.settings.supersampling);
-        if matches!(request.paint, Paint::Surface(_)) {
+        if matches!(request.paint, Paint::Surface(_) | Paint::Normals) {
             return self.shade_on_cpu(request, scene, cameras, done);
         }
         let targets = Targets::new(&self.device, size, per_pixel)?;
@@ -127,7 +128,6 @@ impl GpuRenderer {
         cameras: &[Camera],
         done: &mut dyn FnMut(View) -> Result<()>,
     ) -> Result<()> {
-        let normals = CornerNormals::new(request.mesh, request.settings.crease);
         for &camera in cameras {
             let [centres, samples] = [1, request.settings.supersampling].map(|per_pixel| {
                 let fine = finer(&camera, per_pixel);
@@ -141,7 +141,7 @@ impl GpuRenderer {
                 continue;
             };
             view.camera = camera;
-            view.rgb = shade_hits(request, &normals, &camera, &samples.triangles, &samples.depth);
+            view.rgb = request.shade_hits(&camera, &samples.triangles, &samples.depth);
             done(view)?;
         }
         Ok(())
@@ -313,11 +313,10 @@ impl Scene {
                 found: mesh.n_faces().to_string(),
             });
         }
-        let normals = CornerNormals::new(mesh, request.settings.crease);
         let corners: Vec<Corner> = mesh
             .faces()
             .iter()
-            .zip(normals.corners())
+            .zip(request.normals.corners())
             .flat_map(|(ids, normals)| {
                 [0, 1, 2].map(|corner| {
                     let id = ids[corner] as usize;
@@ -325,8 +324,9 @@ impl Scene {
                     let color = match request.paint {
                         Paint::Plain(color) => *color,
                         Paint::Vertices(colors) => colors[id],
-                        Paint::Surface(_) => [0.0; 3],
+                        Paint::Surface(_) | Paint::Normals => [0.0; 3],
                     };
+                    let color = color.map(|c| c * request.light_at(id));
                     Corner { position, normal: normals[corner], color }
                 })
             })

@@ -1,14 +1,18 @@
 //! The renderer: a mesh and cameras in, pictures with depth and triangle ids out.
 //!
 //! `triangle` turns a triangle into linear forms over the image, `raster` fills a z-buffer with
-//! them, `shade` gives its samples colours, `probe` asks for the depth at single positions.
+//! them, `shade` gives its samples colours, `probe` asks for the depth at single positions,
+//! `occlusion` darkens what little light reaches, `edges` draws outlines.
 //! Everything is computed on the CPU, the same at every thread count.
 
+mod edges;
+mod occlusion;
 pub(crate) mod probe;
 pub(crate) mod raster;
 mod shade;
 pub(crate) mod triangle;
 
+use std::fmt;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,6 +24,7 @@ pub(crate) use shade::light_direction;
 pub use shade::{CornerNormals, Paint};
 
 use crate::{Camera, Error, Result, View};
+pub use occlusion::openness;
 use raster::Raster;
 use triangle::Projection;
 
@@ -42,6 +47,10 @@ pub struct RenderSettings {
     pub ambient: f64,
     /// Vertex normals are used up to this angle from the triangle's own, in radians.
     pub crease: f64,
+    /// How much what is closed in is darkened, from 0 (not at all) to 1 (by its [`openness`]).
+    pub occlusion: f64,
+    /// How dark silhouettes and creases are drawn, from 0 (not at all) to 1 (black).
+    pub edges: f64,
 }
 
 impl Default for RenderSettings {
@@ -52,7 +61,18 @@ impl Default for RenderSettings {
             light: [0.25, 0.35, 0.9],
             ambient: 0.35,
             crease: 40f64.to_radians(),
+            occlusion: 0.0,
+            edges: 0.0,
         }
+    }
+}
+
+impl fmt::Display for RenderSettings {
+    /// In one line, for the metadata of files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { supersampling, light: [x, y, z], ambient, occlusion, edges, .. } = self;
+        write!(f, "{supersampling}² samples, light {x} {y} {z}, ambient {ambient}, ")?;
+        write!(f, "occlusion {occlusion}, edges {edges}")
     }
 }
 
@@ -71,6 +91,11 @@ impl RenderSettings {
                 "finite numbers and a light of some length",
                 found,
             ));
+        }
+        for (name, strength) in [("occlusion", self.occlusion), ("edges", self.edges)] {
+            if !(0.0..=1.0).contains(&strength) {
+                return Err(Error::invalid(name, "0 to 1", strength.to_string()));
+            }
         }
         Ok(())
     }
@@ -103,33 +128,34 @@ pub fn render(
     settings: &RenderSettings,
     task: &Task,
 ) -> Result<Vec<View>> {
-    Request::check(mesh, paint, cameras, settings)?;
-    let normals = CornerNormals::new(mesh, settings.crease);
+    let request = Request::new(mesh, paint, cameras, settings)?;
     let done = AtomicUsize::new(0);
     task.step("render", 0, cameras.len())?;
     cameras
         .par_iter()
         .map(|camera| {
             task.check()?;
-            let view = render_one(mesh, &normals, paint, camera, settings);
+            let view = render_one(&request, camera);
             task.step("render", done.fetch_add(1, Ordering::Relaxed) + 1, cameras.len())?;
             Ok(view)
         })
         .collect()
 }
 
-/// What is to be drawn, checked.
-#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only the check is used"))]
+/// What is to be drawn: checked, and with what all views of it share.
 pub(crate) struct Request<'a> {
     pub mesh: &'a Mesh,
     pub paint: &'a Paint<'a>,
     pub settings: &'a RenderSettings,
+    pub normals: CornerNormals,
+    /// Light that reaches each vertex (n) where occlusion is asked for.
+    occlusion: Option<Vec<f32>>,
 }
 
 impl<'a> Request<'a> {
     /// # Errors
     /// As [`render`].
-    pub fn check(
+    pub fn new(
         mesh: &'a Mesh,
         paint: &'a Paint<'a>,
         cameras: &[Camera],
@@ -151,45 +177,48 @@ impl<'a> Request<'a> {
         if mesh.area() <= 0.0 {
             return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
         }
-        Ok(Self { mesh, paint, settings })
+        let darkened = |open: f32| 1.0 - settings.occlusion as f32 * (1.0 - open);
+        let occlusion =
+            (settings.occlusion > 0.0).then(|| openness(mesh).into_iter().map(darkened).collect());
+        let normals = CornerNormals::new(mesh, settings.crease);
+        Ok(Self { mesh, paint, settings, normals, occlusion })
+    }
+
+    /// Share of the light that reaches a vertex.
+    pub fn light_at(&self, vertex: usize) -> f32 {
+        self.occlusion.as_ref().map_or(1.0, |light| light[vertex])
+    }
+
+    /// What is drawn over a finished picture.
+    pub fn finish(&self, view: &mut View) {
+        if self.settings.edges > 0.0 {
+            edges::draw(view, self.mesh, self.settings);
+        }
+    }
+
+    /// Colours a picture of which somebody else found, for every sample, the triangle and its depth.
+    #[cfg(feature = "gpu")]
+    pub fn shade_hits(&self, camera: &Camera, triangles: &[i32], depth: &[f32]) -> Vec<u8> {
+        let per_pixel = self.settings.supersampling;
+        let projection = Projection::new(self.mesh, camera);
+        let raster = Raster::of(per_pixel, (camera.width * per_pixel) as usize, triangles, depth);
+        let mut rgb = vec![0; camera.width as usize * camera.height as usize * 3];
+        shade::Shader::new(&projection, self).mix(&raster, &mut rgb);
+        rgb
     }
 }
 
-/// Colours a picture of which somebody else found, for every sample, the triangle and its depth.
-#[cfg(feature = "gpu")]
-pub(crate) fn shade_hits(
-    request: &Request<'_>,
-    normals: &CornerNormals,
-    camera: &Camera,
-    triangles: &[i32],
-    depth: &[f32],
-) -> Vec<u8> {
-    let per_pixel = request.settings.supersampling;
-    let projection = Projection::new(request.mesh, camera);
-    let raster = Raster::of(per_pixel, (camera.width * per_pixel) as usize, triangles, depth);
-    let mut rgb = vec![0; camera.width as usize * camera.height as usize * 3];
-    shade::Shader::new(&projection, normals, request.paint, request.settings)
-        .mix(&raster, &mut rgb);
-    rgb
-}
-
-fn render_one(
-    mesh: &Mesh,
-    normals: &CornerNormals,
-    paint: &Paint<'_>,
-    camera: &Camera,
-    settings: &RenderSettings,
-) -> View {
+fn render_one(request: &Request<'_>, camera: &Camera) -> View {
     let (width, height) = (camera.width as usize, camera.height as usize);
-    let projection = Projection::new(mesh, camera);
-    let light = shade::Shader::new(&projection, normals, paint, settings);
+    let projection = Projection::new(request.mesh, camera);
+    let light = shade::Shader::new(&projection, request);
     let mut view = View {
         camera: *camera,
         rgb: vec![0; width * height * 3],
         depth: vec![0.0; width * height],
         triangles: vec![0; width * height],
     };
-    let samples_per_row = width * (settings.supersampling as usize).pow(2);
+    let samples_per_row = width * (request.settings.supersampling as usize).pow(2);
     let rows_per_band = (BAND_SAMPLES / samples_per_row).clamp(1, height);
     let band_pixels = rows_per_band * width;
     view.rgb
@@ -202,6 +231,7 @@ fn render_one(
             trace(&projection, rows.clone(), depth, triangles);
             light.colour(rows, rgb);
         });
+    request.finish(&mut view);
     view
 }
 

@@ -6,9 +6,9 @@ use std::ops::Range;
 use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
-use super::RenderSettings;
 use super::raster::{Hit, Raster};
 use super::triangle::Projection;
+use super::{RenderSettings, Request};
 use crate::{Camera, Error, Result};
 
 /// Colour of the surface before lighting, as sRGB values 0 to 1.
@@ -23,6 +23,9 @@ pub enum Paint<'a> {
     Vertices(&'a [[f32; 3]]),
     /// A function of triangle and barycentric weights (sum 1): textures, corner colours.
     Surface(&'a (dyn Fn(usize, [f64; 3]) -> [f32; 3] + Sync)),
+    /// The shading normal as a colour, not lit: x right, y up and z towards the viewer, each from
+    /// −1 … 1 to 0 … 1.
+    Normals,
 }
 
 impl Paint<'_> {
@@ -52,6 +55,7 @@ impl fmt::Debug for Paint<'_> {
             Self::Plain(colour) => f.debug_tuple("Plain").field(colour).finish(),
             Self::Vertices(colours) => f.debug_tuple("Vertices").field(&colours.len()).finish(),
             Self::Surface(_) => f.debug_tuple("Surface").finish_non_exhaustive(),
+            Self::Normals => f.write_str("Normals"),
         }
     }
 }
@@ -104,22 +108,17 @@ pub(crate) fn light_direction(camera: &Camera, settings: &RenderSettings) -> DVe
 /// All that colouring a view needs.
 pub(super) struct Shader<'a> {
     projection: &'a Projection<'a>,
-    normals: &'a CornerNormals,
-    paint: &'a Paint<'a>,
+    request: &'a Request<'a>,
     settings: &'a RenderSettings,
     /// Unit vector towards the light, in the object's frame.
     light: DVec3,
 }
 
 impl<'a> Shader<'a> {
-    pub fn new(
-        projection: &'a Projection<'a>,
-        normals: &'a CornerNormals,
-        paint: &'a Paint<'a>,
-        settings: &'a RenderSettings,
-    ) -> Self {
+    pub fn new(projection: &'a Projection<'a>, request: &'a Request<'a>) -> Self {
+        let settings = request.settings;
         let light = light_direction(projection.camera, settings);
-        Self { projection, normals, paint, settings, light }
+        Self { projection, request, settings, light }
     }
 
     /// Paints the pixels of `rows` into `rgb` (rows × width × 3).
@@ -165,17 +164,18 @@ impl<'a> Shader<'a> {
             let Some(forms) = self.projection.forms(face) else { continue };
             let light = self.brightness(face);
             let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
-            let corners = match self.paint {
+            let corners = match self.request.paint {
                 Paint::Plain(colour) => Some([0, 1, 2].map(|corner| lit(corner, *colour))),
                 Paint::Vertices(colours) => {
                     let ids = self.projection.mesh.faces()[face];
                     Some([0, 1, 2].map(|corner| lit(corner, colours[ids[corner] as usize])))
                 }
+                Paint::Normals => Some(self.normal_colours(face)),
                 Paint::Surface(_) => None,
             };
             for column in columns {
                 let weights = forms.barycentric(raster.position(column), v);
-                let colour = match (corners, self.paint) {
+                let colour = match (corners, self.request.paint) {
                     (None, Paint::Surface(colour)) => {
                         let light: f64 = weights.iter().zip(light).map(|(w, l)| w * l).sum();
                         colour(face, weights).map(|c| c * light as f32)
@@ -193,10 +193,26 @@ impl<'a> Shader<'a> {
 
     /// Light on each corner of a triangle, on whichever side it comes from.
     fn brightness(&self, face: usize) -> [f64; 3] {
-        let ambient = self.settings.ambient;
-        self.normals.0[face].map(|normal| {
-            let cosine = DVec3::from_array(normal.map(f64::from)).dot(self.light).abs();
-            ambient + (1.0 - ambient) * cosine
+        let (ambient, ids) = (self.settings.ambient, self.projection.mesh.faces()[face]);
+        let normals = self.request.normals.0[face];
+        [0, 1, 2].map(|corner| {
+            let normal = DVec3::from_array(normals[corner].map(f64::from));
+            let cosine = normal.dot(self.light).abs();
+            let reaching = f64::from(self.request.light_at(ids[corner] as usize));
+            (ambient + (1.0 - ambient) * cosine) * reaching
+        })
+    }
+
+    /// The corners' normals in camera axes, on the side that the camera sees, as colours.
+    fn normal_colours(&self, face: usize) -> [[f32; 3]; 3] {
+        let (mesh, camera) = (self.projection.mesh, self.projection.camera);
+        let towards = camera.eye() - mesh.vertices()[mesh.faces()[face][0] as usize];
+        let side = mesh.face_normal_scaled(face).dot(towards).signum();
+        self.request.normals.0[face].map(|normal| {
+            let normal = DVec3::from_array(normal.map(f64::from)) * side;
+            let [right, down, forward] =
+                camera.camera_from_object.transform_vector3(normal).as_vec3().to_array();
+            [right, -down, -forward].map(|x| 0.5 + 0.5 * x)
         })
     }
 }

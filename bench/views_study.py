@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""What an encoder should be shown: one protocol of views after the other, judged by the regions.
+
+    python bench/views_study.py DATA --encoder ENCODER.json [--binary target/release/semfm-cli]
+                                [--only PROTOCOL …] [-o views-study]
+
+DATA is a folder as `semfm-cli eval` takes it. For every protocol below, each labelled object is
+drawn (`semfm-cli views`), embedded (`semfm.sidecar`, so the package must be installed) and every
+pair is carried (`semfm-cli eval --methods fused`). What is finished is kept in the output folder
+and not done again; `table.md` there holds all protocols so far.
+
+Objects are halved by turns within each group, in alphabetical order. A -> A are the pairs inside
+the half that choices may be made on, B -> B those inside the other. Differences are to `default`,
+pair by pair, with a 95 % interval from resampling the objects.
+"""
+
+import argparse
+import json
+import random
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+#: Name -> (options of `semfm-cli views`, rolls of each picture).
+PROTOCOLS = {
+    "default": ("", 4),
+    "1 roll": ("", 1),
+    "2 rolls": ("", 2),
+    "6 views": ("--count 6", 4),
+    "10 views": ("--count 10", 4),
+    "20 views": ("--count 20", 4),
+    "28 views": ("--count 28", 4),
+    "28 views, 2 rolls": ("--count 28", 2),
+    "14 views, 448 px": ("--size 448", 4),
+    "6 views, 448 px": ("--count 6 --size 448", 4),
+    "160 px": ("--size 160", 4),
+    "320 px": ("--size 320", 4),
+    "angle of view 12°": ("--fov 12", 4),
+    "angle of view 50°": ("--fov 50", 4),
+    "fill .65": ("--fill 0.65", 4),
+    "fill .95": ("--fill 0.95", 4),
+    "zoom up to 1": ("--max-zoom 1", 4),
+    "zoom up to 3": ("--max-zoom 3", 4),
+    "z of the file upright": ("--upright z", 4),
+    "black background": ("--background 0", 4),
+    "grey background": ("--background 0.5", 4),
+    "occlusion .5": ("--occlusion 0.5", 4),
+    "occlusion 1": ("--occlusion 1", 4),
+    "edges .5": ("--edges 0.5", 4),
+    "normals as colour": ("--normals", 4),
+    "ambient .15": ("--ambient 0.15", 4),
+    "ambient .6": ("--ambient 0.6", 4),
+    "2 close-ups": ("--close-ups 2", 4),
+    "3 close-ups": ("--close-ups 3", 4),
+    "7 views, 2 close-ups": ("--count 7 --close-ups 2", 4),
+    "7 views, 2 close-ups, 2 rolls": ("--count 7 --close-ups 2", 2),
+}
+
+_ENCODER = None
+
+
+def open_worker(model: str, threads: int) -> None:
+    global _ENCODER
+    from semfm.sidecar import open_encoder
+
+    _ENCODER = open_encoder(model, "cpu", threads)
+
+
+def embed(binary: str, mesh: Path, views_options: str, rolls: int, output: Path) -> float:
+    """Draws and embeds one object; returns the seconds that took."""
+    from semfm.sidecar import EmbedSettings, embed_file
+
+    start = time.perf_counter()
+    views = output.with_suffix(".views.mcap")
+    colours = [] if "--normals" in views_options else ["--grey"]
+    command = [binary, "views", mesh, "-o", views, *views_options.split(), *colours]
+    command += ["--renderer", "cpu", "--threads", "1", "--quiet"]
+    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+    embed_file(views, output, _ENCODER, EmbedSettings(rolls=rolls))
+    views.unlink()
+    return time.perf_counter() - start
+
+
+def measure(args: argparse.Namespace, name: str, objects: list[Path], pool: ProcessPoolExecutor) -> dict:
+    """One protocol: rows of pairs and seconds of an object."""
+    options, rolls = PROTOCOLS[name]
+    folder = args.output / "work"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "embedded").mkdir(parents=True)
+    outputs = [folder / "embedded" / f"{mesh.stem}.emb.mcap" for mesh in objects]
+    n = len(objects)
+    seconds = pool.map(embed, [args.binary] * n, objects, [options] * n, [rolls] * n, outputs)
+    seconds = statistics.median(seconds)
+    command = [args.binary, "eval", args.data, "--embeddings", folder / "embedded", "--methods", "fused"]
+    command += ["--gallery", 0, "--no-predictions", "--fresh", "--quiet", "-o", folder / "report"]
+    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+    rows = json.loads((folder / "report" / "results.json").read_text())["rows"]
+    shutil.rmtree(folder)
+    kept = ("group", "source", "target", "iou", "confidence")
+    rows = [{key: row[key] for key in kept} for row in rows]
+    return {"options": options, "rolls": rolls, "seconds": seconds, "rows": rows}
+
+
+def halves(rows: list[dict]) -> dict[str, str]:
+    half: dict[str, str] = {}
+    for group in dict.fromkeys(row["group"] for row in rows):
+        names = {row[end] for row in rows if row["group"] == group for end in ("source", "target")}
+        for turn, name in enumerate(sorted(names)):
+            half.setdefault(name, "AB"[turn % 2])
+    return half
+
+
+def difference(rows: list[dict], base: dict, keep) -> tuple[float, float, float]:
+    """Mean of the paired differences and its interval, objects resampled."""
+    pairs = [(row["source"], row["target"]) for row in rows if keep(row)]
+    by_pair = {(row["source"], row["target"]): row["iou"] for row in rows}
+    gains = [by_pair[pair] - base[pair] for pair in pairs]
+    names, rng, means = sorted({name for pair in pairs for name in pair}), random.Random(0), []
+    for _ in range(2000):
+        counts = dict.fromkeys(names, 0)
+        for name in rng.choices(names, k=len(names)):
+            counts[name] += 1
+        weights = [counts[a] * counts[b] for a, b in pairs]
+        if sum(weights):
+            means.append(sum(w * g for w, g in zip(weights, gains)) / sum(weights))
+    means.sort()
+    return statistics.mean(gains), means[len(means) // 40], means[-len(means) // 40]
+
+
+def category_mean(rows: list[dict]) -> float:
+    by_category: dict[str, list[float]] = {}
+    for row in rows:
+        by_category.setdefault(row["group"][:1], []).append(row["iou"])
+    return statistics.mean(map(statistics.mean, by_category.values()))
+
+
+def table(measured: dict[str, dict]) -> str:
+    base_rows = measured["default"]["rows"]
+    base = {(row["source"], row["target"]): row["iou"] for row in base_rows}
+    half = halves(base_rows)
+    inside = {letter: lambda row, letter=letter: half[row["source"]] == half[row["target"]] == letter for letter in "AB"}
+    lines = ["| protocol | pictures | s | all | categories | < .3 | A → A | B → B | against the default |", "| --- " * 9 + "|"]
+    for name, one in measured.items():
+        rows = one["rows"]
+        ious = [row["iou"] for row in rows]
+        words = dict(zip(one["options"].split()[::2], one["options"].split()[1::2]))
+        pictures = int(words.get("--count", 14)) * (1 + int(words.get("--close-ups", 0))) * one["rolls"]
+        of_half = [statistics.mean(row["iou"] for row in rows if inside[letter](row)) for letter in "AB"]
+        mean, low, high = difference(rows, base, lambda row: True)
+        cells = [name, str(pictures), f"{one['seconds']:.1f}", f"{statistics.mean(ious):.3f}", f"{category_mean(rows):.3f}",
+                 f"{sum(iou < 0.3 for iou in ious) / len(ious):.3f}", *(f"{mean:.3f}" for mean in of_half),
+                 f"{mean:+.3f} ({low:+.3f} … {high:+.3f})"]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--encoder", required=True)
+    parser.add_argument("--binary", default="target/release/semfm-cli")
+    parser.add_argument("--only", action="append", metavar="PROTOCOL", help="(repeatable)")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("-o", "--output", type=Path, default=Path("views-study"))
+    args = parser.parse_args()
+    pairs = json.loads((args.data / "pairs.json").read_text())
+    names = sorted({name for group in pairs.values() for pair in group for name in pair})
+    objects = [next(m for m in sorted(args.data.glob(f"[0-9]*/{n}.*")) if m.suffix != ".json") for n in names]
+    args.output.mkdir(parents=True, exist_ok=True)
+    wanted = args.only or list(PROTOCOLS)
+    measured = {}
+    with ProcessPoolExecutor(args.jobs, initializer=open_worker, initargs=(args.encoder, 1)) as pool:
+        for name in PROTOCOLS:
+            kept = args.output / f"{name}.json"
+            if not kept.is_file() and name in wanted:
+                kept.write_text(json.dumps(measure(args, name, objects, pool)))
+            if kept.is_file():
+                measured[name] = json.loads(kept.read_text())
+                if "default" in measured:
+                    text = table(measured)
+                    (args.output / "table.md").write_text(text)
+                    print(text.splitlines()[-1], file=sys.stderr, flush=True)
+    print(args.output / "table.md")
+
+
+if __name__ == "__main__":
+    main()

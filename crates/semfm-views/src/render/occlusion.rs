@@ -1,0 +1,75 @@
+//! Ambient occlusion: how open the surface lies (Zhukov, Iones & Kronin, *An ambient light
+//! illumination model*, 1998), at the vertices.
+
+use rayon::prelude::*;
+use semfm_geom::Mesh;
+use semfm_geom::math::{DAffine3, DMat3, DVec3};
+
+use super::probe::inverse_depths;
+use super::triangle::Projection;
+use crate::Camera;
+use crate::rig::fibonacci_directions;
+
+/// Axes along which a vertex is looked at, from both ends: of each two opposite eyes a convex
+/// object hides the vertex from exactly one.
+const AXES: usize = 32;
+
+/// Distance of the eyes in bounding-sphere radii: far enough that their rays are parallel to 1°.
+const DISTANCE: f64 = 60.0;
+
+/// What lies in front of a vertex by less than this share of the radius does not hide it: the
+/// triangles around it must not.
+const TOLERANCE: f64 = 0.01;
+
+/// Share of the light from all around that reaches each vertex (n), 0 to 1.
+///
+/// Of the directions from which a vertex is in sight, weighted by the cosine to its normal, twice
+/// the share: a closed convex object has 1 everywhere, the inside of a cup less. No winding is
+/// asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
+/// Vertices of no triangle have 1.
+pub fn openness(mesh: &Mesh) -> Vec<f32> {
+    let (centre, radius) = mesh.bounding_sphere();
+    let mut normals = vec![DVec3::ZERO; mesh.n_vertices()];
+    for (face, ids) in mesh.faces().iter().enumerate() {
+        ids.iter().for_each(|&id| normals[id as usize] += mesh.face_normal_scaled(face));
+    }
+    let directions: Vec<DVec3> =
+        fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
+    let in_sight: Vec<Vec<bool>> = directions
+        .par_iter()
+        .map(|&direction| vertices_in_sight(mesh, centre, radius, direction))
+        .collect();
+    let open = normals.into_par_iter().enumerate().map(|(id, normal)| {
+        let normal = normal.normalize_or_zero();
+        let (mut seen, mut all) = (0.0, 0.0);
+        for (direction, in_sight) in directions.iter().zip(&in_sight) {
+            let weight = normal.dot(*direction).abs();
+            all += weight;
+            seen += if in_sight[id] { weight } else { 0.0 };
+        }
+        if all > 0.0 { (2.0 * seen / all).min(1.0) as f32 } else { 1.0 }
+    });
+    open.collect()
+}
+
+/// Which vertices (n) an eye far away in a direction sees.
+fn vertices_in_sight(mesh: &Mesh, centre: DVec3, radius: f64, direction: DVec3) -> Vec<bool> {
+    let right = direction.any_orthonormal_vector();
+    let turn = DMat3::from_cols(right, right.cross(direction), -direction).transpose();
+    let eye = centre + DISTANCE * radius * direction;
+    let camera = Camera {
+        width: 1,
+        height: 1,
+        fx: DISTANCE,
+        fy: DISTANCE,
+        cx: 0.0,
+        cy: 0.0,
+        camera_from_object: DAffine3::from_mat3_translation(turn, turn * -eye),
+    };
+    let projected: Vec<(f64, f64, f64)> =
+        mesh.vertices().iter().map(|&p| camera.project(p)).collect();
+    let positions: Vec<[f64; 2]> = projected.iter().map(|p| [p.0, p.1]).collect();
+    let nearest = inverse_depths(&Projection::new(mesh, &camera), &positions);
+    let tolerance = TOLERANCE * radius;
+    projected.iter().zip(nearest).map(|(p, inverse)| p.2 <= 1.0 / inverse + tolerance).collect()
+}
