@@ -36,6 +36,7 @@ PROTOCOLS = {
     "28 views": ("--count 28", 4),
     "28 views, 2 rolls": ("--count 28", 2),
     "14 views, 448 px": ("--size 448", 4),
+    "10 views, 2 rolls": ("--count 10", 2),
     "6 views, 448 px": ("--count 6 --size 448", 4),
     "160 px": ("--size 160", 4),
     "320 px": ("--size 320", 4),

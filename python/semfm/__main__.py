@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -29,6 +30,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
 def script() -> None:
     """The console script: Ctrl-C ends it as it ends the binary."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Mesa's choice of a device would complain on stderr where there is no display.
+    os.environ.setdefault("NODEVICE_SELECT", "1")
     sys.exit(main())
 
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use semfm::views::mcap::ViewsFile;
 use semfm_tests::shell::run;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -162,6 +163,38 @@ fn views_lead_to_a_region_by_a_mask() {
         "never.json",
     ]);
     assert_eq!(other.code, Some(2), "views of another mesh: {other:?}");
+}
+
+#[test]
+fn views_look_as_they_are_told() {
+    let (folder, files) = demo("shoes", "0");
+    let draw = |name: &str, more: &[&str]| {
+        let path = folder.path().join(name);
+        let mut arguments = vec!["views", files[0].to_str().unwrap(), "-o", path.to_str().unwrap()];
+        arguments.extend(["--count", "2", "--size", "64", "--renderer", "cpu", "--quiet"]);
+        arguments.extend(more);
+        let answer = run(&arguments);
+        assert_eq!(answer.code, Some(0), "{answer:?}");
+        ViewsFile::read(&path).unwrap()
+    };
+    let plain = draw("plain.views.mcap", &["--grey"]);
+    let close = draw("close.views.mcap", &["--grey", "--close-ups", "2"]);
+    assert_eq!((plain.views.len(), close.views.len()), (2, 6));
+    assert_eq!(plain.views[1].rgb, close.views[3].rgb);
+    assert!(close.metadata.rig.contains("2 close-ups"), "{}", close.metadata.rig);
+    let looks = [
+        &["--grey", "--occlusion", "1"][..],
+        &["--grey", "--edges", "1"],
+        &["--grey", "--ambient", "0.9"],
+        &["--grey", "--background", "0,0,1"],
+        &["--normals"],
+    ];
+    for look in looks {
+        let drawn = draw("look.views.mcap", look);
+        assert_eq!(drawn.views[0].triangles, plain.views[0].triangles, "{look:?}");
+        assert_ne!(drawn.views[0].rgb, plain.views[0].rgb, "{look:?}");
+    }
+    assert_eq!(draw("look.views.mcap", looks[3]).views[0].rgb[..3], [0, 0, 255]);
 }
 
 #[test]

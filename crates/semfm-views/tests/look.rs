@@ -100,12 +100,13 @@ fn directions_as_colours_face_the_viewer() {
 }
 
 #[test]
-fn strengths_out_of_range_are_named() {
+fn looks_out_of_range_are_named() {
     let ball = ellipsoid(4, DVec3::ONE, DVec3::ZERO);
     let cameras = rig(&ball, &RigSettings::default()).unwrap();
     for (settings, name) in [
         (RenderSettings { occlusion: 1.5, ..Default::default() }, "occlusion"),
         (RenderSettings { edges: f64::NAN, ..Default::default() }, "edges"),
+        (RenderSettings { background: [0.0, 2.0, 0.0], ..Default::default() }, "background"),
     ] {
         let answer = render(&ball, &Paint::GREY, &cameras, &settings, &Task::default());
         let message = answer.unwrap_err().to_string();

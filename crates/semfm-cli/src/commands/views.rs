@@ -56,7 +56,7 @@ struct RigOptions {
     #[arg(long, default_value_t = RigSettings::default().close_ups, value_name = "N")]
     close_ups: usize,
     /// Angle of view, in degrees
-    #[arg(long, default_value_t = RigSettings::default().field_of_view.to_degrees().round(), value_name = "DEGREES")]
+    #[arg(long, default_value_t = RigSettings::default().field_of_view.to_degrees().round(), value_name = "DEGREES", value_parser = degrees)]
     fov: f64,
     /// Share of the image's side that the silhouette fills
     #[arg(long, default_value_t = RigSettings::default().fill, value_name = "SHARE")]
@@ -87,6 +87,12 @@ impl RigOptions {
             close_ups: self.close_ups,
         }
     }
+}
+
+/// An angle of view that a flat picture can have.
+fn degrees(text: &str) -> std::result::Result<f64, String> {
+    let angle: f64 = text.parse().map_err(|_| "expected a number of degrees".to_owned())?;
+    if (1.0..=150.0).contains(&angle) { Ok(angle) } else { Err("expected 1 to 150 degrees".into()) }
 }
 
 /// How the surface looks.

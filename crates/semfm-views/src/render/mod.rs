@@ -92,6 +92,10 @@ impl RenderSettings {
                 found,
             ));
         }
+        if !self.background.iter().all(|c| (0.0..=1.0).contains(c)) {
+            let found = format!("{:?}", self.background);
+            return Err(Error::invalid("background", "sRGB values from 0 to 1", found));
+        }
         for (name, strength) in [("occlusion", self.occlusion), ("edges", self.edges)] {
             if !(0.0..=1.0).contains(&strength) {
                 return Err(Error::invalid(name, "0 to 1", strength.to_string()));
