@@ -155,6 +155,27 @@ def test_a_description_that_does_not_fit_the_network_writes_nothing(
     assert not list(tmp_path.glob("*e.mcap*"))
 
 
+def test_many_files_go_through_one_encoder_into_a_folder(tmp_path, views, capsys):
+    model, folder = write_encoder(tmp_path), tmp_path / "embedded"
+    pair = [tmp_path / "a.views.mcap", tmp_path / "b.views.mcap"]
+    for path in pair:
+        path.write_bytes(views.read_bytes())
+    shared = ["--output-folder", str(folder), "--model", str(model)]
+    assert main([*map(str, pair), *shared]) == 0
+    written = [folder / "a.emb.mcap", folder / "b.emb.mcap"]
+    assert capsys.readouterr().out.splitlines() == list(map(str, written))
+    assert main([str(pair[0]), "-o", str(tmp_path / "one.emb.mcap"), *shared[2:]]) == 0
+    alone = (tmp_path / "one.emb.mcap").read_bytes()
+    assert [path.read_bytes() for path in written] == [alone, alone]
+
+    assert main([*map(str, pair), "-o", str(tmp_path / "x.mcap"), *shared[2:]]) == 2
+    assert "--output-folder" in capsys.readouterr().err
+    assert main([str(pair[0]), str(pair[0]), *shared]) == 2
+    assert "another name" in capsys.readouterr().err
+    assert main([str(model), *shared]) == 2
+    assert "NAME.views.mcap" in capsys.readouterr().err
+
+
 def test_bad_input_leaves_an_older_output_alone(tmp_path, views, capsys):
     output = tmp_path / "e.mcap"
     output.write_bytes(b"older")

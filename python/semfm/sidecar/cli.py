@@ -11,17 +11,20 @@ from collections.abc import Sequence
 from .. import __version__
 from .embed import EmbedSettings, embed_file
 from .embeddings_file import DTYPES
-from .errors import SidecarError
+from .errors import SidecarError, expected
 from .models import DEVICES, open_encoder
 from .patches import ROLLS
 from .progress import MODES, open_progress
+
+_VIEWS = ".views.mcap"
 
 _EPILOG = """\
 examples:
   semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224
   semfm-embed mug.views.mcap -o mug.emb.mcap --model mobilenet_v2.json --threads 2
+  semfm-embed *.views.mcap --output-folder embedded --model mobilenet_v2.json
 
-exit code: 0 written, 2 bad input or failure (nothing is written), 130 interrupted
+exit code: 0 written, 2 bad input or failure, 130 interrupted; a file is written whole or not at all
 """
 
 
@@ -34,8 +37,16 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    p.add_argument("views", metavar="V.views.mcap", help="views, from `semfm-cli views`")
-    p.add_argument("-o", "--output", metavar="V.emb.mcap", required=True, help="file to write")
+    p.add_argument(
+        "views", nargs="+", metavar="V.views.mcap", help="views, from `semfm-cli views`"
+    )
+    to = p.add_mutually_exclusive_group(required=True)
+    to.add_argument("-o", "--output", metavar="V.emb.mcap", help="file to write, for one V")
+    to.add_argument(
+        "--output-folder",
+        metavar="FOLDER",
+        help="where NAME.views.mcap becomes NAME.emb.mcap, for any number of them",
+    )
     p.add_argument(
         "--model",
         required=True,
@@ -79,24 +90,43 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"semfm-embed: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("semfm-embed: interrupted, nothing written", file=sys.stderr)
+        print("semfm-embed: interrupted; only whole files are written", file=sys.stderr)
         return 130
     return 0
 
 
 def _run(args: argparse.Namespace) -> None:
     settings = EmbedSettings(args.rolls, args.batch, args.dtype)
-    for path in (args.views, os.path.dirname(os.path.abspath(args.output))):
+    outputs = _outputs(args)
+    for path in (*args.views, *{os.path.dirname(os.path.abspath(path)) for path in outputs}):
         if not os.path.exists(path):  # before minutes go into loading a model
             raise SidecarError(f"{path}: No such file or directory")
     encoder = open_encoder(args.model, args.device, args.threads)
-    start = time.perf_counter()
-    progress = open_progress("none" if args.quiet else args.progress)
-    try:
-        embed_file(args.views, args.output, encoder, settings, progress)
-    finally:
-        progress.close()
-    if not args.quiet and args.progress != "json":
-        took = time.perf_counter() - start
-        print(f"semfm-embed: {encoder.name}, {took:.1f} s", file=sys.stderr)
-    print(args.output)
+    for views, output in zip(args.views, outputs):
+        start = time.perf_counter()
+        progress = open_progress("none" if args.quiet else args.progress)
+        try:
+            embed_file(views, output, encoder, settings, progress)
+        finally:
+            progress.close()
+        if not args.quiet and args.progress != "json":
+            took = time.perf_counter() - start
+            print(f"semfm-embed: {encoder.name}, {took:.1f} s", file=sys.stderr)
+        print(output, flush=True)
+
+
+def _outputs(args: argparse.Namespace) -> list[str]:
+    """One file for each views file."""
+    if args.output_folder is None:
+        if len(args.views) != 1:
+            raise expected("-o", "views", "one file (--output-folder takes more)", len(args.views))
+        return [args.output]
+    os.makedirs(args.output_folder, exist_ok=True)
+    names = [os.path.basename(path) for path in args.views]
+    for name in names:
+        if not name.endswith(_VIEWS):
+            raise expected(name, "name", f"NAME{_VIEWS}", repr(name))
+        if names.count(name) > 1:
+            raise expected(name, "name", "another name for each file of a folder", repr(name))
+    folder = args.output_folder
+    return [os.path.join(folder, name[: -len(_VIEWS)] + ".emb.mcap") for name in names]

@@ -45,44 +45,75 @@ impl Encoder {
         Ok(Self { model: model.to_owned(), rolls, folder })
     }
 
-    /// The embeddings of an object's default views, made where they are not there yet.
-    pub fn embed(&self, file: &MeshFile, colored: bool, common: &Common) -> Result<EmbeddingsFile> {
-        Ok(self.embed_timed(file, colored, common)?.0)
+    /// The embeddings of the objects' default views, made where they are not there yet: in one call
+    /// of the encoder, which may take longer to start than to look at an object.
+    pub fn embed<const N: usize>(
+        &self,
+        files: [&MeshFile; N],
+        colored: bool,
+        common: &Common,
+    ) -> Result<[EmbeddingsFile; N]> {
+        let paths = files.map(|file| self.kept(file, colored));
+        // Whatever is wrong with a kept file, a new one is the cure.
+        let mut missing: Vec<(&Path, &MeshFile)> = Vec::new();
+        for (path, file) in paths.iter().zip(files) {
+            let is_listed = missing.iter().any(|(other, _)| other == path);
+            if !is_listed && load::embeddings(path, &file.mesh).is_err() {
+                missing.push((path, file));
+            }
+        }
+        if !missing.is_empty() {
+            self.make(&missing, colored, common)?;
+        }
+        let mut made = Vec::with_capacity(N);
+        for (path, file) in paths.iter().zip(files) {
+            made.push(load::embeddings(path, &file.mesh)?);
+        }
+        made.try_into().map_err(|_| anyhow::anyhow!("one embedding for each of {N} objects"))
     }
 
-    /// The same, and what making them took, now or then.
+    /// The same of one object, and what making them took, now or then.
     pub fn embed_timed(
         &self,
         file: &MeshFile,
         colored: bool,
         common: &Common,
     ) -> Result<(EmbeddingsFile, Option<Took>)> {
-        let path = self.folder.join(format!("{}.emb.mcap", self.key(file, colored)));
-        // Whatever is wrong with a kept file, a new one is the cure.
-        if let Ok(kept) = load::embeddings(&path, &file.mesh) {
-            let took = std::fs::read(path.with_extension("took.json")).ok();
-            let took = took.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-            return Ok((kept, took));
-        }
-        let start = Instant::now();
-        let scratch = tempfile::tempdir().context("a folder for the views")?;
-        let views = scratch.path().join("object.views.mcap");
-        // By the CPU on every machine: what is kept must not depend on the driver that was there.
-        make_views(file, &shown(colored), &Renderer::cpu(), &views, common)?;
-        let views_ms = start.elapsed().as_secs_f64() * 1e3;
-        let start = Instant::now();
-        self.run(&views, &path, common)?;
-        let took = Took { views_ms, embed_ms: start.elapsed().as_secs_f64() * 1e3 };
-        // The times are beside the point: embeddings without them are as good.
-        let _ = write_atomically(path.with_extension("took.json"), |out| {
-            Ok(serde_json::to_writer(out, &took)?)
-        });
-        Ok((load::embeddings(&path, &file.mesh)?, Some(took)))
+        let [embeddings] = self.embed([file], colored, common)?;
+        let took = std::fs::read(took_path(&self.kept(file, colored))).ok();
+        Ok((embeddings, took.and_then(|bytes| serde_json::from_slice(&bytes).ok())))
     }
 
-    fn run(&self, views: &Path, output: &Path, common: &Common) -> Result<()> {
+    /// Draws the objects and has them embedded, each into its place.
+    fn make(&self, objects: &[(&Path, &MeshFile)], colored: bool, common: &Common) -> Result<()> {
+        let scratch = tempfile::tempdir().context("a folder for the views")?;
+        let (mut drawn, mut views_ms) = (Vec::new(), Vec::new());
+        for (path, file) in objects {
+            let start = Instant::now();
+            let name = path.file_name().context("a name for the views")?;
+            let views = scratch.path().join(name).with_extension("").with_extension("views.mcap");
+            // By the CPU on every machine: what is kept must not depend on the driver that was there.
+            make_views(file, &shown(colored), &Renderer::cpu(), &views, common)?;
+            views_ms.push(start.elapsed().as_secs_f64() * 1e3);
+            drawn.push(views);
+        }
+        let start = Instant::now();
+        self.run(&drawn, common)?;
+        let embed_ms = start.elapsed().as_secs_f64() * 1e3 / objects.len() as f64;
+        for ((path, _), views_ms) in objects.iter().zip(views_ms) {
+            // The times are beside the point: embeddings without them are as good.
+            let _ = write_atomically(took_path(path), |out| {
+                Ok(serde_json::to_writer(out, &Took { views_ms, embed_ms })?)
+            });
+        }
+        Ok(())
+    }
+
+    /// Calls the sidecar: `NAME.views.mcap` becomes `NAME.emb.mcap` in the folder.
+    fn run(&self, views: &[PathBuf], common: &Common) -> Result<()> {
         let program = std::env::var_os(PROGRAM).unwrap_or_else(|| "semfm-embed".into());
-        let mut arguments: Vec<OsString> = vec![views.into(), "-o".into(), output.into()];
+        let mut arguments: Vec<OsString> = views.iter().map(OsString::from).collect();
+        arguments.extend(["--output-folder".into(), OsString::from(&self.folder)]);
         arguments.extend(["--model".into(), (&self.model).into()]);
         arguments.extend(["--rolls".into(), self.rolls.to_string().into()]);
         if common.threads > 0 {
@@ -106,6 +137,11 @@ impl Encoder {
         Ok(())
     }
 
+    /// Where the embeddings of an object are kept.
+    fn kept(&self, file: &MeshFile, colored: bool) -> PathBuf {
+        self.folder.join(format!("{}.emb.mcap", self.key(file, colored)))
+    }
+
     /// A name for the embeddings: of this mesh, these pictures, this encoder.
     fn key(&self, file: &MeshFile, colored: bool) -> String {
         let mut words =
@@ -120,6 +156,11 @@ impl Encoder {
         }
         blake3::hash(words.join("\n").as_bytes()).to_hex().to_string()
     }
+}
+
+/// Where it stands what making embeddings took.
+fn took_path(embeddings: &Path) -> PathBuf {
+    embeddings.with_extension("took.json")
 }
 
 /// How an encoder is shown an object, in its own colours or in grey.

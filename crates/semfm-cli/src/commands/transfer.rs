@@ -166,7 +166,7 @@ impl Carry {
                 let encoder = Encoder::new(model, rolls, !self.matching.no_cache, scratch.path())?;
                 // Colour on one side alone misleads the encoder.
                 let colored = !source.appearance.is_plain() && !target.appearance.is_plain();
-                (encoder.embed(&source, colored, common)?, encoder.embed(&target, colored, common)?)
+                encoder.embed([&source, &target], colored, common)?.into()
             };
         announce("source", &a, common);
         announce("target", &b, common);
