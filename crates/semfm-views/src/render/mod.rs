@@ -9,6 +9,7 @@ pub(crate) mod raster;
 mod shade;
 pub(crate) mod triangle;
 
+#[cfg(feature = "gpu")]
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,7 +21,7 @@ pub(crate) use shade::light_direction;
 pub use shade::{CornerNormals, Paint};
 
 use crate::{Camera, Error, Result, View};
-use raster::Raster;
+use raster::{DrawAll, Raster};
 use triangle::Projection;
 
 /// Samples of one z-buffer: larger pictures are drawn in bands of rows, which bounds the memory.
@@ -155,22 +156,36 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Colours a picture of which somebody else found, for every sample, the triangle and its depth.
+/// A view in which nothing is seen.
+pub(crate) fn blank(camera: &Camera, settings: &RenderSettings) -> View {
+    let n_pixels = camera.width as usize * camera.height as usize;
+    View {
+        camera: *camera,
+        rgb: shade::background(settings).repeat(n_pixels),
+        depth: vec![f32::INFINITY; n_pixels],
+        triangles: vec![-1; n_pixels],
+    }
+}
+
+/// Colours a window of a view (columns and rows of pixels) of which somebody else found, for every
+/// sample, the triangle and its depth.
 #[cfg(feature = "gpu")]
 pub(crate) fn shade_hits(
     request: &Request<'_>,
     normals: &CornerNormals,
-    camera: &Camera,
-    triangles: &[i32],
-    depth: &[f32],
-) -> Vec<u8> {
-    let per_pixel = request.settings.supersampling;
-    let projection = Projection::new(request.mesh, camera);
-    let raster = Raster::of(per_pixel, (camera.width * per_pixel) as usize, triangles, depth);
-    let mut rgb = vec![0; camera.width as usize * camera.height as usize * 3];
-    shade::Shader::new(&projection, normals, request.paint, request.settings)
-        .mix(&raster, &mut rgb);
-    rgb
+    view: &mut View,
+    [columns, rows]: [Range<usize>; 2],
+    samples: impl Iterator<Item = (i32, f32)>,
+) {
+    let projection = Projection::new(request.mesh, &view.camera);
+    let width = view.camera.width as usize;
+    let first = rows.start * width * 3;
+    let raster = Raster::of(request.settings.supersampling, columns, rows, samples);
+    shade::Shader::new(&projection, normals, request.paint, request.settings).mix(
+        &raster,
+        &mut view.rgb[first..],
+        width,
+    );
 }
 
 fn render_one(
@@ -183,14 +198,10 @@ fn render_one(
     let (width, height) = (camera.width as usize, camera.height as usize);
     let projection = Projection::new(mesh, camera);
     let light = shade::Shader::new(&projection, normals, paint, settings);
-    let mut view = View {
-        camera: *camera,
-        rgb: vec![0; width * height * 3],
-        depth: vec![0.0; width * height],
-        triangles: vec![0; width * height],
-    };
-    let samples_per_row = width * (settings.supersampling as usize).pow(2);
-    let rows_per_band = (BAND_SAMPLES / samples_per_row).clamp(1, height);
+    let mut view = blank(camera, settings);
+    let window = projection.window();
+    let samples_per_row = window[0].len() * (settings.supersampling as usize).pow(2);
+    let rows_per_band = (BAND_SAMPLES / samples_per_row.max(1)).clamp(1, height);
     let band_pixels = rows_per_band * width;
     view.rgb
         .par_chunks_mut(band_pixels * 3)
@@ -198,23 +209,27 @@ fn render_one(
         .enumerate()
         .for_each(|(band, (rgb, (depth, triangles)))| {
             let first = band * rows_per_band;
-            let rows = first..first + depth.len() / width;
-            trace(&projection, rows.clone(), depth, triangles);
-            light.colour(rows, rgb);
+            let [columns, rows] = window.clone();
+            let rows = rows.start.max(first)..rows.end.min(first + depth.len() / width);
+            if columns.is_empty() || rows.is_empty() {
+                return;
+            }
+            let mut rasters = [1, settings.supersampling]
+                .map(|per_pixel| Raster::new(per_pixel, columns.clone(), rows.clone()));
+            let draw = DrawAll { projection: &projection, rasters: &mut rasters };
+            pulp::Arch::new().dispatch(draw);
+            let [centres, samples] = rasters;
+            let skipped = (rows.start - first) * width;
+            let lines =
+                depth[skipped..].chunks_mut(width).zip(triangles[skipped..].chunks_mut(width));
+            for ((depth, triangles), hits) in lines.zip(centres.hits.chunks_exact(columns.len())) {
+                let pixels = depth[columns.clone()].iter_mut().zip(&mut triangles[columns.clone()]);
+                for ((depth, triangle), hit) in pixels.zip(hits) {
+                    *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
+                    *triangle = hit.face().map_or(-1, |face| face as i32);
+                }
+            }
+            light.mix(&samples, &mut rgb[skipped * 3..], width);
         });
     view
-}
-
-/// Depth and triangle at the centres of the pixels in `rows`.
-fn trace(
-    projection: &Projection<'_>,
-    rows: Range<usize>,
-    depth: &mut [f32],
-    triangles: &mut [i32],
-) {
-    let raster = Raster::new(projection, 1, rows);
-    for ((depth, triangle), hit) in depth.iter_mut().zip(triangles).zip(raster.hits) {
-        *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
-        *triangle = hit.face().map_or(-1, |face| face as i32);
-    }
 }
