@@ -10,6 +10,20 @@ use crate::{Error, Result};
 /// a hundredth of it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// Less than what the driver has, so that tests meet its limits.
+pub(super) struct Restraint {
+    pub texture_side: u32,
+    pub buffer_bytes: u64,
+    /// Share of the driver's memory beyond which it says that there is none left.
+    pub memory_percent: u8,
+}
+
+impl Default for Restraint {
+    fn default() -> Self {
+        Self { texture_side: u32::MAX, buffer_bytes: u64::MAX, memory_percent: 95 }
+    }
+}
+
 /// An open driver. What goes wrong inside it is kept until somebody asks with [`Device::check`];
 /// left alone, the library would panic.
 pub(super) struct Device {
@@ -20,19 +34,21 @@ pub(super) struct Device {
 }
 
 impl Device {
-    /// Opens the fastest adapter there is, within the limits that `bound` leaves of its own.
+    /// Opens the fastest adapter there is.
     ///
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
-    pub fn open(bound: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
+    pub fn open(restraint: &Restraint) -> Result<Self> {
         // GL is asked last: its loader talks to the terminal where there is no display.
-        let adapter = adapter(wgpu::Backends::PRIMARY)
-            .or_else(|_| adapter(wgpu::Backends::GL))
+        let adapter = adapter(wgpu::Backends::PRIMARY, restraint)
+            .or_else(|_| adapter(wgpu::Backends::GL, restraint))
             .map_err(|error| Error::NoGpu { reason: error.to_string() })?;
-        let limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits());
-        let limits = wgpu::Limits { max_buffer_size: adapter.limits().max_buffer_size, ..limits };
-        let description =
-            wgpu::DeviceDescriptor { required_limits: bound(limits), ..Default::default() };
+        let own = adapter.limits();
+        let mut limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
+        limits.max_texture_dimension_2d =
+            limits.max_texture_dimension_2d.min(restraint.texture_side);
+        limits.max_buffer_size = own.max_buffer_size.min(restraint.buffer_bytes);
+        let description = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&description))
             .map_err(|error| Error::Gpu { reason: error.to_string() })?;
         let fault = Arc::new(Mutex::new(None));
@@ -96,9 +112,14 @@ impl Device {
 /// The fastest adapter behind some interfaces.
 fn adapter(
     backends: wgpu::Backends,
+    restraint: &Restraint,
 ) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let description = wgpu::InstanceDescriptor {
         backends,
+        memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
+            for_resource_creation: Some(restraint.memory_percent),
+            for_device_loss: None,
+        },
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     };
     let wanted = wgpu::RequestAdapterOptions {

@@ -11,6 +11,8 @@
 
 mod device;
 mod draw;
+#[cfg(test)]
+mod faults;
 mod frame;
 mod parts;
 mod pipelines;
@@ -24,7 +26,7 @@ use semfm_geom::{Mesh, Task};
 
 use crate::render::{CornerNormals, Request, blank};
 use crate::{Camera, Error, Paint, RenderSettings, Result, View};
-use device::Device;
+use device::{Device, Restraint};
 use draw::Draw;
 use frame::{Extent, Frame};
 use parts::{batches, extent};
@@ -51,12 +53,11 @@ impl GpuRenderer {
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
     pub fn new() -> Result<Self> {
-        Self::within(|limits| limits)
+        Self::within(&Restraint::default())
     }
 
-    /// A renderer that keeps to less than the driver's own limits.
-    fn within(bound: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
-        Ok(Self { driver: Mutex::new(Arc::new(Driver::open(bound)?)) })
+    fn within(restraint: &Restraint) -> Result<Self> {
+        Ok(Self { driver: Mutex::new(Arc::new(Driver::open(restraint)?)) })
     }
 
     /// Adapter and interface, as the driver names itself.
@@ -103,7 +104,7 @@ impl GpuRenderer {
     fn working(&self) -> Result<Arc<Driver>> {
         let mut driver = self.driver.lock().unwrap_or_else(PoisonError::into_inner);
         if driver.failed.load(Ordering::Relaxed) {
-            *driver = Arc::new(Driver::open(|limits| limits)?);
+            *driver = Arc::new(Driver::open(&Restraint::default())?);
         }
         Ok(driver.clone())
     }
@@ -118,8 +119,8 @@ struct Driver {
 }
 
 impl Driver {
-    fn open(bound: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
-        let device = Device::open(bound)?;
+    fn open(restraint: &Restraint) -> Result<Self> {
+        let device = Device::open(restraint)?;
         let pipelines = Pipelines::new(&device);
         device.check()?;
         Ok(Self { device, pipelines, frames: Mutex::default(), failed: AtomicBool::new(false) })

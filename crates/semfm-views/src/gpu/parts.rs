@@ -11,9 +11,9 @@ use crate::render::Request;
 use crate::render::triangle::Projection;
 
 /// Bytes that one batch may bring back: enough to keep a driver busy, little enough that the next
-/// batch is drawn while this one is read. On a software driver 2 to 16 MiB are as good, and 32 slower,
-/// since the samples then leave the processor's caches.
-const BATCH_BYTES: u64 = 6 << 20;
+/// batch is drawn while this one is read. On lavapipe 1.5 to 6 MiB are as good, 32 a fifth slower,
+/// since the samples then leave the processor's caches; below 1 MiB the driver waits too often.
+const BATCH_BYTES: u64 = 4 << 20;
 
 /// Pixels around the object, since a driver rounds the corners' places.
 const MARGIN: usize = 1;
@@ -67,42 +67,39 @@ pub(super) fn batches(
     let limits = device.device.limits();
     let side = (limits.max_texture_dimension_2d / request.settings.supersampling).max(1) as usize;
     let most = BATCH_BYTES.min(limits.max_buffer_size) / u64::from(scale * scale);
-    // Batches of like size can be drawn into the same textures.
-    let all: u64 = windows.iter().map(|[columns, rows]| bytes(columns.len(), rows.len())).sum();
-    pack(&windows, side, all.div_ceil(all.div_ceil(most).max(1)).max(1))
+    pack(&windows, side, most)
 }
 
 fn window(request: &Request<'_>, camera: &Camera) -> [Range<usize>; 2] {
     let [columns, rows] = Projection::new(request.mesh, camera).window();
     let wider = |pixels: Range<usize>, side: u32| {
+        if pixels.is_empty() {
+            return pixels;
+        }
         pixels.start.saturating_sub(MARGIN)..(pixels.end + MARGIN).min(side as usize)
     };
     [wider(columns, camera.width), wider(rows, camera.height)]
 }
 
-/// Cuts windows to parts of at most `side` pixels, and puts them in order into batches of at most
-/// `side` rows that bring back at most `most` bytes.
+/// Cuts windows to parts of at most `side` pixels, and puts them in order into batches of like
+/// size: at most `side` rows that bring back at most `most` bytes, as wide as the widest part.
 fn pack(windows: &[[Range<usize>; 2]], side: usize, most: u64) -> Vec<Vec<Part>> {
+    let widest = windows.iter().map(|[columns, _]| columns.len()).max().unwrap_or(0).min(side);
+    let row = bytes_of_row(widest).max(1);
+    let all: u64 = windows.iter().map(|[_, rows]| rows.len() as u64 * row).sum();
+    let alike = all.div_ceil(all.div_ceil(most.max(1)).max(1));
+    let most_rows = (alike / row).clamp(1, side as u64) as usize;
     let mut batches: Vec<Vec<Part>> = Vec::new();
-    let fits = |width: usize, height: usize| height <= side && bytes(width, height) <= most;
     for (view, [columns, rows]) in windows.iter().enumerate() {
         for left in columns.clone().step_by(side) {
             let columns = left..columns.end.min(left + side);
-            let most_rows = (most / bytes(columns.len(), 1)).clamp(1, side as u64) as usize;
             for first in rows.clone().step_by(most_rows) {
                 let rows = first..rows.end.min(first + most_rows);
-                let mut part = Part { view, columns: columns.clone(), rows, top: 0 };
-                let batch = batches.last_mut().filter(|batch| {
-                    let Extent { width, height } = extent(batch);
-                    let width = columns.len().max(width as usize);
-                    fits(width, height as usize + part.rows.len())
-                });
-                match batch {
-                    Some(batch) => {
-                        part.top = extent(batch).height as usize;
-                        batch.push(part);
-                    }
-                    None => batches.push(vec![part]),
+                let top = batches.last().map_or(most_rows, |batch| extent(batch).height as usize);
+                let part = Part { view, columns: columns.clone(), rows, top };
+                match batches.last_mut().filter(|_| top + part.rows.len() <= most_rows) {
+                    Some(batch) => batch.push(part),
+                    None => batches.push(vec![Part { top: 0, ..part }]),
                 }
             }
         }
@@ -110,9 +107,8 @@ fn pack(windows: &[[Range<usize>; 2]], side: usize, most: u64) -> Vec<Vec<Part>>
     batches
 }
 
-fn bytes(width: usize, height: usize) -> u64 {
-    let row = |bytes_per_pixel| u64::from(padded(width as u32, bytes_per_pixel));
-    row(ID_BYTES).max(row(COLOR_BYTES)) * height as u64
+fn bytes_of_row(width: usize) -> u64 {
+    u64::from(padded(width as u32, ID_BYTES.max(COLOR_BYTES)))
 }
 
 #[cfg(test)]
@@ -127,7 +123,7 @@ mod tests {
             for batch in pack(&windows, side, most) {
                 let Extent { width, height } = extent(&batch);
                 assert!(width as usize <= side && height as usize <= side);
-                assert!(batch.len() == 1 || bytes(width as usize, height as usize) <= most);
+                assert!(height == 1 || bytes_of_row(side.min(200)) * u64::from(height) <= most);
                 let mut top = 0;
                 for part in &batch {
                     assert_eq!(part.top, top);
