@@ -40,9 +40,10 @@ impl Device {
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
     pub fn open(restraint: &Restraint) -> Result<Self> {
         // GL is asked last: its loader talks to the terminal where there is no display.
-        let adapter = adapter(wgpu::Backends::PRIMARY, restraint)
-            .or_else(|_| adapter(wgpu::Backends::GL, restraint))
-            .map_err(|error| Error::NoGpu { reason: error.to_string() })?;
+        let adapter = adapter(wgpu::Backends::PRIMARY, restraint).or_else(|reason| {
+            adapter(wgpu::Backends::GL, restraint)
+                .map_err(|_| Error::NoGpu { reason: reason.to_string() })
+        })?;
         let own = adapter.limits();
         let mut limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
         limits.max_texture_dimension_2d =
