@@ -1,57 +1,182 @@
-//! Medians of rendering and lifting on a given OBJ mesh, and contact sheets of the rig to look at.
+//! Medians of rendering and lifting on a mesh: the CPU's renderer, a graphics driver's, and both
+//! side by side in one run.
 //!
-//! `cargo run --release -p semfm-views --example bench_render -- MESH.obj [SHEET.png]`
+//! ```sh
+//! cargo run --release -p semfm-views --example bench_render -- MESH [--who cpu,driver,lift]
+//!     [--shots 14x224,12x448] [--repeats 15] [--sheet SHEET.png] [--folder FOLDER]
+//! ```
+//!
+//! `--shots` are numbers of views and sides in pixels. `--folder` writes what another program needs
+//! to draw the same: the mesh, cameras and times in `bench.json`, and the pictures as raw arrays.
 #![allow(clippy::print_stdout)]
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_views::{
     Camera, EmbeddedView, LiftSettings, Paint, PatchEmbeddings, RenderSettings, RigSettings, View,
     lift, render, rig,
 };
+use serde_json::{Value, json};
 
-const REPEATS: usize = 15;
 const DIM: usize = 416;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().ok_or("usage: bench_render MESH.obj [SHEET.png]")?;
-    let mesh = read_obj(&std::fs::read_to_string(path)?)?;
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> Result<(), Failure> {
+    let order = Order::read(std::env::args().skip(1))?;
+    let mesh = semfm_geom::io::read_mesh(&order.mesh)?.mesh;
     println!("{} vertices, {} triangles", mesh.n_vertices(), mesh.n_faces());
-    let (settings, task) = (RenderSettings::default(), Task::default());
-    let draw = |cameras: &[Camera]| render(&mesh, &Paint::GREY, cameras, &settings, &task);
-
-    let default = rig(&mesh, &RigSettings::default())?;
-    let large = rig(&mesh, &RigSettings { count: 12, size: 448, ..Default::default() })?;
-    report("rig of 14", || rig(&mesh, &RigSettings::default()).map(drop))?;
-    report("render 14 views at 224 px", || draw(&default).map(drop))?;
-    report("render 12 views at 448 px", || draw(&large).map(drop))?;
-
-    bench_driver(&mesh, [("14 views at 224 px", &default), ("12 views at 448 px", &large)])?;
-
-    let views = draw(&default)?;
-    let embedded: Vec<EmbeddedView> = views.iter().map(noise_tokens).collect();
-    for (name, settings) in
-        [("pull", LiftSettings::default()), ("unproject", LiftSettings::paper())]
-    {
-        let mut seen = 0;
-        report(&format!("lift by {name}, 14 views, d = {DIM}"), || {
-            seen = lift(&mesh, &embedded, &settings, &task)?.report.n_seen;
-            Ok(())
-        })?;
-        println!("    {seen} of {} samples seen", settings.n_samples);
+    let mut bench = Bench { order: &order, mesh: &mesh, times: Vec::new() };
+    for who in &order.who {
+        match who.as_str() {
+            "cpu" => bench.draw("cpu", &|cameras| {
+                let (settings, task) = (RenderSettings::default(), Task::default());
+                render(&mesh, &Paint::GREY, cameras, &settings, &task)
+            })?,
+            "driver" => bench_driver(&mut bench)?,
+            "lift" => bench_lift(&mut bench)?,
+            other => return Err(format!("--who: cpu, driver or lift, not {other}").into()),
+        }
     }
-    if let Some(sheet) = arguments.next() {
-        save_sheet(&views, &sheet)?;
+    if let Some(folder) = &order.folder {
+        let array = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes);
+        array("vertices.f64", bytemuck::cast_slice(mesh.vertices()))?;
+        array("faces.u32", bytemuck::cast_slice(mesh.faces()))?;
+        let shots: Result<Vec<Value>, Failure> =
+            order.shots.iter().map(|shot| Ok(shot.told(&shot.cameras(&mesh)?))).collect();
+        let report = json!({ "mesh": order.mesh, "shots": shots?, "times": bench.times });
+        std::fs::write(folder.join("bench.json"), serde_json::to_vec_pretty(&report)?)?;
     }
     Ok(())
 }
 
+/// What was asked for.
+struct Order {
+    mesh: PathBuf,
+    who: Vec<String>,
+    shots: Vec<Shot>,
+    repeats: usize,
+    sheet: Option<PathBuf>,
+    folder: Option<PathBuf>,
+}
+
+impl Order {
+    fn read(mut arguments: impl Iterator<Item = String>) -> Result<Self, Failure> {
+        let mesh = arguments.next().ok_or("which mesh?")?.into();
+        let list = |text: &str| text.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let (mut who, mut shots) = (list("cpu,driver,lift"), list("14x224,12x448"));
+        let (mut repeats, mut sheet, mut folder) = (15, None, None);
+        while let Some(option) = arguments.next() {
+            let value = arguments.next().ok_or_else(|| format!("{option} needs a value"))?;
+            match option.as_str() {
+                "--who" => who = list(&value),
+                "--shots" => shots = list(&value),
+                "--repeats" => repeats = value.parse()?,
+                "--sheet" => sheet = Some(value.into()),
+                "--folder" => folder = Some(value.into()),
+                _ => return Err(format!("there is no option {option}").into()),
+            }
+        }
+        let shots = shots.iter().map(|shot| Shot::read(shot)).collect::<Result<_, _>>()?;
+        Ok(Self { mesh, who, shots, repeats, sheet, folder })
+    }
+}
+
+/// Views of one size.
+#[derive(Clone, Copy)]
+struct Shot {
+    count: usize,
+    size: u32,
+}
+
+impl Shot {
+    fn read(text: &str) -> Result<Self, Failure> {
+        let (count, size) = text.split_once('x').ok_or("--shots: such as 14x224,12x448")?;
+        Ok(Self { count: count.parse()?, size: size.parse()? })
+    }
+
+    fn cameras(self, mesh: &Mesh) -> semfm_views::Result<Vec<Camera>> {
+        rig(mesh, &RigSettings { count: self.count, size: self.size, ..Default::default() })
+    }
+
+    /// For other programs: matrices are rows.
+    fn told(self, cameras: &[Camera]) -> Value {
+        let cameras = cameras.iter().map(|camera| {
+            let pose = camera.camera_from_object;
+            json!({
+                "fx": camera.fx, "fy": camera.fy, "cx": camera.cx, "cy": camera.cy,
+                "rotation": pose.matrix3.transpose().to_cols_array_2d(),
+                "translation": pose.translation.to_array(),
+            })
+        });
+        json!({ "count": self.count, "size": self.size, "cameras": cameras.collect::<Vec<_>>() })
+    }
+}
+
+struct Bench<'a> {
+    order: &'a Order,
+    mesh: &'a Mesh,
+    times: Vec<Value>,
+}
+
+impl Bench<'_> {
+    /// Draws every shot `repeats` times.
+    fn draw(
+        &mut self,
+        who: &str,
+        draw: &dyn Fn(&[Camera]) -> semfm_views::Result<Vec<View>>,
+    ) -> Result<(), Failure> {
+        for (k, shot) in self.order.shots.iter().enumerate() {
+            let cameras = shot.cameras(self.mesh)?;
+            let name = format!("{who}: {} views at {} px", shot.count, shot.size);
+            let mut views = Vec::new();
+            let [wall, cpu] = self.time(&name, shot.count, || {
+                views = draw(&cameras)?;
+                Ok(())
+            })?;
+            self.times.push(json!({
+                "who": who, "count": shot.count, "size": shot.size, "wall_ms": wall, "cpu_ms": cpu,
+            }));
+            if let Some(folder) = &self.order.folder {
+                write_pictures(folder, &format!("{who}-{}x{}", shot.count, shot.size), &views)?;
+            }
+            if let Some(sheet) = self.order.sheet.as_ref().filter(|_| k == 0) {
+                save_sheet(&views, sheet)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Medians of wall and process CPU time in milliseconds.
+    fn time(
+        &self,
+        name: &str,
+        n_views: usize,
+        mut work: impl FnMut() -> Result<(), Failure>,
+    ) -> Result<[f64; 2], Failure> {
+        let mut times = Vec::new();
+        for _ in 0..self.order.repeats {
+            let (wall, cpu) = (Instant::now(), cpu_seconds());
+            work()?;
+            times.push([wall.elapsed().as_secs_f64(), cpu_seconds() - cpu]);
+        }
+        let median = |which: usize| {
+            let mut values: Vec<f64> = times.iter().map(|time| time[which]).collect();
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2] * 1e3
+        };
+        let [wall, cpu] = [median(0), median(1)];
+        let per_view = wall / n_views as f64;
+        println!("{name}: {wall:.1} ms wall ({per_view:.2} a view), {cpu:.1} ms CPU");
+        Ok([wall, cpu])
+    }
+}
+
 /// The same pictures by a graphics driver, where there is one.
 #[cfg(feature = "gpu")]
-fn bench_driver(mesh: &Mesh, shots: [(&str, &Vec<Camera>); 2]) -> semfm_views::Result<()> {
+fn bench_driver(bench: &mut Bench<'_>) -> Result<(), Failure> {
     let start = Instant::now();
     let gpu = match semfm_views::GpuRenderer::new() {
         Ok(gpu) => gpu,
@@ -60,38 +185,35 @@ fn bench_driver(mesh: &Mesh, shots: [(&str, &Vec<Camera>); 2]) -> semfm_views::R
             return Ok(());
         }
     };
-    println!("{} opened in {:.0} ms", gpu.name(), start.elapsed().as_secs_f64() * 1e3);
-    let (settings, task) = (RenderSettings::default(), Task::default());
-    for (name, cameras) in shots {
-        report(&format!("driver: {name}"), || {
-            gpu.render(mesh, &Paint::GREY, cameras, &settings, &task).map(drop)
-        })?;
-    }
-    Ok(())
+    let opened = start.elapsed().as_secs_f64() * 1e3;
+    println!("driver: {} opened in {opened:.0} ms", gpu.name());
+    bench.times.push(json!({ "who": "driver", "adapter": gpu.name(), "open_ms": opened }));
+    let mesh = bench.mesh;
+    bench.draw("driver", &|cameras| {
+        gpu.render(mesh, &Paint::GREY, cameras, &RenderSettings::default(), &Task::default())
+    })
 }
 
 #[cfg(not(feature = "gpu"))]
-fn bench_driver(_: &Mesh, _: [(&str, &Vec<Camera>); 2]) -> semfm_views::Result<()> {
+fn bench_driver(_: &mut Bench<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Wall and process CPU time, medians.
-fn report(
-    name: &str,
-    mut work: impl FnMut() -> semfm_views::Result<()>,
-) -> semfm_views::Result<()> {
-    let mut times = Vec::new();
-    for _ in 0..REPEATS {
-        let (wall, cpu) = (Instant::now(), cpu_seconds());
-        work()?;
-        times.push((wall.elapsed().as_secs_f64(), cpu_seconds() - cpu));
+fn bench_lift(bench: &mut Bench<'_>) -> Result<(), Failure> {
+    let (mesh, task) = (bench.mesh, Task::default());
+    let cameras = rig(mesh, &RigSettings::default())?;
+    let views = render(mesh, &Paint::GREY, &cameras, &RenderSettings::default(), &task)?;
+    let embedded: Vec<EmbeddedView> = views.iter().map(noise_tokens).collect();
+    for (name, settings) in
+        [("pull", LiftSettings::default()), ("unproject", LiftSettings::paper())]
+    {
+        let mut seen = 0;
+        bench.time(&format!("lift by {name}, 14 views, d = {DIM}"), 14, || {
+            seen = lift(mesh, &embedded, &settings, &task)?.report.n_seen;
+            Ok(())
+        })?;
+        println!("    {seen} of {} samples seen", settings.n_samples);
     }
-    let median = |pick: fn(&(f64, f64)) -> f64| {
-        let mut values: Vec<f64> = times.iter().map(pick).collect();
-        values.sort_by(f64::total_cmp);
-        values[REPEATS / 2] * 1e3
-    };
-    println!("{name}: {:.1} ms wall, {:.1} ms CPU", median(|t| t.0), median(|t| t.1));
     Ok(())
 }
 
@@ -120,7 +242,16 @@ fn noise_tokens(view: &View) -> EmbeddedView {
     EmbeddedView { camera: view.camera, patches }
 }
 
-fn save_sheet(views: &[View], path: &str) -> image::ImageResult<()> {
+/// All views of a shot, one after the other, as raw arrays.
+fn write_pictures(folder: &Path, name: &str, views: &[View]) -> std::io::Result<()> {
+    let all = |of: fn(&View) -> &[u8]| views.iter().flat_map(of).copied().collect::<Vec<u8>>();
+    let write = |kind: &str, bytes| std::fs::write(folder.join(format!("{name}.{kind}")), bytes);
+    write("triangles.i32", all(|view| bytemuck::cast_slice(&view.triangles)))?;
+    write("depth.f32", all(|view| bytemuck::cast_slice(&view.depth)))?;
+    write("rgb.u8", all(|view| &view.rgb))
+}
+
+fn save_sheet(views: &[View], path: &Path) -> image::ImageResult<()> {
     let side = views[0].camera.width;
     let columns = 5;
     let mut sheet =
@@ -132,28 +263,4 @@ fn save_sheet(views: &[View], path: &str) -> image::ImageResult<()> {
         }
     }
     sheet.save(path)
-}
-
-/// Positions and triangles of a plain OBJ file: enough for a benchmark.
-fn read_obj(text: &str) -> Result<Mesh, Box<dyn std::error::Error>> {
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let xyz = words.take(3).map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-                vertices.push(DVec3::from_slice(&xyz));
-            }
-            Some("f") => {
-                let ids = words
-                    .map(|word| {
-                        word.split('/').next().unwrap_or_default().parse::<u32>().map(|id| id - 1)
-                    })
-                    .collect::<Result<Vec<u32>, _>>()?;
-                faces.extend((2..ids.len()).map(|k| [ids[0], ids[k - 1], ids[k]]));
-            }
-            _ => {}
-        }
-    }
-    Ok(Mesh::new(vertices, faces)?)
 }

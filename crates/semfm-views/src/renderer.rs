@@ -2,6 +2,8 @@
 
 use std::fmt;
 use std::str::FromStr;
+#[cfg(feature = "gpu")]
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use semfm_geom::{Mesh, Task};
 
@@ -50,9 +52,11 @@ impl FromStr for RendererChoice {
 pub struct Renderer {
     #[cfg(feature = "gpu")]
     gpu: Option<GpuRenderer>,
-    /// Whether the CPU takes over what the driver refuses.
+    /// Whether the CPU takes over what the driver refuses, and whether it did the last time.
     #[cfg(feature = "gpu")]
     yielding: bool,
+    #[cfg(feature = "gpu")]
+    yielded: AtomicBool,
     note: Option<String>,
 }
 
@@ -64,8 +68,16 @@ impl Renderer {
             gpu: None,
             #[cfg(feature = "gpu")]
             yielding: true,
+            #[cfg(feature = "gpu")]
+            yielded: AtomicBool::new(false),
             note: None,
         }
+    }
+
+    /// The renderer on a driver; where it is `yielding`, the CPU takes over what the driver refuses.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn by(gpu: GpuRenderer, yielding: bool) -> Self {
+        Self { gpu: Some(gpu), yielding, ..Self::cpu() }
     }
 
     /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: they
@@ -87,10 +99,7 @@ impl Renderer {
                 "views are drawn on the CPU, exactly; {} would draw them there, too",
                 gpu.name()
             )),
-            (_, Some(gpu)) => {
-                let yielding = choice == RendererChoice::Auto;
-                Ok(Self { gpu: Some(gpu?), yielding, note: None })
-            }
+            (_, Some(gpu)) => Ok(Self::by(gpu?, choice == RendererChoice::Auto)),
         }
     }
 
@@ -113,10 +122,10 @@ impl Renderer {
         self.note.as_deref()
     }
 
-    /// Who draws, for reports.
+    /// Who draws, for reports; once something was drawn, who drew it.
     pub fn name(&self) -> String {
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = &self.gpu {
+        if let Some(gpu) = self.gpu.as_ref().filter(|_| !self.yielded.load(Ordering::Relaxed)) {
             return gpu.name();
         }
         "CPU".to_owned()
@@ -126,8 +135,8 @@ impl Renderer {
     /// differ from the CPU's in single pixels at edges.
     ///
     /// # Errors
-    /// As [`render`](crate::render()) and, of a driver that was asked for by name, [`Error::Gpu`]
-    /// and [`Error::BeyondGpu`].
+    /// As [`render`](crate::render()) and, of a driver that was asked for by name, [`Error::Gpu`],
+    /// [`Error::BeyondGpu`] and [`Error::NoGpu`]; for [`RendererChoice::Auto`] the CPU draws then.
     pub fn render(
         &self,
         mesh: &Mesh,
@@ -138,9 +147,14 @@ impl Renderer {
     ) -> Result<Vec<View>> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &self.gpu {
-            match gpu.render(mesh, paint, cameras, settings, task) {
-                Err(Error::Gpu { .. } | Error::BeyondGpu { .. }) if self.yielding => {}
-                answer => return answer,
+            let answer = gpu.render(mesh, paint, cameras, settings, task);
+            let refused = matches!(
+                answer,
+                Err(Error::Gpu { .. } | Error::BeyondGpu { .. } | Error::NoGpu { .. })
+            );
+            self.yielded.store(self.yielding && refused, Ordering::Relaxed);
+            if !(self.yielding && refused) {
+                return answer;
             }
         }
         render(mesh, paint, cameras, settings, task)

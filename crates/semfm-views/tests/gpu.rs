@@ -13,27 +13,32 @@ use std::sync::OnceLock;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_views::{
-    Camera, Error, GpuRenderer, Paint, RenderSettings, RigSettings, View, render, rig,
+    Camera, Error, GpuRenderer, Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View,
+    render, rig,
 };
 use shapes::{lumpy_torus, zoo};
 
 /// Drivers snap corners to a 256th of a pixel: that share of the pixels may see a neighbour.
 const OTHER_TRIANGLE: f64 = 1e-3;
 
+/// The environment of a machine without drivers: neither Vulkan nor EGL finds one.
+const NO_DRIVERS: [(&str, &str); 4] = [
+    ("VK_DRIVER_FILES", "/nonexistent.json"),
+    ("VK_ICD_FILENAMES", "/nonexistent.json"), // loaders of before 2022
+    ("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json"),
+    ("LIBGL_DRIVERS_PATH", "/nonexistent"),
+];
+
 fn gpu() -> Option<&'static GpuRenderer> {
-    static GPU: OnceLock<Option<GpuRenderer>> = OnceLock::new();
-    let gpu = GPU.get_or_init(|| match GpuRenderer::new() {
+    static GPU: OnceLock<Result<GpuRenderer, Error>> = OnceLock::new();
+    match GPU.get_or_init(GpuRenderer::new) {
         Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os("SEMFM_DEMAND_GPU").is_none() => {
+        Err(error @ Error::NoGpu { .. }) if std::env::var_os("SEMFM_DEMAND_GPU").is_none() => {
             eprintln!("SKIPPED: {error}");
             None
         }
-        Err(error) => panic!("SEMFM_DEMAND_GPU is set, but: {error}"),
-    });
-    if gpu.is_none() {
-        eprintln!("SKIPPED: no graphics adapter");
+        Err(error) => panic!("a driver was demanded, or does not open: {error}"),
     }
-    gpu.as_ref()
 }
 
 fn both(gpu: &GpuRenderer, mesh: &Mesh, paint: &Paint<'_>, cameras: &[Camera]) -> [Vec<View>; 2] {
@@ -81,7 +86,7 @@ fn cameras(mesh: &Mesh, count: usize, size: u32) -> Vec<Camera> {
 fn the_zoo_looks_the_same() {
     let Some(gpu) = gpu() else { return };
     let (mut different, mut n) = (0, 0);
-    for (name, mesh) in zoo() {
+    for (name, mesh) in zoo().into_iter().chain(semfm_geom::zoo::all()) {
         // 100 is not a multiple of 64: rows come back padded.
         let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 5, 100));
         let counts = compare(name, &views);
@@ -99,9 +104,11 @@ fn every_paint_looks_the_same() {
     let places: Vec<[f32; 3]> =
         mesh.vertices().iter().map(|p| (p.normalize() * 0.5 + 0.5).as_vec3().to_array()).collect();
     let stripes = |face: usize, w: [f64; 3]| [w[0] as f32, (face % 2) as f32, w[2] as f32];
-    for (name, paint) in
-        [("vertices", Paint::Vertices(&places)), ("function", Paint::Surface(&stripes))]
-    {
+    for (name, paint) in [
+        ("vertices", Paint::Vertices(&places)),
+        ("function", Paint::Surface(&stripes)),
+        ("normals", Paint::Normals),
+    ] {
         let (different, n) = compare(name, &both(gpu, &mesh, &paint, &shots));
         assert!(different as f64 <= OTHER_TRIANGLE * n as f64, "{name}: {different} of {n}");
     }
@@ -131,21 +138,75 @@ fn what_is_behind_the_camera_is_not_drawn() {
 }
 
 #[test]
-fn what_a_driver_cannot_take_is_an_error() {
+fn other_settings_look_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let (mesh, task) = (lumpy_torus(20), Task::default());
+    let mut shots = cameras(&mesh, 2, 90);
+    shots[1].cx += 60.0; // cut off by the picture's right side
+    let background = [0.5, 0.1, 0.9];
+    let mut looks: Vec<RenderSettings> = [1, 3, 4]
+        .map(|supersampling| RenderSettings { supersampling, background, ..Default::default() })
+        .into();
+    looks.push(RenderSettings { occlusion: 1.0, ..Default::default() });
+    looks.push(RenderSettings { edges: 0.8, ..Default::default() });
+    for settings in looks {
+        let by_gpu = gpu.render(&mesh, &Paint::GREY, &shots, &settings, &task).unwrap();
+        let by_cpu = render(&mesh, &Paint::GREY, &shots, &settings, &task).unwrap();
+        assert_eq!(by_gpu[0].rgb[..3], by_cpu[0].rgb[..3], "the background");
+        let (different, n) = compare(&settings.to_string(), &[by_gpu, by_cpu]);
+        assert!(different as f64 <= 2.0 * OTHER_TRIANGLE * n as f64, "{different} of {n}");
+    }
+}
+
+#[test]
+fn cancelled_work_is_an_error_and_the_next_is_done() {
     let Some(gpu) = gpu() else { return };
     let mesh = lumpy_torus(8);
-    let huge = cameras(&mesh, 1, 8192);
-    let settings = RenderSettings { supersampling: 8, ..Default::default() };
-    let answer = gpu.render(&mesh, &Paint::GREY, &huge, &settings, &Task::default());
-    assert!(matches!(answer, Err(Error::BeyondGpu { .. })), "{answer:?}");
+    let shots = cameras(&mesh, 1, 32);
     let cancelled = Task::default();
     cancelled.cancel();
-    let shots = cameras(&mesh, 1, 32);
-    assert!(
-        gpu.render(&mesh, &Paint::GREY, &shots, &RenderSettings::default(), &cancelled).is_err()
-    );
-    // And the renderer still draws.
+    let answer = gpu.render(&mesh, &Paint::GREY, &shots, &RenderSettings::default(), &cancelled);
+    assert!(matches!(answer, Err(Error::Geom(semfm_geom::Error::Cancelled))), "{answer:?}");
     assert_eq!(both(gpu, &mesh, &Paint::GREY, &shots)[0].len(), 1);
+}
+
+#[test]
+fn threads_may_share_a_driver() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = lumpy_torus(16);
+    let shots = cameras(&mesh, 4, 80);
+    let draw = || both(gpu, &mesh, &Paint::GREY, &shots)[0].clone();
+    let alone = draw();
+    std::thread::scope(|scope| {
+        let others: Vec<_> = (0..4).map(|_| scope.spawn(draw)).collect();
+        others.into_iter().for_each(|other| assert!(other.join().unwrap() == alone));
+    });
+}
+
+/// Runs in a process of its own, since drivers are looked for once.
+#[test]
+fn without_a_driver_the_cpu_draws_unless_a_driver_was_demanded() {
+    const CHILD: &str = "SEMFM_TEST_WITHOUT_DRIVERS";
+    if std::env::var_os(CHILD).is_some() {
+        let refused = Renderer::open(RendererChoice::Gpu).unwrap_err();
+        assert!(matches!(refused, Error::NoGpu { .. }), "{refused}");
+        let message = refused.to_string();
+        assert!(message.starts_with("no graphics adapter: expected a Vulkan"), "{message}");
+        let automatic = Renderer::open(RendererChoice::Auto).unwrap();
+        assert_eq!(automatic.name(), "CPU");
+        assert!(automatic.note().is_some_and(|note| note.contains("no graphics adapter")));
+        return;
+    }
+    let name = "without_a_driver_the_cpu_draws_unless_a_driver_was_demanded";
+    let output = std::process::Command::new(std::env::current_exe().unwrap())
+        .args([name, "--exact", "--nocapture"])
+        .env(CHILD, "1")
+        .envs(NO_DRIVERS)
+        .output()
+        .unwrap();
+    let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(output.status.success(), "{out}{err}");
+    assert!(out.contains("1 passed"), "{out}");
 }
 
 #[test]
@@ -153,18 +214,30 @@ fn real_objects_look_the_same() {
     let Some(gpu) = gpu() else { return };
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let shared = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from);
-    let objects = shared.join("data/objects/4_water_containers");
-    let Ok(entries) = std::fs::read_dir(&objects) else {
+    let objects = shared.join("data/objects");
+    let Ok(categories) = std::fs::read_dir(&objects) else {
         eprintln!("SKIPPED: no shared data at {} (set SEMFM_SHARED)", objects.display());
         return;
     };
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-        .filter(|path| path.extension().is_some_and(|kind| kind != "json"))
+    let listed = |folder: std::fs::ReadDir| {
+        let mut paths: Vec<PathBuf> =
+            folder.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+        paths.sort();
+        paths
+    };
+    let files: Vec<PathBuf> = listed(categories)
+        .iter()
+        .filter_map(|category| std::fs::read_dir(category).ok())
+        .flat_map(|folder| {
+            let mut meshes = listed(folder);
+            meshes.retain(|path| path.extension().is_some_and(|kind| kind == "obj"));
+            meshes.truncate(3);
+            meshes
+        })
         .collect();
-    files.sort();
+    assert!(files.len() >= 12, "{files:?}");
     let (mut different, mut n) = (0, 0);
-    for path in files.iter().take(8) {
+    for path in &files {
         let mesh = semfm_geom::io::read_mesh(path).unwrap().mesh;
         let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 4, 224));
         let counts = compare(&path.display().to_string(), &views);

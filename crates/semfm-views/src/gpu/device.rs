@@ -1,8 +1,28 @@
 //! The graphics driver: found, opened, and listened to.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use crate::{Error, Result};
+
+/// A driver that has not finished a batch after this long hangs. The slowest software driver takes
+/// a hundredth of it.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Less than what the driver has, so that tests meet its limits.
+pub(super) struct Restraint {
+    pub texture_side: u32,
+    pub buffer_bytes: u64,
+    /// Share of the driver's memory beyond which it says that there is none left.
+    pub memory_percent: u8,
+}
+
+impl Default for Restraint {
+    fn default() -> Self {
+        Self { texture_side: u32::MAX, buffer_bytes: u64::MAX, memory_percent: 95 }
+    }
+}
 
 /// An open driver. What goes wrong inside it is kept until somebody asks with [`Device::check`];
 /// left alone, the library would panic.
@@ -18,13 +38,17 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
-    pub fn open() -> Result<Self> {
+    pub fn open(restraint: &Restraint) -> Result<Self> {
         // GL is asked last: its loader talks to the terminal where there is no display.
-        let adapter = adapter(wgpu::Backends::PRIMARY)
-            .or_else(|_| adapter(wgpu::Backends::GL))
-            .map_err(|error| Error::NoGpu { reason: error.to_string() })?;
-        let limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits());
-        let limits = wgpu::Limits { max_buffer_size: adapter.limits().max_buffer_size, ..limits };
+        let adapter = adapter(wgpu::Backends::PRIMARY, restraint).or_else(|reason| {
+            adapter(wgpu::Backends::GL, restraint)
+                .map_err(|_| Error::NoGpu { reason: reason.to_string() })
+        })?;
+        let own = adapter.limits();
+        let mut limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
+        limits.max_texture_dimension_2d =
+            limits.max_texture_dimension_2d.min(restraint.texture_side);
+        limits.max_buffer_size = own.max_buffer_size.min(restraint.buffer_bytes);
         let description = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&description))
             .map_err(|error| Error::Gpu { reason: error.to_string() })?;
@@ -32,11 +56,8 @@ impl Device {
         let heard = fault.clone();
         device.on_uncaptured_error(Arc::new(move |error| note(&heard, error.to_string())));
         let heard = fault.clone();
-        device.set_device_lost_callback(move |reason, message| {
-            // Dropping a device is reported as a loss, too.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note(&heard, format!("the device was lost: {message}"));
-            }
+        device.set_device_lost_callback(move |_, message| {
+            note(&heard, format!("the device was lost: {message}"));
         });
         Ok(Self { device, queue, adapter: adapter.get_info(), fault })
     }
@@ -50,20 +71,56 @@ impl Device {
         fault.map_or(Ok(()), |reason| Err(Error::Gpu { reason }))
     }
 
-    /// Waits until everything that was sent has been done.
-    pub fn wait(&self) -> Result<()> {
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+    /// A buffer filled with `bytes`, whose number is a multiple of four.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] where the driver has no memory for it, or is lost.
+    pub fn buffer(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes.len() as u64,
+            usage,
+            mapped_at_creation: true,
+        });
+        let mapped = buffer.slice(..).get_mapped_range_mut();
+        self.check()?; // knows more of the reason
+        mapped.map_err(|error| Error::Gpu { reason: error.to_string() })?.copy_from_slice(bytes);
+        buffer.unmap();
+        Ok(buffer)
+    }
+
+    /// Waits until a submission has been done.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] for what went wrong until then, and for a driver that hangs.
+    pub fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        let poll = wgpu::PollType::Wait {
+            submission_index: Some(submission.clone()),
+            timeout: Some(PATIENCE),
+        };
+        // The library panics where the driver is lost in this very moment.
+        let waited = catch_unwind(AssertUnwindSafe(|| self.device.poll(poll)));
         self.check()?;
-        waited.map(drop).map_err(|error| Error::Gpu { reason: error.to_string() })
+        let reason = match waited {
+            Ok(Ok(_)) => return Ok(()),
+            Ok(Err(error)) => error.to_string(),
+            Err(_) => "the device was lost".to_owned(),
+        };
+        Err(Error::Gpu { reason })
     }
 }
 
 /// The fastest adapter behind some interfaces.
 fn adapter(
     backends: wgpu::Backends,
+    restraint: &Restraint,
 ) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let description = wgpu::InstanceDescriptor {
         backends,
+        memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
+            for_resource_creation: Some(restraint.memory_percent),
+            for_device_loss: None,
+        },
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     };
     let wanted = wgpu::RequestAdapterOptions {

@@ -1,10 +1,8 @@
 //! The three programs that the driver runs, and what they read.
 
-use wgpu::util::DeviceExt;
-
 use super::device::Device;
 
-/// Triangle (from 1) and bits of the depth of a pixel.
+/// Triangle and bits of the depth of a pixel.
 pub(super) const ID_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 pub(super) const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -36,6 +34,8 @@ pub(super) struct Pipelines {
     pub average: wgpu::RenderPipeline,
     pub camera_layout: wgpu::BindGroupLayout,
     pub samples_layout: wgpu::BindGroupLayout,
+    /// Reads the mean of what lies around a position.
+    pub between: wgpu::Sampler,
 }
 
 impl Pipelines {
@@ -55,13 +55,14 @@ impl Pipelines {
         let samples = (
             1,
             wgpu::BindingType::Texture {
-                sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                sample_type: wgpu::TextureSampleType::Float { filterable: true },
                 view_dimension: wgpu::TextureViewDimension::D2,
                 multisampled: false,
             },
         );
+        let between = (2, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering));
         let camera_layout = layout(device, &[camera]);
-        let samples_layout = layout(device, &[camera, samples]);
+        let samples_layout = layout(device, &[camera, samples, between]);
         let program = Program { device, module: &module };
         Self {
             identify: program.of_mesh(&camera_layout, "place", "identify", ID_FORMAT),
@@ -69,6 +70,11 @@ impl Pipelines {
             average: program.pipeline(&samples_layout, "cover", "average", COLOR_FORMAT, &[], None),
             camera_layout,
             samples_layout,
+            between: device.create_sampler(&wgpu::SamplerDescriptor {
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
         }
     }
 }
@@ -153,13 +159,4 @@ impl Program<'_> {
             cache: None,
         })
     }
-}
-
-/// A buffer filled with `bytes`.
-pub(super) fn buffer(device: &Device, bytes: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    device.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: None,
-        contents: bytes,
-        usage,
-    })
 }

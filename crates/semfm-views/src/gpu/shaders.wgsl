@@ -24,10 +24,10 @@ struct Place {
 
 @vertex
 fn place(corner: Corner, @builtin(vertex_index) index: u32) -> Place {
-    return Place(camera.clip_from_mesh * vec4(corner.position, 1.0), index / 3u + 1u);
+    return Place(camera.clip_from_mesh * vec4(corner.position, 1.0), index / 3u);
 }
 
-// Triangle counted from 1, and the bits of its depth: one integer target, which every driver draws.
+// Triangle and the bits of its depth: one integer target, which every driver draws.
 @fragment
 fn identify(place: Place) -> @location(0) vec2<u32> {
     return vec2(place.triangle, bitcast<u32>(1.0 / place.clip.w));
@@ -50,8 +50,8 @@ fn paint(lit: Lit) -> @location(0) vec4<f32> {
     return vec4(lit.color, 1.0);
 }
 
-// The mean of a pixel's samples.
 @group(0) @binding(1) var samples: texture_2d<f32>;
+@group(0) @binding(2) var between: sampler;
 
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
@@ -59,15 +59,19 @@ fn cover(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
     return vec4(corner * 4.0 - 1.0, 0.0, 1.0);
 }
 
+// The mean of a pixel's samples; of an even number, four at a time, read from where they meet.
 @fragment
 fn average(@builtin(position) place: vec4<f32>) -> @location(0) vec4<f32> {
     let per_pixel = camera.per_pixel;
     let first = vec2<u32>(place.xy) * per_pixel;
+    let step = 2u - (per_pixel & 1u);
+    let texel = 1.0 / vec2<f32>(textureDimensions(samples));
     var sum = vec4(0.0);
-    for (var row = 0u; row < per_pixel; row++) {
-        for (var column = 0u; column < per_pixel; column++) {
-            sum += textureLoad(samples, first + vec2(column, row), 0);
+    for (var row = 0u; row < per_pixel; row += step) {
+        for (var column = 0u; column < per_pixel; column += step) {
+            let middle = vec2<f32>(first + vec2(column, row)) + 0.5 * f32(step);
+            sum += textureSampleLevel(samples, between, middle * texel, 0.0);
         }
     }
-    return sum / f32(per_pixel * per_pixel);
+    return sum * f32(step * step) / f32(per_pixel * per_pixel);
 }

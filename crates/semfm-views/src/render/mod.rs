@@ -13,6 +13,7 @@ mod shade;
 pub(crate) mod triangle;
 
 use std::fmt;
+#[cfg(feature = "gpu")]
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -25,7 +26,7 @@ pub use shade::{CornerNormals, Paint};
 
 use crate::{Camera, Error, Result, View};
 pub use occlusion::openness;
-use raster::Raster;
+use raster::{DrawAll, Raster};
 use triangle::Projection;
 
 /// Samples of one z-buffer: larger pictures are drawn in bands of rows, which bounds the memory.
@@ -200,30 +201,43 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Colours a picture of which somebody else found, for every sample, the triangle and its depth.
+    /// Colours a window of a view (columns and rows of pixels) of which somebody else found, for
+    /// every sample, the triangle and its depth.
     #[cfg(feature = "gpu")]
-    pub fn shade_hits(&self, camera: &Camera, triangles: &[i32], depth: &[f32]) -> Vec<u8> {
-        let per_pixel = self.settings.supersampling;
-        let projection = Projection::new(self.mesh, camera);
-        let raster = Raster::of(per_pixel, (camera.width * per_pixel) as usize, triangles, depth);
-        let mut rgb = vec![0; camera.width as usize * camera.height as usize * 3];
-        shade::Shader::new(&projection, self).mix(&raster, &mut rgb);
-        rgb
+    pub fn shade_hits(
+        &self,
+        view: &mut View,
+        [columns, rows]: [Range<usize>; 2],
+        samples: impl Iterator<Item = (i32, f32)>,
+    ) {
+        let projection = Projection::new(self.mesh, &view.camera);
+        let width = view.camera.width as usize;
+        let first = rows.start * width * 3;
+        let raster = Raster::of(self.settings.supersampling, columns, rows, samples);
+        shade::Shader::new(&projection, self).mix(&raster, &mut view.rgb[first..], width);
+    }
+}
+
+/// A view in which nothing is seen.
+pub(crate) fn blank(camera: &Camera, settings: &RenderSettings) -> View {
+    let n_pixels = camera.width as usize * camera.height as usize;
+    View {
+        camera: *camera,
+        rgb: shade::background(settings).repeat(n_pixels),
+        depth: vec![f32::INFINITY; n_pixels],
+        triangles: vec![-1; n_pixels],
     }
 }
 
 fn render_one(request: &Request<'_>, camera: &Camera) -> View {
+    let settings = request.settings;
     let (width, height) = (camera.width as usize, camera.height as usize);
     let projection = Projection::new(request.mesh, camera);
     let light = shade::Shader::new(&projection, request);
-    let mut view = View {
-        camera: *camera,
-        rgb: vec![0; width * height * 3],
-        depth: vec![0.0; width * height],
-        triangles: vec![0; width * height],
-    };
-    let samples_per_row = width * (request.settings.supersampling as usize).pow(2);
-    let rows_per_band = (BAND_SAMPLES / samples_per_row).clamp(1, height);
+    let mut view = blank(camera, settings);
+    let window = projection.window();
+    let samples_per_row = window[0].len() * (settings.supersampling as usize).pow(2);
+    let rows_per_band = (BAND_SAMPLES / samples_per_row.max(1)).clamp(1, height);
     let band_pixels = rows_per_band * width;
     view.rgb
         .par_chunks_mut(band_pixels * 3)
@@ -231,24 +245,28 @@ fn render_one(request: &Request<'_>, camera: &Camera) -> View {
         .enumerate()
         .for_each(|(band, (rgb, (depth, triangles)))| {
             let first = band * rows_per_band;
-            let rows = first..first + depth.len() / width;
-            trace(&projection, rows.clone(), depth, triangles);
-            light.colour(rows, rgb);
+            let [columns, rows] = window.clone();
+            let rows = rows.start.max(first)..rows.end.min(first + depth.len() / width);
+            if columns.is_empty() || rows.is_empty() {
+                return;
+            }
+            let mut rasters = [1, settings.supersampling]
+                .map(|per_pixel| Raster::new(per_pixel, columns.clone(), rows.clone()));
+            let draw = DrawAll { projection: &projection, rasters: &mut rasters };
+            pulp::Arch::new().dispatch(draw);
+            let [centres, samples] = rasters;
+            let skipped = (rows.start - first) * width;
+            let lines =
+                depth[skipped..].chunks_mut(width).zip(triangles[skipped..].chunks_mut(width));
+            for ((depth, triangles), hits) in lines.zip(centres.hits.chunks_exact(columns.len())) {
+                let pixels = depth[columns.clone()].iter_mut().zip(&mut triangles[columns.clone()]);
+                for ((depth, triangle), hit) in pixels.zip(hits) {
+                    *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
+                    *triangle = hit.face().map_or(-1, |face| face as i32);
+                }
+            }
+            light.mix(&samples, &mut rgb[skipped * 3..], width);
         });
     request.finish(&mut view);
     view
-}
-
-/// Depth and triangle at the centres of the pixels in `rows`.
-fn trace(
-    projection: &Projection<'_>,
-    rows: Range<usize>,
-    depth: &mut [f32],
-    triangles: &mut [i32],
-) {
-    let raster = Raster::new(projection, 1, rows);
-    for ((depth, triangle), hit) in depth.iter_mut().zip(triangles).zip(raster.hits) {
-        *depth = 1.0 / hit.inverse_depth(); // +∞ on the background
-        *triangle = hit.face().map_or(-1, |face| face as i32);
-    }
 }

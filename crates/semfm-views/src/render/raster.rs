@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::triangle::{LinearForm, Projection, TriangleForms};
+use super::triangle::{LinearForm, PixelBox, Projection, TriangleForms};
 
 /// The nearest triangle at a sample: bits of 1/z (f32, not negative, so they sort as it does) above
 /// the complement of the triangle's id. The larger of two hits is the nearer one, or the one with
@@ -29,7 +29,7 @@ impl Hit {
     }
 }
 
-/// Nearest triangle for a band of rows of a grid of samples.
+/// Nearest triangle for a window of a grid of samples.
 ///
 /// The grid has `per_pixel` samples along each side of a pixel; sample (i, j) looks through pixel
 /// position ((i + ½)/per_pixel, (j + ½)/per_pixel).
@@ -37,47 +37,39 @@ pub(crate) struct Raster {
     pub per_pixel: u32,
     /// Pixels from one sample to the next.
     spacing: f64,
-    /// Samples in a row.
-    pub width: usize,
-    /// Rows of the grid that this band covers.
+    /// Columns and rows of the grid that the window covers.
+    pub columns: Range<usize>,
     pub rows: Range<usize>,
-    /// What each sample sees (rows × width), row-major.
+    /// What each sample sees (rows × columns), row-major.
     pub hits: Vec<Hit>,
 }
 
 impl Raster {
-    /// Draws every triangle into the band of grid rows `rows`.
-    pub fn new(projection: &Projection<'_>, per_pixel: u32, rows: Range<usize>) -> Self {
-        let width = projection.camera.width as usize * per_pixel as usize;
-        let n_samples = width * rows.len();
-        let spacing = 1.0 / f64::from(per_pixel);
-        let hits = vec![Hit::NONE; n_samples];
-        let mut raster = Self { per_pixel, spacing, width, rows, hits };
-        for face in 0..projection.mesh.n_faces() {
-            let bounds = projection.pixel_box(face);
-            let columns = raster.samples_in(bounds.low[0], bounds.high[0], 0..width);
-            let rows = raster.samples_in(bounds.low[1], bounds.high[1], raster.rows.clone());
-            // Most triangles of a dense mesh miss every sample: leave before any arithmetic.
-            if columns.is_empty() || rows.is_empty() {
-                continue;
-            }
-            if let Some(forms) = projection.forms(face) {
-                raster.draw(face as u32, &forms, columns, rows);
-            }
-        }
-        raster
+    /// A window of pixels in which nothing is seen yet.
+    pub fn new(per_pixel: u32, columns: Range<usize>, rows: Range<usize>) -> Self {
+        let hits = vec![Hit::NONE; columns.len() * rows.len() * (per_pixel as usize).pow(2)];
+        Self::with(per_pixel, columns, rows, hits)
     }
 
-    /// A raster of a whole picture of which somebody else found the triangles (−1: none) and depths.
+    /// A window of pixels of which somebody else found the triangles (−1: none) and depths.
     #[cfg(feature = "gpu")]
-    pub fn of(per_pixel: u32, width: usize, triangles: &[i32], depth: &[f32]) -> Self {
-        let hit = |(&triangle, &depth): (&i32, &f32)| match u32::try_from(triangle) {
+    pub fn of(
+        per_pixel: u32,
+        columns: Range<usize>,
+        rows: Range<usize>,
+        samples: impl Iterator<Item = (i32, f32)>,
+    ) -> Self {
+        let hit = |(triangle, depth): (i32, f32)| match u32::try_from(triangle) {
             Ok(face) => Hit::new(1.0 / depth, face),
             Err(_) => Hit::NONE,
         };
-        let hits: Vec<Hit> = triangles.iter().zip(depth).map(hit).collect();
-        let rows = 0..hits.len() / width;
-        Self { per_pixel, spacing: 1.0 / f64::from(per_pixel), width, rows, hits }
+        Self::with(per_pixel, columns, rows, samples.map(hit).collect())
+    }
+
+    fn with(per_pixel: u32, columns: Range<usize>, rows: Range<usize>, hits: Vec<Hit>) -> Self {
+        let [columns, rows] = [columns, rows]
+            .map(|pixels| pixels.start * per_pixel as usize..pixels.end * per_pixel as usize);
+        Self { per_pixel, spacing: 1.0 / f64::from(per_pixel), columns, rows, hits }
     }
 
     /// Pixel position of the centre of a grid row or column.
@@ -85,21 +77,18 @@ impl Raster {
         (sample as f64 + 0.5) * self.spacing
     }
 
-    /// Grid rows or columns whose positions lie within [low, high], clipped to `allowed`.
-    fn samples_in(&self, low: f64, high: f64, allowed: Range<usize>) -> Range<usize> {
-        let per_pixel = f64::from(self.per_pixel);
-        // `as` saturates: an endless box is the whole range, an empty one none.
-        let end = (high * per_pixel + 0.5).max(0.0) as i32 as usize;
-        ceil(low * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
+    /// The grid columns and rows of a window that a rectangle can reach.
+    fn within(&self, bounds: PixelBox) -> [Range<usize>; 2] {
+        let reach = |k: usize, allowed: &Range<usize>| {
+            let per_pixel = f64::from(self.per_pixel);
+            // `as` saturates: an endless box is the whole range, an empty one none.
+            let end = (bounds.high[k] * per_pixel + 0.5).max(0.0) as i32 as usize;
+            ceil(bounds.low[k] * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
+        };
+        [reach(0, &self.columns), reach(1, &self.rows)]
     }
 
-    fn draw(
-        &mut self,
-        face: u32,
-        forms: &TriangleForms,
-        columns: Range<usize>,
-        rows: Range<usize>,
-    ) {
+    fn draw(&mut self, face: u32, forms: &TriangleForms, [columns, rows]: [Range<usize>; 2]) {
         let per_pixel = f64::from(self.per_pixel);
         let edges = forms.weights.map(|weight| Edge::new(weight, per_pixel));
         let [lowest, highest] = forms.bounds;
@@ -112,11 +101,41 @@ impl Raster {
             }
             let start = forms.inverse_depth.row(v) + 0.5 * slope;
             let mut column = span.start as f64;
-            let first = (row - self.rows.start) * self.width;
-            for hit in &mut self.hits[first..][span] {
+            let first = (row - self.rows.start) * self.columns.len();
+            let span =
+                first + span.start - self.columns.start..first + span.end - self.columns.start;
+            for hit in &mut self.hits[span] {
                 let inverse = at_least(lowest, at_most(highest, start + slope * column)) as f32;
                 *hit = (*hit).max(Hit::new(inverse, face));
                 column += 1.0;
+            }
+        }
+    }
+}
+
+/// Draws every triangle into some rasters at once: its forms are the same for all of them.
+pub(crate) struct DrawAll<'a> {
+    pub projection: &'a Projection<'a>,
+    pub rasters: &'a mut [Raster],
+}
+
+impl pulp::WithSimd for DrawAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for face in 0..self.projection.mesh.n_faces() {
+            let bounds = self.projection.pixel_box(face);
+            let mut forms = None;
+            for raster in &mut *self.rasters {
+                let within = raster.within(bounds);
+                // Most triangles of a dense mesh miss every sample: leave before any arithmetic.
+                if within.iter().any(Range::is_empty) {
+                    continue;
+                }
+                if let Some(forms) = forms.get_or_insert_with(|| self.projection.forms(face)) {
+                    raster.draw(face as u32, forms, within);
+                }
             }
         }
     }

@@ -1,13 +1,12 @@
 //! Colour: paint times light, averaged over the samples of each pixel.
 
 use std::fmt;
-use std::ops::Range;
 
 use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
 use super::raster::{Hit, Raster};
-use super::triangle::Projection;
+use super::triangle::{Projection, TriangleForms};
 use super::{RenderSettings, Request};
 use crate::{Camera, Error, Result};
 
@@ -105,6 +104,15 @@ pub(crate) fn light_direction(camera: &Camera, settings: &RenderSettings) -> DVe
     camera.camera_from_object.matrix3.transpose() * light
 }
 
+/// The bytes of a pixel of which every sample sees the background.
+pub(super) fn background(settings: &RenderSettings) -> [u8; 3] {
+    let mut sum = [0f32; 3];
+    for _ in 0..settings.supersampling.pow(2) {
+        sum = [0, 1, 2].map(|k| sum[k] + settings.background[k]);
+    }
+    sum.map(|sum| byte(sum * share(settings.supersampling)))
+}
+
 /// All that colouring a view needs.
 pub(super) struct Shader<'a> {
     projection: &'a Projection<'a>,
@@ -121,74 +129,10 @@ impl<'a> Shader<'a> {
         Self { projection, request, settings, light }
     }
 
-    /// Paints the pixels of `rows` into `rgb` (rows × width × 3).
-    pub fn colour(&self, rows: Range<usize>, rgb: &mut [u8]) {
-        let per_pixel = self.settings.supersampling as usize;
-        let grid_rows = rows.start * per_pixel..rows.end * per_pixel;
-        let raster = Raster::new(self.projection, self.settings.supersampling, grid_rows);
-        self.mix(&raster, rgb);
-    }
-
-    /// Paints the pixels under a raster into `rgb` (rows × width × 3): the mean of their samples.
-    pub fn mix(&self, raster: &Raster, rgb: &mut [u8]) {
-        let (per_pixel, grid_rows) = (raster.per_pixel as usize, raster.rows.clone());
-        let mut grid = raster.hits.chunks_exact(raster.width).zip(grid_rows);
-        let mut sums = vec![[0f32; 3]; raster.width / per_pixel];
-        let share = 255.0 / (per_pixel * per_pixel) as f32;
-        for pixels in rgb.chunks_exact_mut(sums.len() * 3) {
-            sums.fill([0.0; 3]);
-            for (hits, row) in grid.by_ref().take(per_pixel) {
-                self.add_row(raster, hits, raster.position(row), &mut sums);
-            }
-            for (byte, sum) in pixels.iter_mut().zip(sums.as_flattened()) {
-                *byte = (sum * share + 0.5) as u8; // saturates
-            }
-        }
-    }
-
-    /// Adds the colours of one row of samples at height `v` to the sums of its pixels. Neighbours
-    /// mostly see the same triangle, so its forms are made once per run.
-    fn add_row(&self, raster: &Raster, hits: &[Hit], v: f64, sums: &mut [[f32; 3]]) {
-        let mut column = 0;
-        for run in hits.chunk_by(|a, b| a.face() == b.face()) {
-            let columns = column..column + run.len();
-            column = columns.end;
-            let mut add = |column: usize, colour: [f32; 3]| {
-                let sum = &mut sums[column / raster.per_pixel as usize];
-                *sum = [0, 1, 2].map(|k| sum[k] + colour[k]);
-            };
-            let Some(face) = run[0].face().map(|face| face as usize) else {
-                columns.for_each(|column| add(column, self.settings.background));
-                continue;
-            };
-            let Some(forms) = self.projection.forms(face) else { continue };
-            let light = self.brightness(face);
-            let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
-            let corners = match self.request.paint {
-                Paint::Plain(colour) => Some([0, 1, 2].map(|corner| lit(corner, *colour))),
-                Paint::Vertices(colours) => {
-                    let ids = self.projection.mesh.faces()[face];
-                    Some([0, 1, 2].map(|corner| lit(corner, colours[ids[corner] as usize])))
-                }
-                Paint::Normals => Some(self.normal_colours(face)),
-                Paint::Surface(_) => None,
-            };
-            for column in columns {
-                let weights = forms.barycentric(raster.position(column), v);
-                let colour = match (corners, self.request.paint) {
-                    (None, Paint::Surface(colour)) => {
-                        let light: f64 = weights.iter().zip(light).map(|(w, l)| w * l).sum();
-                        colour(face, weights).map(|c| c * light as f32)
-                    }
-                    (corners, _) => {
-                        let [a, b, c] = corners.unwrap_or_default();
-                        let [wa, wb, wc] = weights.map(|w| w as f32);
-                        [0, 1, 2].map(|k| wa * a[k] + wb * b[k] + wc * c[k])
-                    }
-                };
-                add(column, colour);
-            }
-        }
+    /// Paints the window of a raster: the mean of each pixel's samples. `rgb` starts at the window's
+    /// first row and holds `width` pixels a row.
+    pub fn mix(&self, raster: &Raster, rgb: &mut [u8], width: usize) {
+        pulp::Arch::new().dispatch(Mix { shader: self, raster, rgb, width });
     }
 
     /// Light on each corner of a triangle, on whichever side it comes from.
@@ -214,5 +158,171 @@ impl<'a> Shader<'a> {
                 camera.camera_from_object.transform_vector3(normal).as_vec3().to_array();
             [right, -down, -forward].map(|x| 0.5 + 0.5 * x)
         })
+    }
+}
+
+/// Samples whose colours are computed side by side.
+const LANES: usize = 4;
+
+/// Triangles whose forms are remembered from one row of samples to the next.
+const REMEMBERED: usize = 512;
+
+fn share(per_pixel: u32) -> f32 {
+    255.0 / (per_pixel * per_pixel) as f32
+}
+
+#[inline(always)]
+fn byte(x: f32) -> u8 {
+    (x + 0.5) as u8 // saturates
+}
+
+/// [`Shader::mix`] on the widest registers that the processor has.
+struct Mix<'a> {
+    shader: &'a Shader<'a>,
+    raster: &'a Raster,
+    rgb: &'a mut [u8],
+    width: usize,
+}
+
+impl pulp::WithSimd for Mix<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { shader, raster, rgb, width } = self;
+        let per_pixel = raster.per_pixel as usize;
+        let n_columns = raster.columns.len();
+        let window = raster.columns.start / per_pixel..raster.columns.end / per_pixel;
+        let mut grid = raster.hits.chunks_exact(n_columns.max(1)).zip(raster.rows.clone());
+        let mut line = Line::new(n_columns);
+        let mut sums = [0; 3].map(|_| vec![0f32; window.len()]);
+        for pixels in rgb.chunks_exact_mut(width * 3).take(raster.rows.len() / per_pixel) {
+            sums.iter_mut().for_each(|sums| sums.fill(0.0));
+            for (hits, row) in grid.by_ref().take(per_pixel) {
+                shader.colour(raster, hits, raster.position(row), &mut line);
+                for (sums, line) in sums.iter_mut().zip(&line.colours) {
+                    match per_pixel {
+                        2 => add_pairs(sums, line),
+                        _ => {
+                            for (sum, samples) in sums.iter_mut().zip(line.chunks_exact(per_pixel))
+                            {
+                                samples.iter().for_each(|sample| *sum += sample);
+                            }
+                        }
+                    }
+                }
+            }
+            let pixels = &mut pixels[window.start * 3..window.end * 3];
+            for (k, sums) in sums.iter().enumerate() {
+                for (pixel, sum) in pixels.as_chunks_mut::<3>().0.iter_mut().zip(sums) {
+                    pixel[k] = byte(sum * share(raster.per_pixel));
+                }
+            }
+        }
+    }
+}
+
+/// The usual case of two samples along each side of a pixel.
+#[inline(always)]
+fn add_pairs(sums: &mut [f32], samples: &[f32]) {
+    for (sum, [a, b]) in sums.iter_mut().zip(samples.as_chunks::<2>().0) {
+        *sum = *sum + a + b;
+    }
+}
+
+/// The colours of one row of samples.
+struct Line {
+    /// By channel, with room for a block of lanes beyond the end.
+    colours: [Vec<f32>; 3],
+    known: Vec<Known>,
+}
+
+/// What the shader needs of a triangle.
+#[derive(Clone, Copy)]
+struct Known {
+    face: usize,
+    forms: Option<TriangleForms>,
+    light: [f64; 3],
+    /// Lit colours of the corners, where the paint has any.
+    corners: [[f32; 3]; 3],
+}
+
+impl Line {
+    fn new(n_columns: usize) -> Self {
+        let nothing =
+            Known { face: usize::MAX, forms: None, light: [0.0; 3], corners: [[0.0; 3]; 3] };
+        Self {
+            colours: [0; 3].map(|_| vec![0.0; n_columns + LANES]),
+            known: vec![nothing; REMEMBERED],
+        }
+    }
+}
+
+impl Shader<'_> {
+    /// Colours one row of samples at height `v`. Neighbours mostly see the same triangle.
+    #[inline(always)]
+    fn colour(&self, raster: &Raster, hits: &[Hit], v: f64, line: &mut Line) {
+        let mut column = 0;
+        for run in hits.chunk_by(|a, b| a.face() == b.face()) {
+            let columns = column..column + run.len();
+            column = columns.end;
+            let Some(face) = run[0].face().map(|face| face as usize) else {
+                for (line, background) in line.colours.iter_mut().zip(self.settings.background) {
+                    line[columns.clone()].fill(background);
+                }
+                continue;
+            };
+            let known = &mut line.known[face % REMEMBERED];
+            if known.face != face {
+                *known = self.look_up(face);
+            }
+            let Some(forms) = known.forms else {
+                line.colours.iter_mut().for_each(|line| line[columns.clone()].fill(0.0));
+                continue;
+            };
+            if let Paint::Surface(paint) = self.request.paint {
+                for column in columns {
+                    let u = raster.position(raster.columns.start + column);
+                    let weights = forms.barycentric(u, v);
+                    let light: f64 = weights.iter().zip(known.light).map(|(w, l)| w * l).sum();
+                    let colour = paint(face, weights).map(|c| c * light as f32);
+                    line.colours.iter_mut().zip(colour).for_each(|(line, c)| line[column] = c);
+                }
+                continue;
+            }
+            let [a, b, c] = known.corners;
+            // Lanes beyond the run's end are overwritten by the next one.
+            for first in columns.step_by(LANES) {
+                let mut weights = [[0f32; LANES]; 3];
+                for lane in 0..LANES {
+                    let u = raster.position(raster.columns.start + first + lane);
+                    let exact = forms.barycentric(u, v);
+                    (0..3).for_each(|k| weights[k][lane] = exact[k] as f32);
+                }
+                for (k, line) in line.colours.iter_mut().enumerate() {
+                    let place: &mut [f32; LANES] =
+                        line[first..].first_chunk_mut().expect("room for a block");
+                    for lane in 0..LANES {
+                        let [wa, wb, wc] = [0, 1, 2].map(|corner| weights[corner][lane]);
+                        place[lane] = wa * a[k] + wb * b[k] + wc * c[k];
+                    }
+                }
+            }
+        }
+    }
+
+    fn look_up(&self, face: usize) -> Known {
+        let light = self.brightness(face);
+        let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
+        let ids = self.projection.mesh.faces()[face];
+        let corners = match self.request.paint {
+            Paint::Plain(colour) => [0, 1, 2].map(|corner| lit(corner, *colour)),
+            Paint::Vertices(colours) => {
+                [0, 1, 2].map(|corner| lit(corner, colours[ids[corner] as usize]))
+            }
+            Paint::Normals => self.normal_colours(face),
+            Paint::Surface(_) => [[0.0; 3]; 3],
+        };
+        Known { face, forms: self.projection.forms(face), light, corners }
     }
 }

@@ -13,6 +13,8 @@
 //! An edge that two triangles share yields the same three numbers in both, up to an exact change of
 //! sign, so with closed half-planes no sample falls between them, whatever the rounding.
 
+use std::ops::Range;
+
 use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
@@ -128,6 +130,26 @@ impl<'a> Projection<'a> {
         let in_front = self.mesh.faces()[face].iter().any(|&id| self.points[id as usize].z > 0.0);
         let (low, high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
         if in_front { PixelBox { low, high } } else { PixelBox { low: high, high: low } }
+    }
+
+    /// Columns and rows of pixels outside of which nothing is seen: all of them, if a vertex lies
+    /// behind the camera.
+    pub fn window(&self) -> [Range<usize>; 2] {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let sides = [self.camera.width, self.camera.height].map(f64::from);
+        for pixel in &self.pixels {
+            for k in 0..2 {
+                if pixel[k].is_nan() {
+                    (low[k], high[k]) = (0.0, sides[k]);
+                }
+                low[k] = low[k].min(pixel[k]);
+                high[k] = high[k].max(pixel[k]);
+            }
+        }
+        [0, 1].map(|k| {
+            let low = (low[k] - MARGIN).floor().clamp(0.0, sides[k]);
+            low as usize..(high[k] + MARGIN).ceil().clamp(low, sides[k]) as usize
+        })
     }
 
     /// The linear forms of triangle `face`, `None` where it is seen exactly edge-on.

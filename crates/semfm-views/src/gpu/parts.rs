@@ -1,0 +1,145 @@
+//! What is drawn together: the rectangles of some views that the object fills, one below the other.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::device::Device;
+use super::frame::{COLOR_BYTES, Extent, ID_BYTES, padded};
+use crate::Camera;
+use crate::render::Request;
+use crate::render::triangle::Projection;
+
+/// Bytes that one batch may bring back: enough to keep a driver busy, little enough that the next
+/// batch is drawn while this one is read. On lavapipe 1.5 to 6 MiB are as good, 32 a fifth slower,
+/// since the samples then leave the processor's caches; below 1 MiB the driver waits too often.
+const BATCH_BYTES: u64 = 4 << 20;
+
+/// Pixels around the object, since a driver rounds the corners' places.
+const MARGIN: usize = 1;
+
+/// A rectangle of a view, and its place in a batch.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Part {
+    /// Index of the view.
+    pub view: usize,
+    /// Columns and rows of its pixels.
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    /// Rows above it in the batch.
+    pub top: usize,
+}
+
+impl Part {
+    /// The camera that sees this part alone, with `scale` pixels for each.
+    pub fn camera(&self, whole: &Camera, scale: u32) -> Camera {
+        let factor = f64::from(scale);
+        Camera {
+            width: self.columns.len() as u32 * scale,
+            height: self.rows.len() as u32 * scale,
+            fx: whole.fx * factor,
+            fy: whole.fy * factor,
+            cx: (whole.cx - self.columns.start as f64) * factor,
+            cy: (whole.cy - self.rows.start as f64) * factor,
+            ..*whole
+        }
+    }
+}
+
+/// Parts one below the other, their left sides aligned.
+pub(super) fn extent(batch: &[Part]) -> Extent {
+    let width = batch.iter().map(|part| part.columns.len()).max().unwrap_or(0);
+    let height = batch.last().map_or(0, |part| part.top + part.rows.len());
+    Extent { width: width as u32, height: height as u32 }
+}
+
+/// The batches that draw all views and bring back `scale` values along each side of a pixel. What no
+/// triangle can reach is in none; what is larger than the driver's textures or than a batch is in
+/// several.
+pub(super) fn batches(
+    device: &Device,
+    request: &Request<'_>,
+    cameras: &[Camera],
+    scale: u32,
+) -> Vec<Vec<Part>> {
+    let windows: Vec<[Range<usize>; 2]> =
+        cameras.par_iter().map(|camera| window(request, camera)).collect();
+    let limits = device.device.limits();
+    let side = (limits.max_texture_dimension_2d / request.settings.supersampling).max(1) as usize;
+    let most = BATCH_BYTES.min(limits.max_buffer_size) / u64::from(scale * scale);
+    pack(&windows, side, most)
+}
+
+fn window(request: &Request<'_>, camera: &Camera) -> [Range<usize>; 2] {
+    let [columns, rows] = Projection::new(request.mesh, camera).window();
+    let wider = |pixels: Range<usize>, side: u32| {
+        if pixels.is_empty() {
+            return pixels;
+        }
+        pixels.start.saturating_sub(MARGIN)..(pixels.end + MARGIN).min(side as usize)
+    };
+    [wider(columns, camera.width), wider(rows, camera.height)]
+}
+
+/// Cuts windows to parts of at most `side` pixels, and puts them in order into batches of like
+/// size: at most `side` rows that bring back at most `most` bytes, as wide as the widest part.
+fn pack(windows: &[[Range<usize>; 2]], side: usize, most: u64) -> Vec<Vec<Part>> {
+    let widest = windows.iter().map(|[columns, _]| columns.len()).max().unwrap_or(0).min(side);
+    let row = bytes_of_row(widest).max(1);
+    let all: u64 = windows.iter().map(|[_, rows]| rows.len() as u64 * row).sum();
+    let alike = all.div_ceil(all.div_ceil(most.max(1)).max(1));
+    let most_rows = (alike / row).clamp(1, side as u64) as usize;
+    let mut batches: Vec<Vec<Part>> = Vec::new();
+    for (view, [columns, rows]) in windows.iter().enumerate() {
+        for left in columns.clone().step_by(side) {
+            let columns = left..columns.end.min(left + side);
+            for first in rows.clone().step_by(most_rows) {
+                let rows = first..rows.end.min(first + most_rows);
+                let top = batches.last().map_or(most_rows, |batch| extent(batch).height as usize);
+                let part = Part { view, columns: columns.clone(), rows, top };
+                match batches.last_mut().filter(|_| top + part.rows.len() <= most_rows) {
+                    Some(batch) => batch.push(part),
+                    None => batches.push(vec![Part { top: 0, ..part }]),
+                }
+            }
+        }
+    }
+    batches
+}
+
+fn bytes_of_row(width: usize) -> u64 {
+    u64::from(padded(width as u32, ID_BYTES.max(COLOR_BYTES)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_of_every_window_is_in_one_part() {
+        let windows = [[3..203, 5..105], [0..0, 0..0], [0..64, 0..1000], [10..11, 7..8]];
+        for (side, most) in [(64, 1 << 20), (1000, 50_000), (4096, 6 << 20), (1, 1), (77, 2000)] {
+            let mut seen: Vec<_> = windows.iter().map(|_| vec![0u8; 300 * 1000]).collect();
+            for batch in pack(&windows, side, most) {
+                let Extent { width, height } = extent(&batch);
+                assert!(width as usize <= side && height as usize <= side);
+                assert!(height == 1 || bytes_of_row(side.min(200)) * u64::from(height) <= most);
+                let mut top = 0;
+                for part in &batch {
+                    assert_eq!(part.top, top);
+                    top += part.rows.len();
+                    for row in part.rows.clone() {
+                        for column in part.columns.clone() {
+                            seen[part.view][row * 300 + column] += 1;
+                        }
+                    }
+                }
+            }
+            for (seen, [columns, rows]) in seen.iter().zip(&windows) {
+                let area: usize = seen.iter().map(|&n| usize::from(n)).sum();
+                assert_eq!(area, columns.len() * rows.len());
+                assert!(seen.iter().all(|&n| n <= 1));
+            }
+        }
+    }
+}
