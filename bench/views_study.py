@@ -21,9 +21,12 @@ import shutil
 import statistics
 import subprocess
 import sys
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+
+#: Objects of which DATA/coloured/NAME.ply holds a painted copy are drawn in its colours. No group
+#: has two of them, so every pair that they are in sees colour on one side only.
+ONE_SIDE = "colours"
 
 #: Name -> (options of `semfm-cli views`, rolls of each picture).
 PROTOCOLS = {
@@ -52,6 +55,7 @@ PROTOCOLS = {
     "edges .5": ("--edges 0.5", 4),
     "normals as colour": ("--normals", 4),
     "ambient .6": ("--ambient 0.6", 4),
+    "colours on one side": (ONE_SIDE, 4),
     "2 close-ups": ("--close-ups 2", 4),
     "7 views, 2 close-ups, 2 rolls": ("--count 7 --close-ups 2", 2),
 }
@@ -66,39 +70,49 @@ def open_worker(model: str, threads: int) -> None:
     _ENCODER = open_encoder(model, "cpu", threads)
 
 
-def embed(binary: str, mesh: Path, views_options: str, rolls: int, output: Path) -> float:
-    """Draws and embeds one object; returns the seconds that took."""
-    from semfm.sidecar import EmbedSettings, embed_file
+def draw(binary: str, mesh: Path, options: str, views: Path) -> None:
+    painted = mesh.parent.parent / "coloured" / f"{mesh.stem}.ply"
+    if options == ONE_SIDE and painted.is_file():
+        import semfm
 
-    start = time.perf_counter()
-    views = output.with_suffix(".views.mcap")
-    colours = [] if "--normals" in views_options else ["--grey"]
-    command = [binary, "views", mesh, "-o", views, *views_options.split(), *colours]
+        plain, colors = semfm.Mesh.read(mesh), semfm.MeshFile.read(painted).vertex_colors
+        semfm.write_views(views, semfm.render(plain, colors=colors[:, :3] / 255), plain)
+        return
+    options = "" if options == ONE_SIDE else options
+    colours = [] if "--normals" in options else ["--grey"]
+    command = [binary, "views", mesh, "-o", views, *options.split(), *colours]
     command += ["--renderer", "cpu", "--threads", "1", "--quiet"]
     subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+
+
+def embed(binary: str, mesh: Path, options: str, rolls: int, output: Path) -> None:
+    """Draws and embeds one object."""
+    from semfm.sidecar import EmbedSettings, embed_file
+
+    views = output.with_suffix(".views.mcap")
+    draw(binary, mesh, options, views)
     embed_file(views, output, _ENCODER, EmbedSettings(rolls=rolls))
     views.unlink()
-    return time.perf_counter() - start
 
 
-def measure(args: argparse.Namespace, name: str, objects: list[Path], pool: ProcessPoolExecutor) -> dict:
-    """One protocol: rows of pairs and seconds of an object."""
+def measure(args: argparse.Namespace, name: str, objects: list[Path], pool) -> dict:
+    """One protocol: the rows of its pairs."""
     options, rolls = PROTOCOLS[name]
     folder = args.output / "work"
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "embedded").mkdir(parents=True)
     outputs = [folder / "embedded" / f"{mesh.stem}.emb.mcap" for mesh in objects]
     n = len(objects)
-    seconds = pool.map(embed, [args.binary] * n, objects, [options] * n, [rolls] * n, outputs)
-    seconds = statistics.median(seconds)
-    command = [args.binary, "eval", args.data, "--embeddings", folder / "embedded", "--methods", "fused"]
-    command += ["--gallery", 0, "--no-predictions", "--fresh", "--quiet", "-o", folder / "report"]
+    list(pool.map(embed, [args.binary] * n, objects, [options] * n, [rolls] * n, outputs))
+    command = [args.binary, "eval", args.data, "--embeddings", folder / "embedded"]
+    command += ["--methods", "fused", "--gallery", 0, "--no-predictions", "--fresh", "--quiet"]
+    command += ["-o", folder / "report"]
     subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
     rows = json.loads((folder / "report" / "results.json").read_text())["rows"]
     shutil.rmtree(folder)
     kept = ("group", "source", "target", "iou", "confidence")
     rows = [{key: row[key] for key in kept} for row in rows]
-    return {"options": options, "rolls": rolls, "seconds": seconds, "rows": rows}
+    return {"options": options, "rolls": rolls, "rows": rows}
 
 
 def halves(rows: list[dict]) -> dict[str, str]:
@@ -110,11 +124,10 @@ def halves(rows: list[dict]) -> dict[str, str]:
     return half
 
 
-def difference(rows: list[dict], base: dict, keep) -> tuple[float, float, float]:
+def difference(rows: list[dict], base: dict) -> tuple[float, float, float]:
     """Mean of the paired differences and its interval, objects resampled."""
-    pairs = [(row["source"], row["target"]) for row in rows if keep(row)]
-    by_pair = {(row["source"], row["target"]): row["iou"] for row in rows}
-    gains = [by_pair[pair] - base[pair] for pair in pairs]
+    pairs = [(row["source"], row["target"]) for row in rows]
+    gains = [row["iou"] - base[pair] for row, pair in zip(rows, pairs)]
     names, rng, means = sorted({name for pair in pairs for name in pair}), random.Random(0), []
     for _ in range(2000):
         counts = dict.fromkeys(names, 0)
@@ -138,20 +151,29 @@ def table(measured: dict[str, dict]) -> str:
     base_rows = measured["default"]["rows"]
     base = {(row["source"], row["target"]): row["iou"] for row in base_rows}
     half = halves(base_rows)
-    inside = {letter: lambda row, letter=letter: half[row["source"]] == half[row["target"]] == letter for letter in "AB"}
-    lines = ["| protocol | pictures | s | all | categories | < .3 | A → A | B → B | against the default |", "| --- " * 9 + "|"]
+    heads = "protocol | pictures | all | categories | < .3 | A → A | B → B | against the default"
+    lines = [f"| {heads} |", "| --- " * 8 + "|"]
     for name, one in measured.items():
         rows = one["rows"]
         ious = [row["iou"] for row in rows]
         words = dict(zip(one["options"].split()[::2], one["options"].split()[1::2]))
-        pictures = int(words.get("--count", 14)) * (1 + int(words.get("--close-ups", 0))) * one["rolls"]
-        of_half = [statistics.mean(row["iou"] for row in rows if inside[letter](row)) for letter in "AB"]
-        mean, low, high = difference(rows, base, lambda row: True)
-        cells = [name, str(pictures), f"{one['seconds']:.1f}", f"{statistics.mean(ious):.3f}", f"{category_mean(rows):.3f}",
-                 f"{sum(iou < 0.3 for iou in ious) / len(ious):.3f}", *(f"{mean:.3f}" for mean in of_half),
-                 f"{mean:+.3f} ({low:+.3f} … {high:+.3f})"]
+        shots = int(words.get("--count", 14)) * (1 + int(words.get("--close-ups", 0)))
+        low_share = sum(iou < 0.3 for iou in ious) / len(ious)
+        numbers = [statistics.mean(ious), category_mean(rows), low_share]
+        for letter in "AB":
+            inside = [row for row in rows if half[row["source"]] == half[row["target"]] == letter]
+            numbers.append(statistics.mean(row["iou"] for row in inside))
+        mean, low, high = difference(rows, base)
+        cells = [name, str(shots * one["rolls"]), *(f"{number:.3f}" for number in numbers)]
+        cells.append(f"{mean:+.3f} ({low:+.3f} … {high:+.3f})")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def find(data: Path, name: str) -> Path:
+    """The mesh of an object; painted and textured copies lie in folders without a number."""
+    files = sorted(data.glob(f"[0-9]*/{name}.*"))
+    return next(path for path in files if path.suffix != ".json")
 
 
 def main() -> None:
@@ -165,11 +187,11 @@ def main() -> None:
     args = parser.parse_args()
     pairs = json.loads((args.data / "pairs.json").read_text())
     names = sorted({name for group in pairs.values() for pair in group for name in pair})
-    objects = [next(m for m in sorted(args.data.glob(f"[0-9]*/{n}.*")) if m.suffix != ".json") for n in names]
+    objects = [find(args.data, name) for name in names]
     args.output.mkdir(parents=True, exist_ok=True)
     wanted = args.only or list(PROTOCOLS)
     measured = {}
-    with ProcessPoolExecutor(args.jobs, initializer=open_worker, initargs=(args.encoder, 1)) as pool:
+    with ProcessPoolExecutor(args.jobs, None, open_worker, (args.encoder, 1)) as pool:
         for name in PROTOCOLS:
             kept = args.output / f"{name}.json"
             if not kept.is_file() and name in wanted:
