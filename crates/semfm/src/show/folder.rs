@@ -7,8 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Group, Panel};
-use crate::picture::meaning::anchor_color;
-use crate::picture::position_colors;
+use crate::picture::{anchor_color, bytes, position_colors};
 use crate::{Error, Result};
 
 /// What a `path` shows: the folder of a transfer (`transfer -o`), or a mesh with its colours.
@@ -45,7 +44,6 @@ fn transfer_group(folder: &Path) -> Result<Group> {
         }
     }
     let places = position_colors(source.mesh.vertices());
-    let bytes = |color: [f32; 3]| color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
     let source_places: Vec<[u8; 3]> = places.into_iter().map(bytes).collect();
     // Ids beyond the source are refused when the page is written.
     let matched = map.source_of.iter();
