@@ -45,6 +45,8 @@ pub fn write_transfer(
             "source_of": transfer.point_map.source_of,
             "source_anchor": source_anchor,
             "target_anchor": target_anchor,
+            "source_weight": rounded(region.weights()),
+            "target_weight": rounded(transfer.weights()),
         }),
     )?;
     write_weighted(&[at("source.ply")], source.shape.original(), region.weights())?;
@@ -67,6 +69,11 @@ pub fn write_transfer(
         names.push("transfer.mcap");
     }
     Ok(names.into_iter().map(at).collect())
+}
+
+/// Weights to four digits: enough for eyes, and a third of the bytes.
+fn rounded(weights: &[f64]) -> Vec<f64> {
+    weights.iter().map(|w| (w * 1e4).round() / 1e4).collect()
 }
 
 /// A mesh as read with a weight per vertex, as property and as colour.

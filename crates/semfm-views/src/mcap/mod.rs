@@ -18,6 +18,7 @@ mod ros2;
 mod scene;
 mod scene_messages;
 mod schema;
+mod shown;
 mod summary;
 mod views_file;
 mod writer;
@@ -32,4 +33,5 @@ pub use scene::{
     ScenePoints, Severity,
 };
 pub use schema::PATCH_EMBEDDINGS;
+pub use shown::{Colors, read_cloud, read_mesh};
 pub use views_file::{ViewsFile, read_view, write_views};

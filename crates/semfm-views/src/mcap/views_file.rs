@@ -32,7 +32,7 @@ pub struct ViewsFile {
 }
 
 /// Topic of the object itself.
-const MESH: &str = "/mesh";
+pub(super) const MESH: &str = "/mesh";
 
 /// Time of recording of a view, in nanoseconds: one second each, so that playing the file in
 /// Foxglove walks around the object.

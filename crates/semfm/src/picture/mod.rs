@@ -21,8 +21,8 @@ pub(crate) use sheet::bytes;
 /// Side of each picture in pixels.
 const SIDE: u32 = 420;
 /// Colour without and with full weight, as sRGB in 0..1.
-const PLAIN: [f32; 3] = [0.78, 0.78, 0.78];
-const MARKED: [f32; 3] = [0.86, 0.16, 0.16];
+pub(crate) const PLAIN: [f32; 3] = [0.78, 0.78, 0.78];
+pub(crate) const MARKED: [f32; 3] = [0.86, 0.16, 0.16];
 
 /// The colour of each weight: grey to red. One half is where [`regions::painted`] draws its line.
 ///

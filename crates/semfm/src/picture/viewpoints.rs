@@ -16,15 +16,18 @@ const N_SCOUTS: usize = 36;
 /// The second viewpoint looks from at least this far round (cosine): nearer shows the same again,
 /// farther leaves too few to choose from.
 const OTHER_SIDE: f64 = 0.3;
-/// Share of the surface that must lie flat on the ground before an object stands: mugs and shoes have
-/// a tenth, a hammer a thousandth.
-const LEAST_FOOTPRINT: f64 = 0.03;
+/// How well an object must stand: mugs and shoes reach .03 and more, a hammer a thousandth.
+const LEAST_STAND: f64 = 0.006;
 /// How high above the lowest point the ground reaches, as a share of the height, and how little what
 /// lies on it may be tilted (cosine).
-const GROUND: f64 = 0.05;
-const FLAT: f64 = 0.9;
-/// The file's own axes count this much more: nobody exports a table with its top on the ground.
-const FILE_AXIS: f64 = 3.0;
+const GROUND: f64 = 0.04;
+const FLAT: f64 = 0.92;
+/// The file's y and z count this much more: nobody exports a table with its top on the ground.
+const FILE_AXIS: f64 = 1.5;
+/// Directions in which the ground is measured.
+const N_WIDTHS: usize = 8;
+/// More triangles than this are thinned out; the way up needs no more.
+const N_FACETS: usize = 30_000;
 /// Directions that normals are sorted into, and how many of the fullest are tried as the ground.
 const N_BINS: usize = 96;
 const N_FLAT_SIDES: usize = 16;
@@ -215,21 +218,22 @@ pub(super) struct Upright {
     is_sure: bool,
 }
 
-/// The way up in which the largest flat part of the surface is the ground: the file's y or z where
-/// they do nearly as well, the longest principal axis where the object has no foot.
+/// The way up in which the object stands best: the file's y or z where they do nearly as well, the
+/// longest principal axis where it does not stand.
 pub(super) fn upright(mesh: &Mesh) -> Result<Upright> {
     let Some((low, high)) = bounds(mesh.vertices()) else {
         return Err(crate::Error::invalid("mesh to be shown", "vertices", "none"));
     };
     let middle = (low + high) / 2.0;
-    let faces: Vec<Facet> =
-        (0..mesh.n_faces()).map(|face| Facet::new(mesh, face, middle)).collect();
-    let flat = flat_sides(&faces).into_iter().map(|normal| (-normal, 1.0));
+    let step = mesh.n_faces().div_ceil(N_FACETS).max(1);
+    let facets = (0..mesh.n_faces()).step_by(step).map(|face| Facet::new(mesh, face, middle));
+    let facets: Vec<Facet> = facets.collect();
+    let flat = flat_sides(&facets).into_iter().map(|normal| (-normal, 1.0));
     let candidates = flat.chain([(DVec3::Y, FILE_AXIS), (DVec3::Z, FILE_AXIS)]);
     let (up, share) = candidates
-        .map(|(up, bonus)| (up, bonus * footprint(&faces, up)))
+        .map(|(up, bonus)| (up, bonus * stand(&facets, up)))
         .fold((DVec3::Z, 0.0), |best, next| if next.1 > best.1 { next } else { best });
-    let is_sure = share >= LEAST_FOOTPRINT;
+    let is_sure = share >= LEAST_STAND;
     Ok(Upright { up: if is_sure { up } else { principal_frame(mesh)?.row(2) }, is_sure })
 }
 
@@ -247,10 +251,10 @@ impl Facet {
 }
 
 /// Normals of the largest flat parts of the surface.
-fn flat_sides(faces: &[Facet]) -> Vec<DVec3> {
+fn flat_sides(facets: &[Facet]) -> Vec<DVec3> {
     let bins: Vec<DVec3> = fibonacci_directions(N_BINS).collect();
     let mut sums = vec![DVec3::ZERO; bins.len()];
-    for facet in faces {
+    for facet in facets {
         let height = |bin: usize| bins[bin].dot(facet.normal);
         let nearest = (1..bins.len())
             .fold(0, |best, bin| if height(bin) > height(best) { bin } else { best });
@@ -260,21 +264,40 @@ fn flat_sides(faces: &[Facet]) -> Vec<DVec3> {
     sums.into_iter().take(N_FLAT_SIDES).filter_map(DVec3::try_normalize).collect()
 }
 
-/// Share of the surface that lies on the ground and faces down.
-fn footprint(faces: &[Facet], up: DVec3) -> f64 {
-    let heights = faces.iter().map(|facet| facet.centre.dot(up));
+/// How well an object stands with this side up: the share of the surface that lies flat on the ground,
+/// times how far the ground reaches as a share of the object's width where that is least. The first
+/// alone would stand a bottle on its side, the second alone a mug on its rim.
+fn stand(facets: &[Facet], up: DVec3) -> f64 {
+    let heights = facets.iter().map(|facet| facet.centre.dot(up));
     let low = heights.clone().fold(f64::INFINITY, f64::min);
     let high = heights.fold(f64::NEG_INFINITY, f64::max);
+    let is_low = |facet: &&Facet| facet.centre.dot(up) - low < GROUND * (high - low);
     let (mut flat, mut total) = (0.0, 0.0);
-    for facet in faces {
+    for facet in facets {
         let area = facet.normal.length();
         total += area;
-        let is_low = facet.centre.dot(up) - low < GROUND * (high - low);
-        if is_low && facet.normal.dot(up) < -FLAT * area {
+        if is_low(&facet) && facet.normal.dot(up) < -FLAT * area {
             flat += area;
         }
     }
-    if total > 0.0 { flat / total } else { 0.0 }
+    let x = up.any_orthonormal_vector();
+    let y = up.cross(x);
+    let reach = (0..N_WIDTHS)
+        .map(|i| {
+            let (sin, cos) = (std::f64::consts::PI * i as f64 / N_WIDTHS as f64).sin_cos();
+            let along = cos * x + sin * y;
+            width(facets.iter().filter(is_low), along) / width(facets.iter(), along)
+        })
+        .fold(1.0, f64::min);
+    if total > 0.0 { flat / total * reach } else { 0.0 }
+}
+
+/// Extent of the facets' centres along a direction.
+fn width<'a>(facets: impl Iterator<Item = &'a Facet>, along: DVec3) -> f64 {
+    let (low, high) = facets
+        .map(|facet| facet.centre.dot(along))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    (high - low).max(0.0)
 }
 
 /// `target_from_source` of directions. Where both objects stand, up goes to up, and the map says the
