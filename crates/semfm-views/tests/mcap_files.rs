@@ -413,7 +413,7 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
         colors: &colors,
         numbers: &[("weight", SceneNumbers::F32(&[0.5; 4]))],
     };
-    let rendered = view(0);
+    let rendered = views().swap_remove(0);
     let scene = Scene {
         meshes: vec![shown("/source/mesh", "source"), shown("/target/mesh", "target")],
         clouds: vec![cloud],

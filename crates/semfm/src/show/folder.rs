@@ -78,13 +78,19 @@ pub(super) fn transfer_group(folder: &Path, task: &Task) -> Result<Group> {
         fact("IoU", &report["iou"]),
     ];
     Ok(Group {
-        title: folder.display().to_string(),
+        title: title(folder),
         facts: facts.into_iter().flatten().collect(),
         panels,
         layers,
         source_of: Some(map.source_of),
         pictures: Vec::new(),
     })
+}
+
+/// The folder's name, after that of the folder it lies in.
+fn title(folder: &Path) -> String {
+    let names: Vec<_> = folder.iter().map(|name| name.to_string_lossy()).collect();
+    names[names.len().saturating_sub(2)..].join("/")
 }
 
 fn region_layer(map: &PointMapFile, source: &MeshFile, target: &MeshFile) -> Layer {

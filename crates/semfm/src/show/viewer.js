@@ -76,7 +76,7 @@ function link([source, target], sourceOf) {
     source.say(source.tell(vertex));
     // A map need not reach every place of the source.
     const off = target.nearestKey(source.position(vertex));
-    light(vertex, Math.max(radius, 1.2 * off));
+    light(vertex, Math.max(radius, 1.4 * off));
     target.say(off < radius ? `${count(target.nLit())} matched to the place under the pointer`
       : "nothing is matched to the place under the pointer; the nearest that is lights up");
   };
