@@ -213,12 +213,12 @@ fn labels<'a>(exhibit: &Exhibit<'_>) -> Vec<SceneLabel<'a>> {
     };
     let mut labels: Vec<SceneLabel<'a>> = titles.into_iter().enumerate().map(title).collect();
     for (rank, anchor) in exhibit.transfer.report.anchors.iter().enumerate() {
-        for k in 0..2 {
+        for (k, frame_id) in FRAMES.into_iter().enumerate() {
             let points = exhibit.objects()[k].cloud.points().iter().zip(&exhibit.clusters[k]);
             let own = points.filter(|(_, cluster)| cluster.1 == Some(rank)).map(|(&p, _)| p);
             labels.push(SceneLabel {
                 topic: "/anchors",
-                frame_id: FRAMES[k],
+                frame_id,
                 at: Some(mean(own)),
                 text: format!("anchor {}: cosine {:.2}", rank + 1, anchor.anchor.cosine),
                 color: bytes(anchor_color(rank as i64)),

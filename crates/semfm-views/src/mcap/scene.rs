@@ -10,7 +10,9 @@ use semfm_geom::math::{DMat3, DQuat, DVec3, bounds};
 
 use super::frames::{TF, calibration_in, transform_in};
 use super::inspect::METADATA_NAME;
-use super::scene_messages::{log_message, mesh_entity, point_cloud, segments_entity, text_entity};
+use super::scene_messages::{
+    Segment, log_message, mesh_entity, point_cloud, segments_entity, text_entity,
+};
 use super::views_file::encode_png;
 use super::writer::{McapFile, Packing, timestamp, write_file};
 use crate::{Error, Result, View};
@@ -230,7 +232,7 @@ impl Scene<'_> {
             };
             add(label.topic, text_entity(label, &format!("label {i}"), frame, at));
         }
-        let mut segments: BTreeMap<&str, Vec<([DVec3; 2], [u8; 3])>> = BTreeMap::new();
+        let mut segments: BTreeMap<&str, Vec<Segment>> = BTreeMap::new();
         for link in &self.links {
             let end = |(frame, p): (&str, DVec3)| Ok::<_, Error>(stand(frame)?.world_from(p));
             let ends = [end(link.from)?, end(link.to)?];

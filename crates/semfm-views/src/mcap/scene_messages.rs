@@ -59,8 +59,10 @@ pub(super) fn text_entity(
     SceneEntity { texts: vec![text], ..entity(frame_id, id) }
 }
 
-/// Pieces of line in the world, each of one colour.
-pub(super) fn segments_entity(segments: &[([DVec3; 2], [u8; 3])]) -> SceneEntity {
+/// A piece of line in the world and its colour.
+pub(super) type Segment = ([DVec3; 2], [u8; 3]);
+
+pub(super) fn segments_entity(segments: &[Segment]) -> SceneEntity {
     let colors = segments.iter().flat_map(|&(_, rgb)| [color(rgb, LINK_ALPHA); 2]);
     let lines = LinePrimitive {
         r#type: LineType::LineList.into(),

@@ -12,7 +12,8 @@ use semfm_grasp::{Grasp, Gripper};
 use semfm_views::{Paint, RenderSettings, View, render};
 
 use super::sheet::{Entry, Row, Sheet};
-use super::viewpoints::{upright, viewpoints_around};
+use super::upright::upright;
+use super::viewpoints::viewpoints_around;
 use super::{SIDE, weight_colors};
 use crate::Result;
 

@@ -6,6 +6,7 @@ mod letters;
 mod meaning;
 mod sheet;
 mod transfer;
+mod upright;
 mod viewpoints;
 
 use semfm_geom::math::{DVec3, bounds};
