@@ -68,8 +68,8 @@ addEventListener("load", async () => {
 
 
 def probe(browser: str, page: Path, body: str, *options: str, seconds: float = 120):
-    """What `body`, the body of an async function, returns inside a page whose clock is the real one,
-    and what else the console said."""
+    """What `body`, the body of an async function, returns inside a page with a real clock, and what
+    else the console said."""
     probed = page.parent / f"probed-{page.name}"
     script = SCRIPT.replace("PROBE", body)
     probed.write_text(page.read_text().replace("</body>", script + "</body>"))

@@ -110,7 +110,7 @@ def sdk_module():
 
 
 def as_sdk(sdk, message):
-    """A decoded message as the SDK's own object: fields by name, enums by the camel case of theirs."""
+    """A decoded message as the SDK's own object: fields by name, enums in camel case."""
     name = message.DESCRIPTOR.name
     if message.DESCRIPTOR.full_name == "google.protobuf.Timestamp":
         return sdk.Timestamp(message.seconds, message.nanos)

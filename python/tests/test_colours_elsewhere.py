@@ -20,9 +20,7 @@ FILES = ("source.ply", "target.ply", "target.glb")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("colours")
-    done = subprocess.run(
-        [semfm_cli(), "demo", "-q", "-o", out], capture_output=True, text=True
-    )
+    done = subprocess.run([semfm_cli(), "demo", "-q", "-o", out], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return out
 

@@ -108,7 +108,9 @@ def test_schemas_are_those_that_foxglove_publishes(file):
             shared = fields.keys() & theirs[message].keys()
             # One of the two may be newer, but neither may say otherwise.
             assert len(shared) == min(len(fields), len(theirs[message])), message
-            assert {k: fields[k] for k in shared} == {k: theirs[message][k] for k in shared}, message
+            assert {k: fields[k] for k in shared} == {k: theirs[message][k] for k in shared}, (
+                message
+            )
             compared += len(shared)
     assert compared > 10
 
@@ -271,7 +273,9 @@ def test_clouds_are_packed_as_their_fields_say(transfer):
         assert {"x", "y", "z", "red", "green", "blue", "alpha"} <= fields.keys()
         kinds = [(f.name, NUMPY[f.type], f.offset) for f in cloud.fields]
         ends = [offset + np.dtype(kind).itemsize for _, kind, offset in kinds]
-        assert ends[:-1] == [offset for _, _, offset in kinds[1:]] and ends[-1] == cloud.point_stride
+        assert (
+            ends[:-1] == [offset for _, _, offset in kinds[1:]] and ends[-1] == cloud.point_stride
+        )
         points = np.frombuffer(cloud.data, np.dtype([(name, kind) for name, kind, _ in kinds]))
         assert (points["alpha"] == 255).all()
         assert np.isfinite([points[axis] for axis in "xyz"]).all()

@@ -1,7 +1,9 @@
-"""The page of `semfm-cli show` in a real browser: pointing, layers, keys, a large mesh, no network."""
+"""The page of `semfm-cli show` in a real browser: pointing, layers, keys, a large mesh,
+no network."""
 
 from __future__ import annotations
 
+import json
 import subprocess
 from pathlib import Path
 
@@ -20,23 +22,35 @@ LARGE = {"bytes": 4e6, "ready": 10_000, "first": 15_000, "each": 25}
 HELPERS = """
 const groups = await window.semfmReady;
 const [source, target] = groups[0];
+const mouse = { pointerId: 1, pointerType: "mouse", bubbles: true };
 const point = async (panel, x, y) => {
   const box = panel.canvas.getBoundingClientRect();
-  const at = { clientX: box.left + x * box.width, clientY: box.top + y * box.height, pointerId: 1, pointerType: "mouse", bubbles: true };
-  panel.canvas.dispatchEvent(new PointerEvent("pointermove", at));
+  const at = { clientX: box.left + x * box.width, clientY: box.top + y * box.height };
+  panel.canvas.dispatchEvent(new PointerEvent("pointermove", { ...at, ...mouse }));
   await frame();
   return panel.told.textContent;
 };
-const leave = async panel => { panel.canvas.dispatchEvent(new PointerEvent("pointerleave", { pointerId: 1, pointerType: "mouse" })); await frame(); };
+const leave = async panel => {
+  panel.canvas.dispatchEvent(new PointerEvent("pointerleave", mouse));
+  await frame();
+};
+const pixels = ({ canvas }) =>
+  canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
 // Pixels of a panel's own canvas that are yellow.
 const lit = panel => {
-  const { width, height } = panel.canvas, rgba = panel.canvas.getContext("2d").getImageData(0, 0, width, height).data;
+  const rgba = pixels(panel);
   let n = 0;
-  for (let i = 0; i < rgba.length; i += 4) if (rgba[i] > 100 && rgba[i + 1] > 0.62 * rgba[i] && rgba[i + 2] < 0.4 * rgba[i]) n++;
+  for (let i = 0; i < rgba.length; i += 4) {
+    const [r, g, b] = rgba.subarray(i, i + 3);
+    if (r > 100 && g > 0.62 * r && b < 0.4 * r) n++;
+  }
   return n;
 };
 // A place of the object on the middle line, from the left.
-const edge = panel => { for (let x = 0.02; x < 1; x += 0.01) if (panel.pick(x * panel.canvas.clientWidth, panel.canvas.clientHeight / 2) >= 0) return x + 0.02; };
+const edge = panel => {
+  const { clientWidth: width, clientHeight: height } = panel.canvas;
+  for (let x = 0.02; x < 1; x += 0.01) if (panel.pick(x * width, height / 2) >= 0) return x + 0.02;
+};
 await frame(); await frame();
 """
 
@@ -56,8 +70,8 @@ def demo(tmp_path_factory) -> Path:
 
 
 def calm(console: list[str]) -> list[str]:
-    """What a person would find in the console, without what software drawing and the reading of pixels
-    in these tests make the browser say."""
+    """What a person would find in the console, without what software drawing and the reading of
+    pixels in these tests make the browser say."""
     ours = ("GPU stall", "Multiple readback")
     return [line for line in console if not any(word in line for word in ours)]
 
@@ -74,7 +88,8 @@ def test_pointing_at_either_object_lights_its_counterpart(browser, demo):  # noq
     told.after = [lit(source), lit(target), source.told.textContent];
     told.n = [source.n, target.n];
     told.gl = source.painter.gl.getError();
-    told.loaded = performance.getEntriesByType("resource").map(e => e.name).filter(name => !name.startsWith("data:"));
+    told.loaded = performance.getEntriesByType("resource").map(e => e.name)
+      .filter(name => !name.startsWith("data:"));
     return told;
     """
     told, console = probe(browser, demo / "page.html", HELPERS + body)
@@ -98,9 +113,8 @@ def test_layers_switch_with_their_legends(browser, demo):  # noqa: F811
     for (const button of buttons) {
       button.click(); await frame();
       told.legends.push(document.querySelector(".legend").textContent);
-      const { width, height } = target.canvas;
-      const rgba = target.canvas.getContext("2d").getImageData(0, 0, width, height).data;
-      told.pictures.push(rgba.reduce((sum, x, i) => (sum * 31 + x * (i % 7 + 1)) % 1000003, 0));
+      const checksum = (sum, x, i) => (sum * 31 + x * (i % 7 + 1)) % 1000003;
+      told.pictures.push(pixels(target).reduce(checksum, 0));
     }
     told.pressed = buttons.map(b => b.getAttribute("aria-pressed"));
     return told;
@@ -117,20 +131,27 @@ def test_layers_switch_with_their_legends(browser, demo):  # noqa: F811
 
 def test_keys_turn_both_objects_and_tell_what_is_in_the_middle(browser, demo):  # noqa: F811
     body = """
-    const key = async (name, more) => { source.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: name, ...more })); await frame(); };
+    const key = async name => {
+      source.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: name }));
+      await frame();
+    };
     source.canvas.focus();
     const told = { focus: document.activeElement === source.canvas, start: [source.yaw, target.yaw] };
     await key("ArrowLeft"); await key("ArrowUp"); await key("+");
     told.turned = [source.yaw, target.yaw]; told.zoom = [source.zoom, target.zoom];
-    told.says = source.told.textContent; told.cross = source.stage.classList.contains("keys");
+    told.says = source.told.textContent;
+    told.cross = source.stage.classList.contains("keys");
     document.querySelector("input[type=checkbox]").click();
     await key("ArrowLeft");
     told.alone = [source.yaw, target.yaw];
     document.querySelector(".right button").click();
     told.again = [source.yaw, target.yaw, source.zoom];
     // Two fingers that part make it larger.
-    const finger = (kind, id, x) => source.canvas.dispatchEvent(new PointerEvent(kind, { pointerId: id, pointerType: "touch", clientX: x, clientY: 300, bubbles: true }));
-    finger("pointerdown", 5, 100); finger("pointerdown", 6, 200); finger("pointermove", 6, 300); finger("pointerup", 6, 300); finger("pointerup", 5, 100);
+    const finger = (kind, pointerId, clientX) => source.canvas.dispatchEvent(
+      new PointerEvent(kind, { pointerId, clientX, clientY: 300, pointerType: "touch" }));
+    finger("pointerdown", 5, 100); finger("pointerdown", 6, 200);
+    finger("pointermove", 6, 300);
+    finger("pointerup", 6, 300); finger("pointerup", 5, 100);
     told.pinched = source.zoom;
     return told;
     """
@@ -173,7 +194,7 @@ def large(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("large")
     torus(60, 40, out / "small.obj")
     torus(420, 240, out / "large.obj")
-    (out / "grip.json").write_text('{"vertices": [%s]}' % ",".join(map(str, range(400))))
+    (out / "grip.json").write_text(json.dumps({"vertices": list(range(400))}))
     features = ["--source-features", out / "small.npy", "--target-features", out / "large.npy"]
     meshes = [out / "small.obj", out / "large.obj", "--region", out / "grip.json"]
     run("transfer", *meshes, *features, "--no-cache", "-q", "-o", out / "answer")
@@ -184,7 +205,7 @@ def large(tmp_path_factory) -> Path:
 def test_a_hundred_thousand_vertices_are_no_burden(browser, large):  # noqa: F811
     body = """
     const [width, height] = [target.canvas.clientWidth, target.canvas.clientHeight];
-    const x = edge(target) * width, told = { n: target.n, since: performance.now() };
+    const x = edge(target) * width, told = { n: target.n, ready };
     source.ids = target.ids = null;
     let start = performance.now();
     target.point(x, height / 2);
@@ -199,11 +220,9 @@ def test_a_hundred_thousand_vertices_are_no_burden(browser, large):  # noqa: F81
     told.lit = [source.nLit(), target.nLit()];
     return told;
     """
-    timed = HELPERS.replace(
-        "const groups = await window.semfmReady;",
-        "const begun = performance.now(); const groups = await window.semfmReady; const ready = performance.now() - begun;",
-    )
-    told, console = probe(browser, large, timed + body.replace("return told", "told.ready = ready; return told"))
+    begun = "const begun = performance.now(); await window.semfmReady;"
+    begun += "const ready = performance.now() - begun;"
+    told, console = probe(browser, large, begun + HELPERS + body)
     assert calm(console) == []
     assert told["n"] == 420 * 240 and large.stat().st_size < LARGE["bytes"]
     assert told["ready"] < LARGE["ready"] and told["first"] < LARGE["first"]
@@ -220,7 +239,7 @@ def test_without_webgl_the_page_says_so(browser, demo):  # noqa: F811
     """
     told, console = probe(browser, demo / "page.html", body, "--disable-3d-apis")
     assert calm(console) == []
-    assert told["said"].count("does not offer WebGL 2") == 2
+    assert told["said"].count("does not offer WebGL 2") == 4
     assert "accept" in told["said"]
 
 
@@ -235,7 +254,8 @@ def test_meshes_with_regions_and_views_files_are_shown(browser, demo):  # noqa: 
     const [[first], [second]] = all;
     const told = {
       titles: [...document.querySelectorAll("h2")].map(h => h.textContent),
-      layers: first.paints.length, says: "", pictures: document.querySelectorAll(".pictures img").length,
+      pictures: document.querySelectorAll(".pictures img").length,
+      layers: first.paints.length, says: "",
     };
     const box = first.canvas;
     for (let x = 0; x < box.clientWidth && !told.says; x += 5) {
@@ -253,6 +273,32 @@ def test_meshes_with_regions_and_views_files_are_shown(browser, demo):  # noqa: 
     assert told["titles"] == ["containers_0_s0.obj", "v.views.mcap"]
     assert told["layers"] == 2 and told["says"].startswith("vertex") and "weight" in told["says"]
     assert told["pictures"] == 4 and told["images"] == [64] * 4 and told["turned"] > 0.01
+
+
+def test_hands_stand_at_the_object(browser, demo):  # noqa: F811
+    body = """
+    const [, [alone, few]] = await window.semfmReady;
+    const section = alone.figure.closest("section");
+    const told = { names: [alone.name, few.name], n: [alone.n, few.n], seen: [] };
+    told.legend = section.querySelector(".legend").textContent;
+    section.scrollIntoView(); await frame();
+    for (const panel of [alone, few]) {
+      const { clientWidth: width, clientHeight: height } = panel.canvas, words = new Set();
+      for (let y = 0; y < height; y += 8) for (let x = 0; x < width; x += 8) {
+        const vertex = panel.pick(x, y);
+        if (vertex >= 0) words.add(panel.tell(vertex).replace(/^vertex \\d+(, )?/, ""));
+      }
+      told.seen.push([...words]);
+    }
+    return told;
+    """
+    told, console = probe(browser, demo / "page.html", body)
+    assert calm(console) == [] and told["names"] == ["the best grasp", "the best few"]
+    assert 3000 < told["n"][0] < told["n"][1]
+    alone, few = told["seen"]
+    assert sum(word.startswith("grasp") for word in alone) == 1 and "the region" in alone
+    assert sum(word.startswith("grasp") for word in few) > 2
+    assert all(word in told["legend"] for word in few)
 
 
 def test_what_cannot_be_shown_is_told_with_what_can(demo):

@@ -53,7 +53,9 @@ pub fn write_transfer(
     write_weighted(&[at("target.ply"), at("target.glb")], mesh, transfer.weights())?;
     exhibit.write_transfer_picture(&at("transfer.png"), task)?;
     exhibit.write_meaning_picture(&at("meaning.png"), task)?;
-    let mut names = vec![
+    #[cfg(feature = "mcap")]
+    crate::scene::write(&at("transfer.mcap"), &exhibit, &report, task)?;
+    let names = [
         "region.json",
         "report.json",
         "point_map.json",
@@ -63,12 +65,8 @@ pub fn write_transfer(
         "transfer.png",
         "meaning.png",
     ];
-    #[cfg(feature = "mcap")]
-    {
-        crate::scene::write(&at("transfer.mcap"), &exhibit, &report, task)?;
-        names.push("transfer.mcap");
-    }
-    Ok(names.into_iter().map(at).collect())
+    let scene = cfg!(feature = "mcap").then_some("transfer.mcap");
+    Ok(names.into_iter().chain(scene).map(at).collect())
 }
 
 /// Weights to four digits: enough for eyes, and a third of the bytes.

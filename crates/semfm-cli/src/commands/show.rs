@@ -11,7 +11,7 @@ use super::Outcome;
 use crate::options::Common;
 use crate::talk;
 
-/// Put results on one HTML page, in three dimensions: transfers, meshes with regions, views
+/// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
 ///
 /// The page needs no network. Pointing at the source lights the matched place of the target, and the
 /// other way round.
@@ -19,7 +19,7 @@ use crate::talk;
 #[command(after_help = "Examples:\n  semfm-cli show semfm-demo/transfer -o demo.html\n  \
     semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html")]
 pub struct Show {
-    /// Folders that `transfer -o` wrote, meshes, regions (each after its mesh), views files
+    /// Folders that `transfer -o` wrote, meshes, regions and grasps (after their mesh), views files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Where to write the page

@@ -14,14 +14,14 @@ use semfm_views::{Paint, RenderSettings, View, render};
 use super::sheet::{Entry, Row, Sheet};
 use super::upright::upright;
 use super::viewpoints::viewpoints_around;
-use super::{SIDE, weight_colors};
+use super::{SIDE, Sides, weight_colors};
 use crate::Result;
 
 /// Colour of the worst and of the best hand shown, as sRGB in 0..1.
 const WORST: [f32; 3] = [0.95, 0.75, 0.30];
 const BEST: [f32; 3] = [0.13, 0.42, 0.80];
 /// More hands than this hide each other and the object.
-const SHOWN: usize = 6;
+pub(crate) const SHOWN: usize = 6;
 
 /// Writes the picture of the first few of `grasps`, best first, on `mesh` in metres; `weights` is
 /// the region, one weight per vertex.
@@ -63,7 +63,7 @@ pub fn write_grasp_picture(
 }
 
 /// The better the bluer.
-fn hand_color(rank: usize) -> [f32; 3] {
+pub(crate) fn hand_color(rank: usize) -> [f32; 3] {
     let share = rank as f32 / SHOWN as f32;
     std::array::from_fn(|c| BEST[c] + share * (WORST[c] - BEST[c]))
 }
@@ -86,12 +86,24 @@ fn sides(
         colors.resize(vertices.len(), hand_color(rank));
     }
     let scene = Mesh::new(vertices, faces)?;
-    let marked: Vec<f64> =
-        (0..scene.n_vertices()).map(|v| weights.get(v).copied().unwrap_or(0.0)).collect();
-    let sides = viewpoints_around(upright(mesh)?.up, &scene, &marked, SIDE, task)?;
+    let sides = sides_with_hands(mesh, &scene, weights, SIDE, task)?;
     let cameras = [sides.best, sides.other];
     let light = RenderSettings::default();
     Ok(render(&scene, &Paint::Vertices(&colors), &cameras, &light, task)?)
+}
+
+/// From where an object with hands is looked at: `scene` is `mesh` with the hands behind its vertices,
+/// and the object's own way up counts.
+pub(crate) fn sides_with_hands(
+    mesh: &Mesh,
+    scene: &Mesh,
+    weights: &[f64],
+    side: u32,
+    task: &Task,
+) -> Result<Sides> {
+    let mut marked = weights.to_vec();
+    marked.resize(scene.n_vertices(), 0.0);
+    viewpoints_around(upright(mesh)?.up, scene, &marked, side, task)
 }
 
 /// The hand's parts at a grasp, in the object's frame: vertices and triangles.

@@ -16,6 +16,7 @@ pub use grasps::write_grasp_picture;
 pub use sheet::write_sheet;
 pub use viewpoints::{Sides, paired_viewpoints, viewpoints};
 
+pub(crate) use grasps::{SHOWN, hand_color, sides_with_hands};
 pub(crate) use meaning::anchor_color;
 pub(crate) use sheet::bytes;
 

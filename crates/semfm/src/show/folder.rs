@@ -7,16 +7,17 @@ use semfm_geom::{Mesh, Task};
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::grasps::grasps_group;
 use super::paths::own_colors;
 use super::{Group, Layer, Paint, Panel};
 use crate::picture::{MARKED, PLAIN, Sides, anchor_color, bytes, paired_viewpoints};
 use crate::{Error, Region, Result};
 
-/// What the files of `folder` say of one transfer.
+/// What the files of `folder` say of one transfer, and its grasps, where there are some.
 ///
 /// # Errors
 /// Whatever is missing in the folder or wrong with its files; parts that are not of one transfer.
-pub(super) fn transfer_group(folder: &Path, task: &Task) -> Result<Group> {
+pub(super) fn transfer_groups(folder: &Path, task: &Task) -> Result<Vec<Group>> {
     let report: Value = read_json(&folder.join("report.json"))?;
     let map: PointMapFile = read_json(&folder.join("point_map.json"))?;
     let [source, target] = ["source.ply", "target.ply"].map(|name| read_mesh(folder.join(name)));
@@ -59,6 +60,11 @@ pub(super) fn transfer_group(folder: &Path, task: &Task) -> Result<Group> {
         64,
         task,
     )?;
+    let grasps = folder.join("grasps.json");
+    let grasps = match grasps.is_file() {
+        true => grasps_group(&grasps, &target.mesh, Some(&on_target), task)?,
+        false => None,
+    };
     let panel = |name: &str, file: MeshFile, sides: Sides| Panel {
         name: name.into(),
         note: format!("{} vertices, {} triangles", file.mesh.n_vertices(), file.mesh.n_faces()),
@@ -77,14 +83,15 @@ pub(super) fn transfer_group(folder: &Path, task: &Task) -> Result<Group> {
         fact("method", &report["settings"]["method"]),
         fact("IoU", &report["iou"]),
     ];
-    Ok(Group {
+    let transfer = Group {
         title: title(folder),
         facts: facts.into_iter().flatten().collect(),
         panels,
         layers,
         source_of: Some(map.source_of),
         pictures: Vec::new(),
-    })
+    };
+    Ok([Some(transfer), grasps].into_iter().flatten().collect())
 }
 
 /// The folder's name, after that of the folder it lies in.
@@ -223,7 +230,7 @@ impl Place {
     }
 }
 
-fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
+pub(super) fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path)
         .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
     serde_json::from_slice(&bytes).map_err(|error| Error::Format {

@@ -5,6 +5,7 @@
 //! is ours and draws with WebGL 2.
 
 mod folder;
+mod grasps;
 mod pack;
 mod paths;
 #[cfg(feature = "mcap")]

@@ -6,53 +6,46 @@ use semfm_geom::Task;
 use semfm_geom::io::{MeshFile, MeshFormat, read_mesh};
 use serde_json::Value;
 
-use super::folder::transfer_group;
+use super::folder::{read_json, transfer_groups};
+use super::grasps::grasps_group;
 use super::{Group, Layer, Paint, Panel};
 use crate::region_file::read_region;
 use crate::{Error, Region, Result};
 
 /// What `show` takes, for its messages.
 const EXPECTED: &str = "the folder that `transfer -o` wrote, a mesh (OBJ, PLY, STL, OFF, glTF or GLB), \
-    a region (JSON) after its mesh, or a views file (MCAP)";
+    a region or grasps (JSON) after their mesh, or a views file (MCAP)";
 
-/// One group for each folder of a transfer, mesh and views file; a region file is shown on the mesh
-/// before it.
+/// The groups of all paths: one for each folder of a transfer (and one for its grasps), mesh and views
+/// file; a region file is shown on the mesh before it, a file of grasps beside it.
 ///
 /// # Errors
 /// Whatever is missing in a folder or wrong with a file; [`Error::Format`] for anything else, with what
 /// it is and what would be taken.
 pub fn groups_of_paths(paths: &[PathBuf], task: &Task) -> Result<Vec<Group>> {
     let mut groups: Vec<Group> = Vec::new();
-    // Whether the last group is a mesh that a region may follow.
-    let mut takes_regions = false;
+    // The group of the mesh that regions and grasps belong to, and the last region on it.
+    let mut mesh: Option<(usize, Option<Region>)> = None;
     for path in paths {
-        let is_region = !path.is_dir() && extension(path) == "json";
-        if is_region {
-            match groups.last_mut().filter(|_| takes_regions) {
-                Some(group) => add_region(group, path, task)?,
-                None => return Err(json_alone(path)),
+        if !path.is_dir() && extension(path) == "json" {
+            let Some((at, region)) = &mut mesh else { return Err(json_alone(path)) };
+            if is_grasps(path)? {
+                let weights = region.as_ref().map(Region::weights);
+                groups.extend(grasps_group(path, &groups[*at].panels[0].mesh, weights, task)?);
+            } else {
+                *region = Some(add_region(&mut groups[*at], path, task)?);
             }
             continue;
         }
-        takes_regions = false;
-        groups.push(if path.is_dir() {
-            group_of_folder(path, task)?
+        mesh = None;
+        if path.is_dir() {
+            groups.extend(groups_of_folder(path, task)?);
         } else if extension(path) == "mcap" {
-            group_of_mcap(path, task)?
-        } else if MeshFormat::from_path(path).is_some() {
-            takes_regions = true;
-            mesh_group(path, task)?
+            groups.push(group_of_mcap(path, task)?);
         } else {
-            // A file without a telling name may still be a mesh.
-            match read_mesh(path) {
-                Ok(file) => {
-                    takes_regions = true;
-                    group_of_mesh(path, file, task)?
-                }
-                Err(error @ semfm_geom::Error::Io { .. }) => return Err(error.into()),
-                Err(_) => return Err(fault(path, "file", "something else")),
-            }
-        });
+            mesh = Some((groups.len(), None));
+            groups.push(mesh_group(path, task)?);
+        }
     }
     Ok(groups)
 }
@@ -86,14 +79,20 @@ fn json_alone(path: &Path) -> Error {
     }
 }
 
-fn group_of_folder(folder: &Path, task: &Task) -> Result<Group> {
+/// Whether a JSON file says that it holds grasps.
+fn is_grasps(path: &Path) -> Result<bool> {
+    let value: Value = read_json(path)?;
+    Ok(value["format"] == "semfm.grasps/1")
+}
+
+fn groups_of_folder(folder: &Path, task: &Task) -> Result<Vec<Group>> {
     if folder.join("report.json").is_file() {
-        return transfer_group(folder, task);
+        return transfer_groups(folder, task);
     }
     // The folder of a demonstration.
     let inner = folder.join("transfer");
     if inner.join("report.json").is_file() {
-        return transfer_group(&inner, task);
+        return transfer_groups(&inner, task);
     }
     let found = match folder.join("results.json").is_file() {
         true => "an evaluation, which has its own page: index.html",
@@ -125,7 +124,13 @@ fn group_of_mcap(path: &Path, _task: &Task) -> Result<Group> {
 }
 
 fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
-    group_of_mesh(path, read_mesh(path)?, task)
+    match read_mesh(path) {
+        Ok(file) => group_of_mesh(path, file, task),
+        // A file without a telling name may be a mesh, or anything.
+        Err(error @ semfm_geom::Error::Io { .. }) => Err(error.into()),
+        Err(error) if MeshFormat::from_path(path).is_some() => Err(error.into()),
+        Err(_) => Err(fault(path, "file", "something else")),
+    }
 }
 
 fn group_of_mesh(path: &Path, file: MeshFile, task: &Task) -> Result<Group> {
@@ -146,7 +151,7 @@ fn group_of_mesh(path: &Path, file: MeshFile, task: &Task) -> Result<Group> {
 }
 
 /// Puts a region in front of the other layers of a mesh, and looks at it from where it shows.
-fn add_region(group: &mut Group, path: &Path, task: &Task) -> Result<()> {
+fn add_region(group: &mut Group, path: &Path, task: &Task) -> Result<Region> {
     let panel = &mut group.panels[0];
     let region = read_region(path, &panel.mesh)?;
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -158,7 +163,7 @@ fn add_region(group: &mut Group, path: &Path, task: &Task) -> Result<()> {
     }
     let paints = vec![Paint::Weights(region.weights().to_vec())];
     group.layers.insert(at, Layer { name, legend: Vec::new(), paints });
-    Ok(())
+    Ok(region)
 }
 
 /// Colours of the vertices as the file has them: its own, those of its images, or grey.
