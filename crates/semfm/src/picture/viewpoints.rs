@@ -236,6 +236,9 @@ fn turn_of_pair(
     let heading = |(mesh, weights): (&Mesh, &[f64]), flat: DMat3| {
         let inside = mesh.vertices().iter().zip(weights).filter(|(_, w)| **w >= Region::COUNTS);
         let inside: Vec<DVec3> = inside.map(|(&p, _)| p).collect();
+        if inside.is_empty() {
+            return None;
+        }
         let middle = mean(mesh.vertices());
         let reach = mesh.vertices().iter().map(|&p| (flat * (p - middle)).truncate().length());
         let reach = reach.fold(0.0, f64::max);

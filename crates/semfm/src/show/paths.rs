@@ -140,8 +140,14 @@ fn group_of_mesh(path: &Path, file: MeshFile, task: &Task) -> Result<Group> {
         legend: Vec::new(),
         paints: vec![Paint::Colors(own_colors(&file))],
     };
+    let panel = Panel::new(&name, file.mesh, None, task).map_err(|error| Error::Format {
+        path: path.to_owned(),
+        place: "mesh".into(),
+        expected: "a surface that can be drawn".into(),
+        found: error.to_string(),
+    })?;
     Ok(Group {
-        panels: vec![Panel::new(&name, file.mesh, None, task)?],
+        panels: vec![panel],
         title: name,
         facts: Vec::new(),
         layers: vec![layer],
