@@ -20,6 +20,8 @@ from foxglove_files import (
     sdk_module,
 )
 from PIL import Image
+from semfm.sidecar.cli import main as embed
+from tiny_onnx import write_encoder
 
 #: Name of a file -> what it must hold: topics without digits, and their schemas.
 EXPECTED = {
@@ -32,6 +34,12 @@ EXPECTED = {
         "/views/NNN/triangles": "foxglove.RawImage",
     },
     "containers_0_s0.emb.mcap": {
+        "/tf": "foxglove.FrameTransform",
+        "/views/NNN/camera": "foxglove.CameraCalibration",
+        "/views/NNN/embeddings": "semfm.PatchEmbeddings",
+    },
+    # The same by semfm-embed, which is Python.
+    "source.emb.mcap": {
         "/tf": "foxglove.FrameTransform",
         "/views/NNN/camera": "foxglove.CameraCalibration",
         "/views/NNN/embeddings": "semfm.PatchEmbeddings",
@@ -80,8 +88,19 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def embedded(folder):
+    """The views through a tiny ONNX encoder and semfm-embed's own road."""
+    pytest.importorskip("onnxruntime")
+    views, path = folder / "source.views.mcap", folder / "source.emb.mcap"
+    assert embed([str(views), "-o", str(path), "--model", str(write_encoder(folder))]) == 0
+    return path
+
+
 @pytest.fixture(scope="module", params=EXPECTED)
 def file(request, folder):
+    if request.param == "source.emb.mcap":
+        request.getfixturevalue("embedded")
     return request.param, read(folder / request.param)
 
 
@@ -115,8 +134,9 @@ def test_schemas_are_those_that_foxglove_publishes(file):
     assert compared > 10
 
 
-def test_our_own_schema_is_the_one_in_the_documentation(folder):
-    scene = read(folder / "containers_0_s0.emb.mcap")
+@pytest.mark.parametrize("name", ["containers_0_s0.emb.mcap", "source.emb.mcap"])
+def test_our_own_schema_is_the_one_in_the_documentation(folder, embedded, name):
+    scene = read(folder / name)
     ours = fields_of(scene.schemas["semfm.PatchEmbeddings"].file)["semfm.PatchEmbeddings"]
     text = (ROOT / "docs" / "semfm.proto").read_text()
     stated = re.findall(r"^\s+([\w.]+) (\w+) = (\d+);", text, re.M)
