@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
+import threading
 from pathlib import Path
 
 import pytest
@@ -30,10 +32,8 @@ def browser() -> str:
     pytest.skip(f"no browser: none of {', '.join(BROWSERS)} is on the PATH")
 
 
-def browse(browser: str, page: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Opens a page without a screen; the console comes on stderr."""
-    profile = page.parent / "profile"
-    command = [
+def command_line(browser: str, page: Path, *options: str) -> list[str]:
+    return [
         browser,
         "--headless=new",
         "--no-sandbox",
@@ -43,9 +43,54 @@ def browse(browser: str, page: Path, *options: str) -> subprocess.CompletedProce
         "--disable-background-networking",
         "--disable-component-update",
         "--enable-logging=stderr",
-        f"--user-data-dir={profile}",
-        "--virtual-time-budget=20000",
+        f"--user-data-dir={page.parent / 'profile'}",
+        "--window-size=1280,900",
         *options,
         page.as_uri(),
     ]
+
+
+def browse(browser: str, page: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Opens a page without a screen, its clock run ahead; the console comes on stderr."""
+    command = command_line(browser, page, "--virtual-time-budget=20000", *options)
     return subprocess.run(command, capture_output=True, text=True, timeout=180)
+
+
+#: Runs `PROBE`, the body of an async function, and tells what it returns.
+SCRIPT = """<script>
+addEventListener("load", async () => {
+  const frame = () => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
+  try { console.log("told " + JSON.stringify(await (async () => { PROBE })())); }
+  catch (error) { console.log("told " + JSON.stringify({ error: String(error.stack) })); }
+});
+</script>
+"""
+
+
+def probe(browser: str, page: Path, body: str, *options: str, seconds: float = 120):
+    """What `body`, the body of an async function, returns inside a page with a real clock, and what
+    else the console said."""
+    probed = page.parent / f"probed-{page.name}"
+    script = SCRIPT.replace("PROBE", body)
+    probed.write_text(page.read_text().replace("</body>", script + "</body>"))
+    command = command_line(browser, probed, "--remote-debugging-port=0", *options)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, errors="replace")
+    watch = threading.Timer(seconds, process.kill)
+    watch.start()
+    told, console = None, []
+    try:
+        for line in process.stderr:
+            if ":CONSOLE" not in line:
+                continue
+            if '"told {' in line:
+                told = json.loads(line[line.index('"told {') + 6 : line.rindex('", source:')])
+                break
+            console.append(line.strip())
+    finally:
+        watch.cancel()
+        process.kill()
+        process.wait()
+        process.stderr.close()
+    assert told is not None, "the page told nothing: " + "\n".join(console)
+    assert "error" not in told, told["error"]
+    return told, console

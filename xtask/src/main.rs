@@ -8,6 +8,7 @@
 mod docs;
 mod duplicates;
 mod features;
+mod pictures;
 mod process;
 mod python;
 mod tally;
@@ -33,6 +34,7 @@ cargo xtask deny            one version of each crate whose types cross our bord
 cargo xtask corpus          the readers against the corpus of bad files, where it is at hand
 cargo xtask stubs           writes the type stubs of the Python package anew
 cargo xtask wheel           builds the wheel (release) and checks its size and how fast it imports
+cargo xtask pictures        makes the README's pictures anew, in a browser where there is one
 cargo xtask bench           builds the benchmark programs (release) and names them
 cargo xtask ci              fmt, lint, doc, features, deny, then test --full";
 
@@ -70,7 +72,7 @@ fn run(words: &[&str]) -> Result<bool> {
 
 type Job = fn(&Workspace) -> Result<()>;
 
-const JOBS: [(&str, Job); 9] = [
+const JOBS: [(&str, Job); 10] = [
     ("fmt", |workspace| cargo(workspace, &["fmt", "--all", "--check"]).succeed()),
     ("lint", |workspace| {
         let arguments = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
@@ -90,6 +92,7 @@ const JOBS: [(&str, Job); 9] = [
     ("stubs", python::stubs),
     ("wheel", wheel::check),
     ("bench", bench),
+    ("pictures", pictures::make),
 ];
 
 /// What CI runs before the tests, cheapest first.

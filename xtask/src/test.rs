@@ -22,7 +22,7 @@ pub fn run(workspace: &Workspace, full: bool) -> Tally {
             Tally::default().closed(false)
         }));
     };
-    let extras = if full { "onnx,embed,notebook,peers,ray,test" } else { "onnx,test" };
+    let extras = if full { "onnx,embed,notebook,peers,ray,viewers,test" } else { "onnx,test" };
     step("python environment", &|| environment(workspace, extras).map(|_| Tally::default()));
     let steps = Steps { workspace, full };
     step("rust", &|| steps.rust());

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, SceneMesh, ScenePoints, ViewsMetadata, write_scene,
+    Dtype, EmbeddingsFile, EmbeddingsMetadata, Scene, SceneMesh, ScenePoints, ViewsMetadata,
     write_views,
 };
 use semfm_views::{Camera, EmbeddedView, PatchEmbeddings, Result, View};
@@ -55,6 +55,7 @@ fn write_samples(folder: &Path) -> Result<()> {
     let shown = |topic, frame_id| SceneMesh {
         topic,
         frame_id,
+        name: "mesh",
         vertices: mesh.vertices(),
         faces: mesh.faces(),
         colors: Some(&colors),
@@ -64,10 +65,12 @@ fn write_samples(folder: &Path) -> Result<()> {
         frame_id: "source",
         points: mesh.vertices(),
         colors: &colors,
+        numbers: &[],
     };
     let about = serde_json::json!({"method": "sample"});
-    let meshes = [shown("/source/mesh", "source"), shown("/target/mesh", "target")];
-    write_scene(&folder.join("sample.transfer.mcap"), "semfm.transfer/1", &meshes, &[cloud], &about)
+    let meshes = vec![shown("/source/mesh", "source"), shown("/target/mesh", "target")];
+    let scene = Scene { meshes, clouds: vec![cloud], ..Default::default() };
+    scene.write(&folder.join("sample.transfer.mcap"), "semfm.transfer/1", &about)
 }
 
 fn tetrahedron() -> Result<Mesh> {

@@ -10,8 +10,9 @@ use prost::Message as _;
 use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, METADATA_NAME, SceneMesh, ScenePoints, ViewsFile,
-    ViewsMetadata, inspect, read_bytes, read_messages, read_view, write_scene, write_views,
+    Dtype, EmbeddingsFile, EmbeddingsMetadata, METADATA_NAME, Scene, SceneLabel, SceneLink,
+    SceneMesh, SceneNumbers, ScenePicture, ScenePoints, ViewsFile, ViewsMetadata, inspect,
+    read_bytes, read_messages, read_view, write_views,
 };
 use semfm_views::{Camera, EmbeddedView, Error, PatchEmbeddings, View};
 
@@ -400,6 +401,7 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
     let shown = |topic, frame_id| SceneMesh {
         topic,
         frame_id,
+        name: "mesh",
         vertices: mesh.vertices(),
         faces: mesh.faces(),
         colors: Some(&colors),
@@ -409,10 +411,30 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
         frame_id: "target",
         points: mesh.vertices(),
         colors: &colors,
+        numbers: &[("weight", SceneNumbers::F32(&[0.5; 4]))],
     };
-    let meshes = [shown("/source/mesh", "source"), shown("/target/mesh", "target")];
+    let rendered = views().swap_remove(0);
+    let scene = Scene {
+        meshes: vec![shown("/source/mesh", "source"), shown("/target/mesh", "target")],
+        clouds: vec![cloud],
+        labels: vec![SceneLabel {
+            topic: "/labels",
+            frame_id: "target",
+            at: None,
+            text: "target".to_owned(),
+            color: [0; 3],
+        }],
+        links: vec![SceneLink {
+            topic: "/matches",
+            from: ("source", DVec3::ZERO),
+            to: ("target", DVec3::X),
+            color: [9; 3],
+        }],
+        pictures: vec![ScenePicture { frame_id: "source", name: "view", view: &rendered }],
+        ..Default::default()
+    };
     let about = serde_json::json!({"verdict": "accept"});
-    write_scene(&path, "semfm.transfer/1", &meshes, &[cloud], &about).unwrap();
+    scene.write(&path, "semfm.transfer/1", &about).unwrap();
     let mut shifts = BTreeMap::new();
     let contents = read_messages(&path, |message| {
         if message.channel.topic == "/tf" {
@@ -422,16 +444,29 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
         Ok(())
     })
     .unwrap();
-    assert_eq!(contents.n_messages(), 5);
+    // Two meshes, a cloud, a label, links, a camera, a picture, three frames.
+    assert_eq!(contents.n_messages(), 10);
     let (name, entries) = &contents.metadata[0];
     assert_eq!(
         (name.as_str(), entries["json"].as_str()),
         (METADATA_NAME, r#"{"verdict":"accept"}"#)
     );
     // One wide each, a quarter apart.
-    assert_eq!(shifts, BTreeMap::from([("source".to_owned(), 0.0), ("target".to_owned(), 1.25)]));
-    let bad = SceneMesh { colors: Some(&colors[..3]), ..meshes[0] };
-    assert!(write_scene(&path, "semfm.transfer/1", &[bad], &[], &about).is_err());
+    assert_eq!((shifts["source"], shifts["target"]), (0.0, 1.25));
+    let short = SceneNumbers::F32(&[0.5; 3]);
+    let spoil: [fn(&mut Scene<'_>); 3] = [
+        |scene| scene.meshes[0].colors = Some(&[[0; 3]; 3]),
+        |scene| scene.labels[0].frame_id = "elsewhere",
+        |scene| scene.links[0].to.0 = "elsewhere",
+    ];
+    for spoil in spoil {
+        let mut bad = scene.clone();
+        spoil(&mut bad);
+        assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
+    }
+    let numbers = [("weight", short)];
+    let bad = Scene { clouds: vec![ScenePoints { numbers: &numbers, ..cloud }], ..scene.clone() };
+    assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
 }
 
 /// One file of each kind, as bytes.

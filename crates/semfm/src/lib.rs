@@ -40,6 +40,8 @@ pub mod picture;
 pub mod pipeline;
 pub mod region_file;
 pub mod regions;
+#[cfg(feature = "mcap")]
+mod scene;
 pub mod show;
 
 pub use error::{Error, Result};

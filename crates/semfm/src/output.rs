@@ -6,8 +6,7 @@ use semfm_geom::io::{Paint, write_painted_mesh};
 use semfm_geom::{Mesh, Task};
 use serde_json::{Map, Value, json};
 
-use crate::picture::meaning::{AnchorOfPoint, anchors_of_points, by_vertex};
-use crate::picture::{weight_colors, write_meaning_picture, write_picture};
+use crate::picture::{Exhibit, bytes, weight_colors};
 use crate::region_file::{region_json, write_json};
 use crate::{PreparedObject, Region, Result, Transfer};
 
@@ -35,11 +34,8 @@ pub fn write_transfer(
 
     write_json(&at("region.json"), &carried_json(target, transfer))?;
     write_json(&at("report.json"), &report)?;
-    let [source_anchors, target_anchors] = anchors_of_points(source, target, transfer, task)?;
-    let ranks = |object: &PreparedObject, anchors: &[AnchorOfPoint]| -> Result<Vec<i64>> {
-        let rank = |anchor: &AnchorOfPoint| anchor.1.map_or(-1, |rank| rank as i64);
-        by_vertex(object, &anchors.iter().map(rank).collect::<Vec<_>>())
-    };
+    let exhibit = Exhibit::new(source, target, region, transfer, task)?;
+    let [source_anchor, target_anchor] = exhibit.anchors_by_vertex()?;
     write_json(
         &at("point_map.json"),
         &json!({
@@ -47,15 +43,19 @@ pub fn write_transfer(
             "source": source.shape.original().hash().to_string(),
             "target": mesh.hash().to_string(),
             "source_of": transfer.point_map.source_of,
-            "source_anchor": ranks(source, &source_anchors)?,
-            "target_anchor": ranks(target, &target_anchors)?,
+            "source_anchor": source_anchor,
+            "target_anchor": target_anchor,
+            "source_weight": rounded(region.weights()),
+            "target_weight": rounded(transfer.weights()),
         }),
     )?;
     write_weighted(&[at("source.ply")], source.shape.original(), region.weights())?;
     write_weighted(&[at("target.ply"), at("target.glb")], mesh, transfer.weights())?;
-    write_picture(&at("transfer.png"), source, target, region, transfer, task)?;
-    write_meaning_picture(&at("meaning.png"), source, target, region, transfer, task)?;
-    let mut names = vec![
+    exhibit.write_transfer_picture(&at("transfer.png"), task)?;
+    exhibit.write_meaning_picture(&at("meaning.png"), task)?;
+    #[cfg(feature = "mcap")]
+    crate::scene::write(&at("transfer.mcap"), &exhibit, &report, task)?;
+    let names = [
         "region.json",
         "report.json",
         "point_map.json",
@@ -65,18 +65,20 @@ pub fn write_transfer(
         "transfer.png",
         "meaning.png",
     ];
-    #[cfg(feature = "mcap")]
-    {
-        scene::write(&at("transfer.mcap"), source, target, region, transfer, &report)?;
-        names.push("transfer.mcap");
-    }
-    Ok(names.into_iter().map(at).collect())
+    let scene = cfg!(feature = "mcap").then_some("transfer.mcap");
+    Ok(names.into_iter().chain(scene).map(at).collect())
+}
+
+/// Weights to four digits: enough for eyes, and a third of the bytes.
+fn rounded(weights: &[f64]) -> Vec<f64> {
+    weights.iter().map(|w| (w * 1e4).round() / 1e4).collect()
 }
 
 /// A mesh as read with a weight per vertex, as property and as colour.
 fn write_weighted(paths: &[PathBuf], mesh: &Mesh, weights: &[f64]) -> Result<()> {
-    let bytes = |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c: f32| (c * 255.0).round() as u8);
-    let colors: Vec<[u8; 4]> = weight_colors(weights).into_iter().map(bytes).collect();
+    let opaque = |[r, g, b]: [u8; 3]| [r, g, b, u8::MAX];
+    let colors: Vec<[u8; 4]> =
+        weight_colors(weights).into_iter().map(|color| opaque(bytes(color))).collect();
     let paint = Paint { colors: Some(&colors), scalars: &[("weight", weights)] };
     Ok(paths.iter().try_for_each(|path| write_painted_mesh(path, mesh, &paint))?)
 }
@@ -165,63 +167,4 @@ fn object_json(object: &PreparedObject) -> Value {
         value["cloud"]["lifted_by_view"] = json!(lifted.lifted_by_view);
     }
     value
-}
-
-#[cfg(feature = "mcap")]
-mod scene {
-    //! `transfer.mcap`: both objects with their clouds, for Foxglove and its like.
-
-    use semfm_views::mcap::{SceneMesh, ScenePoints, write_scene};
-
-    use super::*;
-    use crate::picture::meaning::meaning_colors;
-
-    pub(super) fn write(
-        path: &Path,
-        source: &PreparedObject,
-        target: &PreparedObject,
-        region: &Region,
-        transfer: &Transfer,
-        report: &Value,
-    ) -> Result<()> {
-        let bytes = |colors: Vec<[f32; 3]>| -> Vec<[u8; 3]> {
-            colors.into_iter().map(|c| c.map(|x| (x * 255.0).round() as u8)).collect()
-        };
-        let [source_meaning, target_meaning] =
-            meaning_colors(&source.cloud, &target.cloud)?.map(bytes);
-        let [marked, carried] =
-            [region.weights(), transfer.weights()].map(|weights| bytes(weight_colors(weights)));
-        let (source_mesh, target_mesh) = (source.shape.original(), target.shape.original());
-        let meshes = [
-            SceneMesh {
-                topic: "/source/mesh",
-                frame_id: "source",
-                vertices: source_mesh.vertices(),
-                faces: source_mesh.faces(),
-                colors: Some(&marked),
-            },
-            SceneMesh {
-                topic: "/target/mesh",
-                frame_id: "target",
-                vertices: target_mesh.vertices(),
-                faces: target_mesh.faces(),
-                colors: Some(&carried),
-            },
-        ];
-        let clouds = [
-            ScenePoints {
-                topic: "/source/cloud",
-                frame_id: "source",
-                points: source.cloud.points(),
-                colors: &source_meaning,
-            },
-            ScenePoints {
-                topic: "/target/cloud",
-                frame_id: "target",
-                points: target.cloud.points(),
-                colors: &target_meaning,
-            },
-        ];
-        Ok(write_scene(path, "semfm.transfer/1", &meshes, &clouds, report)?)
-    }
 }

@@ -90,7 +90,8 @@ impl Demo {
         let outcome = job.finish(&folder, about, Some(&hand), &task, &talkative)?;
         if !common.json {
             talk::say(format_args!("IoU         {overlap:.2} with the true grip"));
-            for picture in ["transfer.png", "grasps.png"].map(|name| folder.join(name)) {
+            let pictures = ["transfer.png", "meaning.png", "grasps.png"];
+            for picture in pictures.map(|name| folder.join(name)) {
                 talk::say(format_args!("picture     {}", picture.display()));
             }
             if !common.quiet {
@@ -119,4 +120,6 @@ fn repeat_by_hand(source: &ObjectFiles, target: &ObjectFiles, scale: f64, folder
         quoted(&target.embeddings),
         quoted(folder),
     ));
+    talk::say("in three dimensions, in a browser");
+    talk::say(format_args!("  semfm-cli show {} -o semfm-demo.html", quoted(folder)));
 }

@@ -4,20 +4,22 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use semfm::show::{group_of_path, write_page};
+use semfm::show::{groups_of_paths, write_page};
 use serde_json::json;
 
 use super::Outcome;
 use crate::options::Common;
 use crate::talk;
 
-/// Put results on one HTML page, in three dimensions: folders of transfers and meshes
+/// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
 ///
-/// The page needs no network. Pointing at the source lights the matched place of the target.
+/// The page needs no network. Pointing at the source lights the matched place of the target, and the
+/// other way round.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  semfm-cli show semfm-demo/transfer -o demo.html")]
+#[command(after_help = "Examples:\n  semfm-cli show semfm-demo/transfer -o demo.html\n  \
+    semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html")]
 pub struct Show {
-    /// Folders that `transfer -o` wrote, and mesh files
+    /// Folders that `transfer -o` wrote, meshes, regions and grasps (after their mesh), views files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Where to write the page
@@ -30,8 +32,7 @@ pub struct Show {
 
 impl Show {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let groups =
-            self.paths.iter().map(|path| group_of_path(path)).collect::<semfm::Result<Vec<_>>>()?;
+        let groups = groups_of_paths(&self.paths, &talk::watched(common.quiet))?;
         write_page(&self.output, &self.title, &groups)?;
         let output = self.output.display();
         if common.json {

@@ -215,7 +215,8 @@ impl Subject {
     ) -> Result<Self> {
         let object = entry.load()?;
         let (mesh, truth) = (object.file.mesh, object.truth);
-        let cameras = viewpoints(&mesh, truth.weights(), side, task)?;
+        let sides = viewpoints(&mesh, truth.weights(), side, task)?;
+        let cameras = [sides.best, sides.other];
         let mut subject =
             Self { name: entry.name.clone(), mesh, truth, cameras, place, own: String::new() };
         let colors = palette::by_weight(subject.truth.weights(), palette::RIGHT);

@@ -47,10 +47,15 @@ fn parse_number(text: &str) -> Option<usize> {
 
 /// Intrinsics of a view's camera.
 pub(super) fn calibration(view: usize, time: u64, camera: &Camera) -> CameraCalibration {
+    calibration_in(frame(view), time, camera)
+}
+
+/// Intrinsics of a camera whose frame is `frame_id`.
+pub(super) fn calibration_in(frame_id: String, time: u64, camera: &Camera) -> CameraCalibration {
     let Camera { fx, fy, cx, cy, .. } = *camera;
     CameraCalibration {
         timestamp: Some(timestamp(time)),
-        frame_id: frame(view),
+        frame_id,
         width: camera.width,
         height: camera.height,
         distortion_model: String::new(),
@@ -63,13 +68,23 @@ pub(super) fn calibration(view: usize, time: u64, camera: &Camera) -> CameraCali
 
 /// The camera's pose in the object's frame.
 pub(super) fn transform(view: usize, time: u64, camera: &Camera) -> FrameTransform {
+    transform_in(OBJECT, frame(view), time, camera)
+}
+
+/// The pose of a camera, whose frame is `child`, in the object's frame `parent`.
+pub(super) fn transform_in(
+    parent: &str,
+    child: String,
+    time: u64,
+    camera: &Camera,
+) -> FrameTransform {
     let object_from_camera = camera.camera_from_object.inverse();
     let DVec3 { x, y, z } = object_from_camera.translation;
     let q = DQuat::from_mat3(&object_from_camera.matrix3).normalize();
     FrameTransform {
         timestamp: Some(timestamp(time)),
-        parent_frame_id: OBJECT.to_owned(),
-        child_frame_id: frame(view),
+        parent_frame_id: parent.to_owned(),
+        child_frame_id: child,
         translation: Some(Vector3 { x, y, z }),
         rotation: Some(Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
     }

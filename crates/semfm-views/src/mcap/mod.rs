@@ -16,7 +16,9 @@ mod reader;
 mod record;
 mod ros2;
 mod scene;
+mod scene_messages;
 mod schema;
+mod shown;
 mod summary;
 mod views_file;
 mod writer;
@@ -26,6 +28,10 @@ pub use inspect::{AttachmentReport, ChannelReport, METADATA_NAME, McapReport, in
 pub use metadata::{EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
 pub use reader::{Channel, Contents, Message, Schema, read_bytes, read_messages};
 pub use ros2::{POSES_TOPIC, write_pose_array};
-pub use scene::{SceneMesh, ScenePoints, write_scene};
+pub use scene::{
+    Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
+    ScenePoints, Severity,
+};
 pub use schema::PATCH_EMBEDDINGS;
+pub use shown::{Colors, read_cloud, read_mesh};
 pub use views_file::{ViewsFile, read_view, write_views};

@@ -1,19 +1,49 @@
-//! Coloured meshes and point clouds for a viewer: `transfer.mcap`.
+//! Coloured meshes, point clouds, labels and pictures for a viewer: `transfer.mcap`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{
-    Color, FrameTransform, PackedElementField, Point3, PointCloud, Pose, Quaternion, SceneEntity,
-    SceneUpdate, TriangleListPrimitive, Vector3,
+    CompressedImage, FrameTransform, Quaternion, SceneEntity, SceneUpdate, Vector3,
 };
-use semfm_geom::math::{DVec3, bounds};
+use semfm_geom::math::{DMat3, DQuat, DVec3, bounds};
 
-use super::frames::TF;
+use super::frames::{TF, calibration_in, transform_in};
 use super::inspect::METADATA_NAME;
-use super::writer::{Packing, timestamp, write_file};
-use crate::{Error, Result};
+use super::scene_messages::{
+    Segment, log_message, mesh_entity, point_cloud, segments_entity, text_entity,
+};
+use super::views_file::encode_png;
+use super::writer::{McapFile, Packing, timestamp, write_file};
+use crate::{Error, Result, View};
+
+/// What a viewer is shown. Everything is recorded at time 0.
+#[derive(Clone, Debug, Default)]
+pub struct Scene<'a> {
+    /// How the frames stand in `world`; those that are not named stand as they are.
+    pub frames: Vec<SceneFrame<'a>>,
+    /// Meshes; those of one topic go into one `foxglove.SceneUpdate`.
+    pub meshes: Vec<SceneMesh<'a>>,
+    /// Clouds, each a `foxglove.PointCloud`.
+    pub clouds: Vec<ScenePoints<'a>>,
+    /// Words.
+    pub labels: Vec<SceneLabel<'a>>,
+    /// Lines from frame to frame.
+    pub links: Vec<SceneLink<'a>>,
+    /// Pictures with their cameras.
+    pub pictures: Vec<ScenePicture<'a>>,
+    /// One `foxglove.Log`.
+    pub log: Option<SceneLog<'a>>,
+}
+
+/// How a frame stands in `world`.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneFrame<'a> {
+    /// The frame.
+    pub frame_id: &'a str,
+    /// A rotation.
+    pub world_from_frame: DMat3,
+}
 
 /// A triangle mesh to be shown.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +52,8 @@ pub struct SceneMesh<'a> {
     pub topic: &'a str,
     /// Frame of the vertices, such as `source`.
     pub frame_id: &'a str,
+    /// What it is; unique in its topic.
+    pub name: &'a str,
     /// Positions (n).
     pub vertices: &'a [DVec3],
     /// Triangles (m).
@@ -41,45 +73,256 @@ pub struct ScenePoints<'a> {
     pub points: &'a [DVec3],
     /// sRGB colours (n).
     pub colors: &'a [[u8; 3]],
+    /// Named numbers (n each), to colour by.
+    pub numbers: &'a [(&'a str, SceneNumbers<'a>)],
+}
+
+/// One number for each point.
+#[derive(Clone, Copy, Debug)]
+pub enum SceneNumbers<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Signed.
+    I32(&'a [i32]),
+    /// Unsigned.
+    U32(&'a [u32]),
+}
+
+/// Words in the scene.
+#[derive(Clone, Debug)]
+pub struct SceneLabel<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// Frame of `at`, or which frame's objects to stand above.
+    pub frame_id: &'a str,
+    /// Where; above everything that the frame holds without.
+    pub at: Option<DVec3>,
+    /// The words.
+    pub text: String,
+    /// sRGB.
+    pub color: [u8; 3],
+}
+
+/// A line between points of two frames, shown in `world`.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneLink<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// Frame and point where it begins.
+    pub from: (&'a str, DVec3),
+    /// Frame and point where it ends.
+    pub to: (&'a str, DVec3),
+    /// sRGB.
+    pub color: [u8; 3],
+}
+
+/// A picture with its camera: topics `/FRAME/NAME/image` and `/FRAME/NAME/camera`, frame
+/// `FRAME_NAME`.
+#[derive(Clone, Copy, Debug)]
+pub struct ScenePicture<'a> {
+    /// Frame of what was drawn.
+    pub frame_id: &'a str,
+    /// Name of the picture, such as `view`.
+    pub name: &'a str,
+    /// The picture and its camera.
+    pub view: &'a View,
+}
+
+/// How grave a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// All is well.
+    Info,
+    /// Look at it.
+    Warning,
+    /// It failed.
+    Error,
+}
+
+/// A line of the log.
+#[derive(Clone, Debug)]
+pub struct SceneLog<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// How grave it is.
+    pub severity: Severity,
+    /// The words.
+    pub text: String,
 }
 
 /// The frame in which the frames of a scene stand side by side.
-const WORLD: &str = "world";
+pub(super) const WORLD: &str = "world";
 
 /// Room between two neighbours, as a share of the larger one.
 const GAP: f64 = 0.25;
+/// Labels stand this share of the widest frame above what they belong to.
+const ABOVE: f64 = 0.12;
 
-/// Writes a scene whole or not at all: each mesh as a `foxglove.SceneUpdate`, each cloud as a
-/// `foxglove.PointCloud`, `/tf` that lays the frames side by side along x in the order in which
-/// they appear, and `metadata` as JSON in the record `semfm`, key `json`, beside its `format`.
-///
-/// # Errors
-/// [`Error::Invalid`] for colours or triangles that do not fit their points, [`Error::Io`].
-pub fn write_scene(
-    path: &Path,
-    format: &str,
-    meshes: &[SceneMesh<'_>],
-    clouds: &[ScenePoints<'_>],
-    metadata: &serde_json::Value,
-) -> Result<()> {
-    for mesh in meshes {
-        mesh.check()?;
+impl Scene<'_> {
+    /// Writes the scene whole or not at all, with `/tf` that lays the frames side by side along x in
+    /// the order in which they appear, and `metadata` as JSON in the record `semfm`, key `json`,
+    /// beside its `format`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for colours, numbers or triangles that do not fit their points and for
+    /// labels and links of a frame that holds nothing, [`Error::Io`].
+    pub fn write(&self, path: &Path, format: &str, metadata: &serde_json::Value) -> Result<()> {
+        self.check()?;
+        let stands = self.side_by_side();
+        let updates = self.updates(&stands)?;
+        write_file(path, "", Packing::Lz4, |file| {
+            let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
+            file.metadata(METADATA_NAME, entries.map(|(k, v)| (k.to_owned(), v)).into())?;
+            for stand in &stands {
+                file.log(TF, 0, &stand.transform())?;
+            }
+            for picture in &self.pictures {
+                picture.write(path, file)?;
+            }
+            if let Some(log) = &self.log {
+                file.log(log.topic, 0, &log_message(log))?;
+            }
+            for (topic, update) in &updates {
+                file.log(topic, 0, update)?;
+            }
+            self.clouds.iter().try_for_each(|cloud| file.log(cloud.topic, 0, &point_cloud(cloud)))
+        })
     }
-    for cloud in clouds {
-        check_length(cloud.topic, "colours", cloud.points.len(), cloud.colors.len())?;
-        check_finite(cloud.topic, cloud.points)?;
+
+    fn check(&self) -> Result<()> {
+        self.meshes.iter().try_for_each(SceneMesh::check)?;
+        for cloud in &self.clouds {
+            check_length(cloud.topic, "colours", cloud.points.len(), cloud.colors.len())?;
+            for (name, numbers) in cloud.numbers {
+                check_length(cloud.topic, name, cloud.points.len(), numbers.len())?;
+            }
+            check_finite(cloud.topic, cloud.points)?;
+        }
+        Ok(())
     }
-    write_file(path, "", Packing::Lz4, |file| {
-        let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
-        file.metadata(METADATA_NAME, entries.map(|(k, v)| (k.to_owned(), v)).into())?;
-        for placed in side_by_side(meshes, clouds) {
-            file.log(TF, 0, &placed)?;
+
+    /// One message for each topic with meshes, labels or links, in the order of first appearance.
+    fn updates(&self, stands: &[Stand<'_>]) -> Result<Vec<(String, SceneUpdate)>> {
+        let mut updates: Vec<(String, SceneUpdate)> = Vec::new();
+        let mut add = |topic: &str, entity: SceneEntity| match updates
+            .iter_mut()
+            .find(|(known, _)| known == topic)
+        {
+            Some((_, update)) => update.entities.push(entity),
+            None => {
+                let update = SceneUpdate { deletions: Vec::new(), entities: vec![entity] };
+                updates.push((topic.to_owned(), update));
+            }
+        };
+        let stand = |frame_id: &str| {
+            let known = || stands.iter().map(|s| s.frame_id).collect::<Vec<_>>().join(", ");
+            stands.iter().find(|stand| stand.frame_id == frame_id).ok_or_else(|| Error::Invalid {
+                what: "frame of a label or link".to_owned(),
+                expected: known(),
+                found: frame_id.to_owned(),
+            })
+        };
+        self.meshes.iter().for_each(|mesh| add(mesh.topic, mesh_entity(mesh)));
+        let widest = stands.iter().map(|s| s.high.x - s.low.x).fold(0.0, f64::max);
+        for (i, label) in self.labels.iter().enumerate() {
+            let stand = stand(label.frame_id)?;
+            let (frame, at) = match label.at {
+                Some(at) => (label.frame_id, at),
+                None => (WORLD, stand.top() + ABOVE * widest * DVec3::Z),
+            };
+            add(label.topic, text_entity(label, &format!("label {i}"), frame, at));
         }
-        for mesh in meshes {
-            file.log(mesh.topic, 0, &scene_update(mesh))?;
+        let mut segments: BTreeMap<&str, Vec<Segment>> = BTreeMap::new();
+        for link in &self.links {
+            let end = |(frame, p): (&str, DVec3)| Ok::<_, Error>(stand(frame)?.world_from(p));
+            let ends = [end(link.from)?, end(link.to)?];
+            segments.entry(link.topic).or_default().push((ends, link.color));
         }
-        clouds.iter().try_for_each(|cloud| file.log(cloud.topic, 0, &point_cloud(cloud)))
-    })
+        segments.iter().for_each(|(topic, segments)| add(topic, segments_entity(segments)));
+        Ok(updates)
+    }
+
+    /// Where each frame stands in the world, so that nothing overlaps: one beside the other along x,
+    /// all with their lowest point at z = 0.
+    fn side_by_side(&self) -> Vec<Stand<'_>> {
+        let shown = self.meshes.iter().map(|mesh| (mesh.frame_id, mesh.vertices));
+        let shown = shown.chain(self.clouds.iter().map(|cloud| (cloud.frame_id, cloud.points)));
+        let mut stands: Vec<Stand<'_>> = Vec::new();
+        for (frame_id, points) in shown {
+            let frame = self.frames.iter().find(|frame| frame.frame_id == frame_id);
+            let turn = frame.map_or(DMat3::IDENTITY, |frame| frame.world_from_frame);
+            let turned: Vec<DVec3> = points.iter().map(|&p| turn * p).collect();
+            let Some((low, high)) = bounds(&turned) else { continue };
+            match stands.iter_mut().find(|stand| stand.frame_id == frame_id) {
+                Some(stand) => (stand.low, stand.high) = (stand.low.min(low), stand.high.max(high)),
+                None => stands.push(Stand { frame_id, turn, low, high, shift: DVec3::ZERO }),
+            }
+        }
+        let widest = stands.iter().map(|s| s.high.x - s.low.x).fold(0.0, f64::max);
+        let mut edge = 0.0;
+        for stand in &mut stands {
+            let middle_y = (stand.low.y + stand.high.y) / 2.0;
+            stand.shift = DVec3::new(edge - stand.low.x, -middle_y, -stand.low.z);
+            edge += stand.high.x - stand.low.x + GAP * widest;
+        }
+        stands
+    }
+}
+
+/// A frame's place in the world.
+struct Stand<'a> {
+    frame_id: &'a str,
+    /// `world_from_frame`, with `shift`.
+    turn: DMat3,
+    shift: DVec3,
+    /// Bounds of what it holds, turned and not yet shifted.
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Stand<'_> {
+    fn world_from(&self, point: DVec3) -> DVec3 {
+        self.turn * point + self.shift
+    }
+
+    /// Middle of the upper side, in the world.
+    fn top(&self) -> DVec3 {
+        let middle = (self.low + self.high) / 2.0;
+        DVec3::new(middle.x, middle.y, self.high.z) + self.shift
+    }
+
+    fn transform(&self) -> FrameTransform {
+        let q = DQuat::from_mat3(&self.turn).normalize();
+        let DVec3 { x, y, z } = self.shift;
+        FrameTransform {
+            timestamp: Some(timestamp(0)),
+            parent_frame_id: WORLD.to_owned(),
+            child_frame_id: self.frame_id.to_owned(),
+            translation: Some(Vector3 { x, y, z }),
+            rotation: Some(Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
+        }
+    }
+}
+
+impl ScenePicture<'_> {
+    fn write(&self, path: &Path, file: &mut McapFile<'_>) -> Result<()> {
+        let Self { frame_id, name, view } = *self;
+        let camera = &view.camera;
+        let own = format!("{frame_id}_{name}");
+        let topic = |what: &str| format!("/{frame_id}/{name}/{what}");
+        file.log(TF, 0, &transform_in(frame_id, own.clone(), 0, camera))?;
+        file.log(&topic("camera"), 0, &calibration_in(own.clone(), 0, camera))?;
+        let png = encode_png(&view.rgb, (camera.width, camera.height)).map_err(|error| {
+            Error::Io { path: path.to_path_buf(), source: std::io::Error::other(error) }
+        })?;
+        let image = CompressedImage {
+            timestamp: Some(timestamp(0)),
+            frame_id: own,
+            data: png.into(),
+            format: "png".to_owned(),
+        };
+        file.log(&topic("image"), 0, &image)
+    }
 }
 
 impl SceneMesh<'_> {
@@ -96,6 +339,16 @@ impl SceneMesh<'_> {
             });
         }
         check_finite(self.topic, self.vertices)
+    }
+}
+
+impl SceneNumbers<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::F32(numbers) => numbers.len(),
+            Self::I32(numbers) => numbers.len(),
+            Self::U32(numbers) => numbers.len(),
+        }
     }
 }
 
@@ -119,100 +372,4 @@ fn check_finite(topic: &str, points: &[DVec3]) -> Result<()> {
             found: points[at].to_string(),
         }),
     }
-}
-
-/// A mesh as a scene of one entity.
-pub(super) fn scene_update(mesh: &SceneMesh<'_>) -> SceneUpdate {
-    let grey = Color { r: 0.7, g: 0.7, b: 0.7, a: 1.0 };
-    let colors = mesh.colors.unwrap_or(&[]).iter().map(|rgb| {
-        let [r, g, b] = rgb.map(|byte| f64::from(byte) / 255.0);
-        Color { r, g, b, a: 1.0 }
-    });
-    let points = mesh.vertices.iter().map(|p| Point3 { x: p.x, y: p.y, z: p.z });
-    let triangles = TriangleListPrimitive {
-        pose: Some(identity_pose()),
-        points: points.collect(),
-        color: Some(grey),
-        colors: colors.collect(),
-        indices: mesh.faces.iter().flatten().copied().collect(),
-    };
-    let entity = SceneEntity {
-        timestamp: Some(timestamp(0)),
-        frame_id: mesh.frame_id.to_owned(),
-        id: mesh.topic.trim_start_matches('/').to_owned(),
-        triangles: vec![triangles],
-        ..Default::default()
-    };
-    SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
-}
-
-fn identity_pose() -> Pose {
-    Pose {
-        position: Some(Vector3::default()),
-        orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-    }
-}
-
-/// Position as three f32 and colour as four bytes, in the names that Foxglove looks for.
-fn point_cloud(cloud: &ScenePoints<'_>) -> PointCloud {
-    let field = |name: &str, offset: u32, kind: NumericType| PackedElementField {
-        name: name.to_owned(),
-        offset,
-        r#type: kind.into(),
-    };
-    let mut data = Vec::with_capacity(16 * cloud.points.len());
-    for (point, rgb) in cloud.points.iter().zip(cloud.colors) {
-        data.extend(point.as_vec3().to_array().into_iter().flat_map(f32::to_le_bytes));
-        data.extend(rgb);
-        data.push(u8::MAX);
-    }
-    PointCloud {
-        timestamp: Some(timestamp(0)),
-        frame_id: cloud.frame_id.to_owned(),
-        pose: Some(identity_pose()),
-        point_stride: 16,
-        fields: vec![
-            field("x", 0, NumericType::Float32),
-            field("y", 4, NumericType::Float32),
-            field("z", 8, NumericType::Float32),
-            field("red", 12, NumericType::Uint8),
-            field("green", 13, NumericType::Uint8),
-            field("blue", 14, NumericType::Uint8),
-            field("alpha", 15, NumericType::Uint8),
-        ],
-        data: data.into(),
-    }
-}
-
-/// Transforms from the world to each frame, so that nothing overlaps.
-fn side_by_side(meshes: &[SceneMesh<'_>], clouds: &[ScenePoints<'_>]) -> Vec<FrameTransform> {
-    let shown = meshes.iter().map(|mesh| (mesh.frame_id, mesh.vertices));
-    let shown = shown.chain(clouds.iter().map(|cloud| (cloud.frame_id, cloud.points)));
-    let mut order: Vec<&str> = Vec::new();
-    let mut extents: BTreeMap<&str, (DVec3, DVec3)> = BTreeMap::new();
-    for (frame_id, points) in shown {
-        let Some((low, high)) = bounds(points) else { continue };
-        match extents.get_mut(frame_id) {
-            Some(extent) => *extent = (extent.0.min(low), extent.1.max(high)),
-            None => {
-                order.push(frame_id);
-                extents.insert(frame_id, (low, high));
-            }
-        }
-    }
-    let widest = extents.values().map(|(low, high)| high.x - low.x).fold(0.0, f64::max);
-    let mut edge = 0.0;
-    let place = |frame_id: &&str| {
-        let (low, high) = extents[frame_id];
-        let translation = Vector3 { x: edge - low.x, y: 0.0, z: 0.0 };
-        edge += high.x - low.x + GAP * widest;
-        FrameTransform {
-            timestamp: Some(timestamp(0)),
-            parent_frame_id: WORLD.to_owned(),
-            child_frame_id: (*frame_id).to_owned(),
-            translation: Some(translation),
-            rotation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-        }
-    };
-    order.iter().map(place).collect()
 }

@@ -17,7 +17,8 @@ use super::frames::{OBJECT, TF, calibration, frame, parse_topic, topic, transfor
 use super::inspect::METADATA_NAME;
 use super::metadata::{MeshIdentity, ViewsMetadata};
 use super::reader::{Message, read_messages};
-use super::scene::{SceneMesh, scene_update};
+use super::scene::SceneMesh;
+use super::scene_messages::mesh_update;
 use super::writer::{McapFile, Packing, timestamp, write_file};
 use crate::{Error, Result, View};
 
@@ -29,6 +30,9 @@ pub struct ViewsFile {
     /// The views, as numbered.
     pub views: Vec<View>,
 }
+
+/// Topic of the object itself.
+pub(super) const MESH: &str = "/mesh";
 
 /// Time of recording of a view, in nanoseconds: one second each, so that playing the file in
 /// Foxglove walks around the object.
@@ -58,8 +62,9 @@ pub fn write_views(
         check_view(view, rendered, metadata)?;
     }
     let shown = SceneMesh {
-        topic: "/mesh",
+        topic: MESH,
         frame_id: OBJECT,
+        name: "object",
         vertices: mesh.vertices(),
         faces: mesh.faces(),
         colors,
@@ -67,7 +72,7 @@ pub fn write_views(
     shown.check()?;
     write_file(path, "", Packing::Lz4, |file| {
         file.metadata(METADATA_NAME, metadata.entries(views.len()))?;
-        file.log(shown.topic, 0, &scene_update(&shown))?;
+        file.log(MESH, 0, &mesh_update(&shown))?;
         for (view, rendered) in views.iter().enumerate() {
             write_view(path, file, view, rendered)?;
         }
@@ -208,6 +213,14 @@ fn numbers<T>(
     Ok(image.data.as_chunks::<4>().0.iter().map(|&bytes| number(bytes)).collect())
 }
 
+/// A PNG of sRGB bytes.
+pub(super) fn encode_png(rgb: &[u8], (width, height): (u32, u32)) -> image::ImageResult<Vec<u8>> {
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(rgb, width, height, ExtendedColorType::Rgb8)?;
+    Ok(png)
+}
+
 /// sRGB bytes of a PNG that must have the given size; nothing larger is ever decoded.
 fn decode_png(bytes: &[u8], size: (u32, u32)) -> std::result::Result<Vec<u8>, (String, String)> {
     let expected = format!("a PNG of {} × {} pixels", size.0, size.1);
@@ -277,13 +290,10 @@ fn write_view(path: &Path, file: &mut McapFile<'_>, view: usize, rendered: &View
     let time = time_of(view);
     file.log(TF, time, &transform(view, time, camera))?;
     file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(rgb, width, height, ExtendedColorType::Rgb8)
-        .map_err(|error| Error::Io {
-            path: path.to_path_buf(),
-            source: std::io::Error::other(error),
-        })?;
+    let png = encode_png(rgb, (width, height)).map_err(|error| Error::Io {
+        path: path.to_path_buf(),
+        source: std::io::Error::other(error),
+    })?;
     let image = CompressedImage {
         timestamp: Some(timestamp(time)),
         frame_id: frame(view),

@@ -11,14 +11,17 @@ use semfm_geom::{Mesh, Task};
 use semfm_grasp::{Grasp, Gripper};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{SIDE, viewpoints, weight_colors, write_sheet};
+use super::sheet::{Entry, Row, Sheet};
+use super::upright::upright;
+use super::viewpoints::viewpoints_around;
+use super::{SIDE, Sides, weight_colors};
 use crate::Result;
 
 /// Colour of the worst and of the best hand shown, as sRGB in 0..1.
 const WORST: [f32; 3] = [0.95, 0.75, 0.30];
 const BEST: [f32; 3] = [0.13, 0.42, 0.80];
 /// More hands than this hide each other and the object.
-const SHOWN: usize = 6;
+pub(crate) const SHOWN: usize = 6;
 
 /// Writes the picture of the first few of `grasps`, best first, on `mesh` in metres; `weights` is
 /// the region, one weight per vertex.
@@ -34,9 +37,35 @@ pub fn write_grasp_picture(
     task: &Task,
 ) -> Result<()> {
     let shown = &grasps[..grasps.len().min(SHOWN)];
-    let mut pictures = sides(mesh, weights, gripper, shown, task)?;
-    pictures.extend(sides(mesh, weights, gripper, &shown[..shown.len().min(1)], task)?);
-    write_sheet(path, &pictures, 2)
+    let all = sides(mesh, weights, gripper, shown, task)?;
+    let Some(best) = shown.first() else {
+        let rows = [Row { title: "no grasp was found".into(), pictures: &all }];
+        return Sheet { columns: &[], rows: &rows, legend: &[Entry::Weights] }.write(path);
+    };
+    let alone = sides(mesh, weights, gripper, &shown[..1], task)?;
+    let first = match shown.len() {
+        1 => "the only grasp".to_owned(),
+        n => format!("the best {n} of {} grasps", grasps.len()),
+    };
+    let second = format!(
+        "the best one: {:.0} mm between the pads, score {:.2}",
+        1e3 * best.width,
+        best.score
+    );
+    let rows = [Row { title: first, pictures: &all }, Row { title: second, pictures: &alone }];
+    let legend = [
+        Entry::Swatch(BEST, "best hand".into()),
+        Entry::Swatch(hand_color(shown.len() - 1), "last of those shown".into()),
+        Entry::Weights,
+    ];
+    let legend = if shown.len() > 1 { &legend[..] } else { &legend[2..] };
+    Sheet { columns: &[], rows: &rows, legend }.write(path)
+}
+
+/// The better the bluer.
+pub(crate) fn hand_color(rank: usize) -> [f32; 3] {
+    let share = rank as f32 / SHOWN as f32;
+    std::array::from_fn(|c| BEST[c] + share * (WORST[c] - BEST[c]))
 }
 
 /// The object with hands, from where the region is seen best and from another side.
@@ -51,18 +80,30 @@ fn sides(
     let mut colors = weight_colors(weights);
     for (rank, grasp) in grasps.iter().enumerate() {
         let (points, triangles) = hand(gripper, grasp);
-        let (first, share) = (vertices.len() as u32, rank as f32 / SHOWN as f32);
+        let first = vertices.len() as u32;
         vertices.extend(points);
         faces.extend(triangles.iter().map(|t| t.map(|v| v + first)));
-        let color = std::array::from_fn(|c| BEST[c] + share * (WORST[c] - BEST[c]));
-        colors.resize(vertices.len(), color);
+        colors.resize(vertices.len(), hand_color(rank));
     }
     let scene = Mesh::new(vertices, faces)?;
-    let marked: Vec<f64> =
-        (0..scene.n_vertices()).map(|v| weights.get(v).copied().unwrap_or(0.0)).collect();
-    let cameras = viewpoints(&scene, &marked, SIDE, task)?;
+    let sides = sides_with_hands(mesh, &scene, weights, SIDE, task)?;
+    let cameras = [sides.best, sides.other];
     let light = RenderSettings::default();
     Ok(render(&scene, &Paint::Vertices(&colors), &cameras, &light, task)?)
+}
+
+/// From where an object with hands is looked at: `scene` is `mesh` with the hands behind its vertices,
+/// and the object's own way up counts.
+pub(crate) fn sides_with_hands(
+    mesh: &Mesh,
+    scene: &Mesh,
+    weights: &[f64],
+    side: u32,
+    task: &Task,
+) -> Result<Sides> {
+    let mut marked = weights.to_vec();
+    marked.resize(scene.n_vertices(), 0.0);
+    viewpoints_around(upright(mesh)?.up, scene, &marked, side, task)
 }
 
 /// The hand's parts at a grasp, in the object's frame: vertices and triangles.

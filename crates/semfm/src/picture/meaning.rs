@@ -7,13 +7,14 @@
 
 use std::path::Path;
 
-use semfm_fmap::clusters::spectral_clusters;
 use semfm_fmap::features::{CentredFeatures, JointFeatures};
-use semfm_geom::{PointIndex, SemanticCloud, Task};
+use semfm_geom::{SemanticCloud, Task};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{SIDE, viewpoints, write_sheet};
-use crate::{PreparedObject, Region, Result, Transfer};
+use super::exhibit::{ClusterOfPoint, by_vertex};
+use super::sheet::{Entry, Row, Sheet};
+use super::{Exhibit, Sides};
+use crate::Result;
 
 /// Features have unit RMS length: this much on each side of grey shows all but the outliers.
 const SPREAD: f64 = 1.5;
@@ -29,23 +30,50 @@ const ANCHORS: [[f32; 3]; 6] = [
 /// Clusters that are no anchors, by turns.
 const REST: [[f32; 3]; 2] = [[0.82; 3], [0.68; 3]];
 
-/// Writes the picture.
-///
-/// # Errors
-/// Whatever clustering, rendering or writing reports.
-pub fn write_meaning_picture(
-    path: &Path,
-    source: &PreparedObject,
-    target: &PreparedObject,
-    region: &Region,
-    transfer: &Transfer,
-    task: &Task,
-) -> Result<()> {
-    let [source_meaning, target_meaning] = meaning_colors(&source.cloud, &target.cloud)?;
-    let anchors = anchors_of_points(source, target, transfer, task)?;
-    let mut pictures = row(source, region.weights(), &source_meaning, &anchors[0], task)?;
-    pictures.extend(row(target, transfer.weights(), &target_meaning, &anchors[1], task)?);
-    write_sheet(path, &pictures, 3)
+impl Exhibit<'_> {
+    /// Writes the picture of what the surfaces mean.
+    ///
+    /// # Errors
+    /// Whatever rendering or writing reports.
+    pub fn write_meaning_picture(&self, path: &Path, task: &Task) -> Result<()> {
+        let [source, target] = [0, 1].map(|side| self.meaning_pictures(side, task));
+        let (source, target) = (source?, target?);
+        let rows = [
+            Row { title: "source".into(), pictures: &source },
+            Row { title: "target".into(), pictures: &target },
+        ];
+        let mut legend: Vec<Entry> = self
+            .transfer
+            .report
+            .anchors
+            .iter()
+            .enumerate()
+            .map(|(rank, anchor)| {
+                let words = format!("anchor {}: cosine {:.2}", rank + 1, anchor.anchor.cosine);
+                Entry::Swatch(anchor_color(rank as i64), words)
+            })
+            .collect();
+        legend.push(Entry::Swatch(REST[0], "other clusters".into()));
+        let words = "features: three principal components, one basis for both objects";
+        legend.push(Entry::Words(words.into()));
+        let columns = ["lifted features", "from another side", "clusters and anchors"];
+        Sheet { columns: &columns, rows: &rows, legend: &legend }.write(path)
+    }
+
+    fn meaning_pictures(&self, side: usize, task: &Task) -> Result<Vec<View>> {
+        let (object, Sides { best, other, .. }) = (self.objects()[side], self.sides[side]);
+        let paint = |&(label, anchor): &ClusterOfPoint| match anchor {
+            Some(rank) => anchor_color(rank as i64),
+            None => REST[label as usize % REST.len()],
+        };
+        let parts: Vec<[f32; 3]> = self.clusters[side].iter().map(paint).collect();
+        let (meaning, parts) =
+            (by_vertex(object, &self.meaning[side])?, by_vertex(object, &parts)?);
+        let (mesh, light) = (object.shape.original(), RenderSettings::default());
+        let mut pictures = render(mesh, &Paint::Vertices(&meaning), &[best, other], &light, task)?;
+        pictures.extend(render(mesh, &Paint::Vertices(&parts), &[best], &light, task)?);
+        Ok(pictures)
+    }
 }
 
 /// The first three principal directions of the pair's features as colours of the clouds' points, in
@@ -66,54 +94,7 @@ pub(crate) fn meaning_colors(
     Ok([colors(joint.source.as_ref()), colors(joint.target.as_ref())])
 }
 
-/// For each cloud point, source's and target's, the cluster it belongs to and the anchor that is.
-pub(crate) type AnchorOfPoint = (u32, Option<usize>);
-
-/// The clusters are made anew: they are a picture's matter, and cost some ten milliseconds.
-pub(crate) fn anchors_of_points(
-    source: &PreparedObject,
-    target: &PreparedObject,
-    transfer: &Transfer,
-    task: &Task,
-) -> Result<[Vec<AnchorOfPoint>; 2]> {
-    let (settings, anchors) = (&transfer.report.settings.clusters, &transfer.report.anchors);
-    let of = |object: &PreparedObject, side: fn(&semfm_fmap::Anchor) -> u32| {
-        let clusters = spectral_clusters(&object.cloud, settings, task)?;
-        let anchor = |label: u32| anchors.iter().position(|a| side(&a.anchor) == label);
-        Result::Ok(clusters.labels().iter().map(|&label| (label, anchor(label))).collect())
-    };
-    Ok([of(source, |a| a.source)?, of(target, |a| a.target)?])
-}
-
-/// What belongs to the cloud point nearest to each vertex of the mesh as read.
-pub(crate) fn by_vertex<T: Copy>(object: &PreparedObject, of_point: &[T]) -> Result<Vec<T>> {
-    let index = PointIndex::new(object.cloud.points())?;
-    let vertices = object.shape.original().vertices();
-    Ok(vertices.iter().map(|&p| of_point[index.nearest(p).0]).collect())
-}
-
 /// The colour of an anchor by its rank, of what is none by a negative one.
 pub(crate) fn anchor_color(rank: i64) -> [f32; 3] {
     usize::try_from(rank).map_or(REST[0], |rank| ANCHORS[rank % ANCHORS.len()])
-}
-
-fn row(
-    object: &PreparedObject,
-    weights: &[f64],
-    meaning: &[[f32; 3]],
-    anchors: &[AnchorOfPoint],
-    task: &Task,
-) -> Result<Vec<View>> {
-    let mesh = object.shape.original();
-    let [best, other] = viewpoints(mesh, weights, SIDE, task)?;
-    let paint = |&(label, anchor): &AnchorOfPoint| match anchor {
-        Some(rank) => anchor_color(rank as i64),
-        None => REST[label as usize % REST.len()],
-    };
-    let parts: Vec<[f32; 3]> = anchors.iter().map(paint).collect();
-    let (meaning, parts) = (by_vertex(object, meaning)?, by_vertex(object, &parts)?);
-    let light = RenderSettings::default();
-    let mut pictures = render(mesh, &Paint::Vertices(&meaning), &[best, other], &light, task)?;
-    pictures.extend(render(mesh, &Paint::Vertices(&parts), &[best], &light, task)?);
-    Ok(pictures)
 }

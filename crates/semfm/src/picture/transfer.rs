@@ -1,41 +1,60 @@
-//! `transfer.png`: the source with its region and the target with what arrived, side by side.
+//! `transfer.png`: the source with its region and the target with what arrived.
 //!
-//! One row for each object, source above. The first two pictures show the region in red from where
-//! it is seen best and from another side; the third paints the source by position and carries the
-//! colours over with the point map, so that equal colours are matched places.
+//! One row for each object, source above, seen from the same two sides. The first two pictures show
+//! the region in red; the third paints the source by position and carries the colours over with the
+//! point map, so that equal colours are matched places.
 
 use std::path::Path;
 
 use semfm_geom::{Mesh, Task};
 use semfm_views::{Paint, RenderSettings, View, render};
 
-use super::{SIDE, position_colors, viewpoints, weight_colors, write_sheet};
-use crate::{PreparedObject, Region, Result, Transfer};
+use super::sheet::{Entry, Row, Sheet};
+use super::{Exhibit, Sides, weight_colors};
+use crate::Result;
 
-/// Writes the picture of a transfer.
-///
-/// # Errors
-/// Whatever rendering or writing reports.
-pub fn write_picture(
-    path: &Path,
-    source: &PreparedObject,
-    target: &PreparedObject,
-    region: &Region,
-    transfer: &Transfer,
-    task: &Task,
-) -> Result<()> {
-    let (source, target) = (source.shape.original(), target.shape.original());
-    let source_places = position_colors(source.vertices());
-    let matched: Vec<[f32; 3]> =
-        transfer.point_map.source_of.iter().map(|&v| source_places[v as usize]).collect();
-    let mut pictures = row(source, region.weights(), &source_places, task)?;
-    pictures.extend(row(target, transfer.weights(), &matched, task)?);
-    write_sheet(path, &pictures, 3)
+impl Exhibit<'_> {
+    /// Writes the picture of the transfer.
+    ///
+    /// # Errors
+    /// Whatever rendering or writing reports.
+    pub fn write_transfer_picture(&self, path: &Path, task: &Task) -> Result<()> {
+        let [source, target] = [0, 1].map(|side| {
+            let (mesh, weights) = (self.meshes()[side], self.weights()[side]);
+            pictures(mesh, weights, &self.places[side], &self.sides[side], task)
+        });
+        let (source, target) = (source?, target?);
+        let rows = [
+            Row { title: "source: the demonstrated region".into(), pictures: &source },
+            Row { title: format!("target: {}", self.answer()), pictures: &target },
+        ];
+        let mut legend = vec![
+            Entry::Weights,
+            Entry::Words("colour transfer: equal colours, matched places".into()),
+        ];
+        let others: Vec<String> = self
+            .transfer
+            .hypotheses
+            .iter()
+            .skip(1)
+            .map(|hypothesis| format!("{:.0} %", 100.0 * hypothesis.probability))
+            .collect();
+        if !others.is_empty() {
+            legend.push(Entry::Words(format!("other places it may belong: {}", others.join(", "))));
+        }
+        let columns = ["region", "from another side", "colour transfer"];
+        Sheet { columns: &columns, rows: &rows, legend: &legend }.write(path)
+    }
 }
 
 /// The three pictures of one object.
-fn row(mesh: &Mesh, weights: &[f64], places: &[[f32; 3]], task: &Task) -> Result<Vec<View>> {
-    let [best, other] = viewpoints(mesh, weights, SIDE, task)?;
+fn pictures(
+    mesh: &Mesh,
+    weights: &[f64],
+    places: &[[f32; 3]],
+    &Sides { best, other, .. }: &Sides,
+    task: &Task,
+) -> Result<Vec<View>> {
     let marked = weight_colors(weights);
     let light = RenderSettings::default();
     let mut pictures = render(mesh, &Paint::Vertices(&marked), &[best, other], &light, task)?;

@@ -1,25 +1,53 @@
 //! `show`: one HTML page that holds results and the viewer for them, and needs no network.
 //!
 //! Meshes stand side by side, with layers of colour to choose from. Where a point map joins the
-//! first to the second, pointing at the source lights the matched place of the target. The viewer
-//! (`viewer.js`) is ours and draws with WebGL 2.
+//! first to the second, pointing at one lights the matched place of the other. The viewer (`*.js`)
+//! is ours and draws with WebGL 2.
 
 mod folder;
+mod grasps;
+mod pack;
+mod paths;
+#[cfg(feature = "mcap")]
+mod views;
 
 use std::path::Path;
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use semfm_geom::Mesh;
 use semfm_geom::io::write_atomically;
-use serde_json::{Map, Value, json};
+use semfm_geom::math::{DMat3, DVec3};
+use semfm_geom::{Mesh, Task};
+use serde_json::{Value, json};
 
-pub use folder::group_of_path;
-
+use self::pack::{base64, packed, packed_mesh, packed_numbers};
+use crate::picture::{MARKED, PLAIN, Sides, bytes, viewpoints};
 use crate::{Error, Result};
 
-/// Named colours of the vertices, as sRGB bytes (n).
-pub type Layer = (String, Vec<[u8; 3]>);
+pub use paths::groups_of_paths;
+
+/// How a layer colours the vertices of one mesh.
+#[derive(Clone, Debug)]
+pub enum Paint {
+    /// sRGB bytes (n).
+    Colors(Vec<[u8; 3]>),
+    /// Weights in 0..1 (n), from grey to red.
+    Weights(Vec<f64>),
+    /// Places in the layer's legend (n).
+    Classes(Vec<u8>),
+    /// The vertices' own positions as colours; where there is a point map, the second mesh takes those
+    /// of the first.
+    Places,
+}
+
+/// A way to colour all meshes of a group.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    /// What its button says.
+    pub name: String,
+    /// Colours and what they mean; words alone have no colour. An entry without words is not shown.
+    pub legend: Vec<(Option<[u8; 3]>, String)>,
+    /// One for each panel, all of one kind.
+    pub paints: Vec<Paint>,
+}
 
 /// A mesh to be shown.
 #[derive(Clone, Debug)]
@@ -30,8 +58,19 @@ pub struct Panel {
     pub note: String,
     /// The mesh.
     pub mesh: Mesh,
-    /// One or more layers; those of a group's panels have the same names in the same order.
-    pub layers: Vec<Layer>,
+    /// From where it is seen at first.
+    pub sides: Sides,
+}
+
+/// A picture of the first panel's mesh.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// What stands below it.
+    pub name: String,
+    /// The PNG file.
+    pub png: Vec<u8>,
+    /// From the object to the eye.
+    pub towards_eye: DVec3,
 }
 
 /// Meshes that are shown side by side.
@@ -43,30 +82,116 @@ pub struct Group {
     pub facts: Vec<(String, String)>,
     /// The meshes, at least one.
     pub panels: Vec<Panel>,
+    /// Ways to colour them, at least one.
+    pub layers: Vec<Layer>,
     /// Vertex of the first panel matched to each vertex of the second.
     pub source_of: Option<Vec<u32>>,
+    /// Pictures of the first panel's mesh.
+    pub pictures: Vec<Picture>,
+}
+
+impl Panel {
+    /// A mesh seen from where a region on it (a weight per vertex, or none) shows best.
+    ///
+    /// # Errors
+    /// Whatever rendering reports.
+    pub fn new(name: &str, mesh: Mesh, weights: Option<&[f64]>, task: &Task) -> Result<Self> {
+        let none = vec![0.0; mesh.n_vertices()];
+        let sides = viewpoints(&mesh, weights.unwrap_or(&none), 64, task)?;
+        let note = format!("{} vertices, {} triangles", mesh.n_vertices(), mesh.n_faces());
+        Ok(Self { name: name.into(), note, mesh, sides })
+    }
+
+    fn json(&self, paints: Vec<Value>) -> Value {
+        let upright = self.sides.upright_from_object;
+        let forward = self.sides.best.camera_from_object.matrix3.row(2);
+        let (yaw, pitch) = angles(upright, -forward);
+        let mut json = packed_mesh(&self.mesh);
+        json["name"] = json!(self.name);
+        json["note"] = json!(self.note);
+        json["upright"] = json!(upright.transpose().to_cols_array());
+        json["yaw"] = json!(yaw);
+        json["pitch"] = json!(pitch);
+        json["paints"] = json!(paints);
+        json
+    }
+}
+
+/// Heading and height of an eye: at 0 and 0 it looks along the upright frame's y.
+fn angles(upright_from_object: DMat3, towards_eye: DVec3) -> (f64, f64) {
+    let eye = (upright_from_object * towards_eye).normalize_or_zero();
+    (eye.x.atan2(-eye.y), eye.z.clamp(-1.0, 1.0).asin())
+}
+
+impl Paint {
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Colors(_) => "colors",
+            Self::Weights(_) => "weights",
+            Self::Classes(_) => "classes",
+            Self::Places => "places",
+        }
+    }
+
+    /// Entries, where it has any.
+    fn len(&self) -> Option<usize> {
+        match self {
+            Self::Colors(colors) => Some(colors.len()),
+            Self::Weights(weights) => Some(weights.len()),
+            Self::Classes(classes) => Some(classes.len()),
+            Self::Places => None,
+        }
+    }
+
+    fn json(&self) -> Value {
+        match self {
+            Self::Colors(colors) => json!(packed(colors.as_flattened())),
+            Self::Weights(weights) => {
+                let byte = |&w: &f64| (w.clamp(0.0, 1.0) * 255.0).round() as u8;
+                json!(packed(&weights.iter().map(byte).collect::<Vec<u8>>()))
+            }
+            Self::Classes(classes) => json!(packed(classes)),
+            Self::Places => Value::Null,
+        }
+    }
+}
+
+impl Layer {
+    fn json(&self) -> Value {
+        let hex = |[r, g, b]: [u8; 3]| format!("#{r:02x}{g:02x}{b:02x}");
+        let legend: Vec<Value> =
+            self.legend.iter().map(|(color, text)| json!([color.map(hex), text])).collect();
+        json!({
+            "name": self.name, "legend": legend, "kind": self.paints[0].kind(),
+            "plain": bytes(PLAIN), "marked": bytes(MARKED),
+        })
+    }
 }
 
 impl Group {
     fn check(&self) -> Result<()> {
-        let names = |panel: &Panel| {
-            panel.layers.iter().map(|layer| layer.0.clone()).collect::<Vec<_>>().join(", ")
-        };
         let fault = |what: String, expected: String, found: String| {
             Err(Error::invalid(format!("{}: {what}", self.title), expected, found))
         };
-        let Some(first) = self.panels.first() else {
-            return fault("panels".into(), "at least one".into(), "none".into());
-        };
-        for panel in &self.panels {
-            if panel.layers.is_empty() || names(panel) != names(first) {
-                return fault(format!("layers of {}", panel.name), names(first), names(panel));
+        if self.panels.is_empty() || self.layers.is_empty() {
+            return fault("panels and layers".into(), "at least one of each".into(), "none".into());
+        }
+        for Layer { name, legend, paints } in &self.layers {
+            let kinds: Vec<&str> = paints.iter().map(Paint::kind).collect();
+            if kinds.len() != self.panels.len() || kinds.iter().any(|kind| *kind != kinds[0]) {
+                let expected = format!("one paint of one kind for each of {}", self.panels.len());
+                return fault(format!("layer `{name}`"), expected, kinds.join(", "));
             }
-            for (name, colors) in &panel.layers {
+            for (panel, paint) in self.panels.iter().zip(paints) {
+                let what = format!("layer `{name}` of {}", panel.name);
                 let n = panel.mesh.n_vertices();
-                if colors.len() != n {
-                    let what = format!("colours `{name}` of {}", panel.name);
-                    return fault(what, format!("{n}, one per vertex"), colors.len().to_string());
+                if let Some(found) = paint.len().filter(|&found| found != n) {
+                    return fault(what, format!("{n}, one per vertex"), found.to_string());
+                }
+                let Paint::Classes(classes) = paint else { continue };
+                let named = legend.iter().take_while(|entry| entry.0.is_some()).count();
+                if let Some(class) = classes.iter().find(|&&class| usize::from(class) >= named) {
+                    return fault(what, format!("classes below {named}"), class.to_string());
                 }
             }
         }
@@ -84,38 +209,28 @@ impl Group {
     }
 
     fn json(&self) -> Value {
-        let panels: Vec<Value> = self
-            .panels
-            .iter()
-            .map(|panel| {
-                let points = panel.mesh.vertices().iter().flat_map(|p| p.as_vec3().to_array());
-                let positions: Vec<u8> = points.flat_map(f32::to_le_bytes).collect();
-                let faces = panel.mesh.faces().as_flattened().iter();
-                let faces: Vec<u8> = faces.flat_map(|id| id.to_le_bytes()).collect();
-                let colors: Map<String, Value> = panel
-                    .layers
-                    .iter()
-                    .map(|(name, colors)| (name.clone(), json!(base64(colors.as_flattened()))))
-                    .collect();
-                json!({
-                    "name": panel.name, "note": panel.note, "colors": colors,
-                    "positions": base64(&positions), "faces": base64(&faces),
-                })
-            })
-            .collect();
+        let paints =
+            |k: usize| self.layers.iter().map(|layer| layer.paints[k].json()).collect::<Vec<_>>();
+        let panels: Vec<Value> =
+            self.panels.iter().enumerate().map(|(k, panel)| panel.json(paints(k))).collect();
         let facts: Vec<Value> = self
             .facts
             .iter()
             .map(|(name, value)| json!([name, value, (name == "verdict").then_some(value)]))
             .collect();
-        let source_of = self
-            .source_of
-            .as_ref()
-            .map(|ids| base64(&ids.iter().flat_map(|id| id.to_le_bytes()).collect::<Vec<u8>>()));
-        let layers: Vec<&String> = self.panels[0].layers.iter().map(|layer| &layer.0).collect();
+        let upright = self.panels[0].sides.upright_from_object;
+        let picture = |picture: &Picture| {
+            let (yaw, pitch) = angles(upright, picture.towards_eye);
+            json!({ "name": picture.name, "png": base64(&picture.png), "yaw": yaw, "pitch": pitch })
+        };
         json!({
-            "title": self.title, "facts": facts, "layers": layers, "panels": panels,
-            "sourceOf": source_of,
+            "title": self.title,
+            "facts": facts,
+            "linked": self.panels.len() > 1,
+            "layers": self.layers.iter().map(Layer::json).collect::<Vec<_>>(),
+            "panels": panels,
+            "sourceOf": self.source_of.as_ref().map(|ids| packed_numbers(ids.iter().copied())),
+            "pictures": self.pictures.iter().map(picture).collect::<Vec<_>>(),
         })
     }
 }
@@ -129,10 +244,17 @@ pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
     let data = json!({ "groups": groups.iter().map(Group::json).collect::<Vec<_>>() });
     // `</script>` inside a string would end the element that holds it.
     let data = data.to_string().replace('<', "\\u003c");
+    let script = [
+        "\"use strict\";\n",
+        include_str!("painter.js"),
+        include_str!("panel.js"),
+        include_str!("viewer.js"),
+    ]
+    .concat();
     let page = include_str!("page.html")
         .replace("{{title}}", &escaped(title))
         .replace("{{version}}", env!("CARGO_PKG_VERSION"))
-        .replace("{{script}}", include_str!("viewer.js"))
+        .replace("{{script}}", &script)
         .replace("{{data}}", &data);
     Ok(write_atomically(path, |out| out.write_all(page.as_bytes()))?)
 }
@@ -142,29 +264,31 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('{', "&#123;")
 }
 
-fn base64(bytes: &[u8]) -> String {
-    BASE64_STANDARD.encode(bytes)
-}
-
 #[cfg(test)]
 mod tests {
-    use semfm_geom::math::DVec3;
-
     use super::*;
 
     fn group(source_of: Option<Vec<u32>>) -> Group {
         let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]).unwrap();
-        let panel = |name: &str| Panel {
+        let panel = |name: &str| {
+            let panel = Panel::new(name, mesh.clone(), None, &Task::default()).unwrap();
+            Panel { note: "</script><b>".into(), ..panel }
+        };
+        let layer = |name: &str, paint: Paint| Layer {
             name: name.into(),
-            note: "</script><b>".into(),
-            mesh: mesh.clone(),
-            layers: vec![("region".into(), vec![[1, 2, 3]; 3])],
+            legend: vec![(Some([1, 2, 3]), "an anchor".into())],
+            paints: vec![paint.clone(), paint],
         };
         Group {
             title: "pair".into(),
             facts: vec![("verdict".into(), "accept".into())],
             panels: vec![panel("source"), panel("target")],
+            layers: vec![
+                layer("region", Paint::Weights(vec![0.0, 0.5, 1.0])),
+                layer("anchors", Paint::Classes(vec![0; 3])),
+            ],
             source_of,
+            pictures: Vec::new(),
         }
     }
 
@@ -186,9 +310,26 @@ mod tests {
         for broken in [Some(vec![0, 1]), Some(vec![0, 1, 3])] {
             assert!(write_page(&path, "t", &[group(broken)]).is_err());
         }
-        let mut other = group(None);
-        other.panels[1].layers[0].1.pop();
-        assert!(write_page(&path, "t", &[other]).is_err());
+        let spoil: [fn(&mut Group); 4] = [
+            |group| group.layers.clear(),
+            |group| group.layers[0].paints[1] = Paint::Weights(vec![0.0; 2]),
+            |group| group.layers[0].paints[1] = Paint::Places,
+            |group| group.layers[1].paints[1] = Paint::Classes(vec![0, 1, 0]),
+        ];
+        for spoil in spoil {
+            let mut broken = group(None);
+            spoil(&mut broken);
+            assert!(write_page(&path, "t", &[broken]).is_err());
+        }
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn the_eye_is_told_by_two_angles() {
+        let close = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).hypot(b - d) < 1e-12;
+        let half = std::f64::consts::FRAC_PI_2;
+        assert!(close(angles(DMat3::IDENTITY, -DVec3::Y), (0.0, 0.0)));
+        assert!(close(angles(DMat3::IDENTITY, DVec3::X), (half, 0.0)));
+        assert!((angles(DMat3::IDENTITY, DVec3::Z).1 - half).abs() < 1e-12);
     }
 }
