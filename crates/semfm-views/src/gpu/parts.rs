@@ -18,8 +18,8 @@ const BATCH_BYTES: u64 = 8 << 20;
 /// handing it over: on lavapipe 14 views at 224 px took a fifth less time in six batches than in one.
 const BATCH_BYTES_ON_CPU: u64 = 1 << 19;
 
-/// Bytes of one part: a view that brings back more is cut.
-const PART_BYTES: u64 = 64 << 20;
+/// Bytes of one part's samples, eight each: a view that has more is cut.
+const PART_BYTES: u64 = 256 << 20;
 
 /// Pixels around the object, since a driver rounds the corners' places.
 const MARGIN: usize = 1;
@@ -60,8 +60,8 @@ pub(super) fn extent(batch: &[Part]) -> Extent {
 }
 
 /// The batches that draw all views and bring back `scale` values along each side of a pixel. What no
-/// triangle can reach is in none; what is larger than the driver's textures or than a batch is in
-/// several.
+/// triangle can reach is in none; what is larger than the driver's textures, or than a part may be,
+/// is in several.
 pub(super) fn batches(
     device: &Device,
     request: &Request<'_>,
@@ -74,8 +74,10 @@ pub(super) fn batches(
     let side = (limits.max_texture_dimension_2d / request.settings.supersampling).max(1) as usize;
     let on_cpu = device.adapter.device_type == wgpu::DeviceType::Cpu;
     let batch = if on_cpu { BATCH_BYTES_ON_CPU } else { BATCH_BYTES };
-    let [batch, part] = [batch, PART_BYTES]
-        .map(|bytes| bytes.min(limits.max_buffer_size) / u64::from(scale * scale));
+    let within = |bytes: u64, scale: u32| bytes / u64::from(scale * scale);
+    let most = within(limits.max_buffer_size, scale);
+    let part = within(PART_BYTES, request.settings.supersampling).min(most);
+    let batch = within(batch, scale).min(most);
     pack(&windows, side, batch, part)
 }
 
