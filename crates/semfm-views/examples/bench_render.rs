@@ -28,7 +28,7 @@ fn main() -> Result<(), Failure> {
     let order = Order::read(std::env::args().skip(1))?;
     let mesh = semfm_geom::io::read_mesh(&order.mesh)?.mesh;
     println!("{} vertices, {} triangles", mesh.n_vertices(), mesh.n_faces());
-    let mut bench = Bench { order: &order, mesh: &mesh, times: Vec::new() };
+    let mut bench = Bench { order: &order, mesh: &mesh, times: Vec::new(), exact: Vec::new() };
     for who in &order.who {
         match who.as_str() {
             "cpu" => bench.draw("cpu", &|cameras| {
@@ -36,7 +36,7 @@ fn main() -> Result<(), Failure> {
                 render(&mesh, &Paint::GREY, cameras, &settings, &task)
             })?,
             "driver" => bench_driver(&mut bench)?,
-            "lift" => bench_lift(&mut bench)?,
+            "lift" => bench_lift(&bench)?,
             other => return Err(format!("--who: cpu, driver or lift, not {other}").into()),
         }
     }
@@ -119,6 +119,8 @@ struct Bench<'a> {
     order: &'a Order,
     mesh: &'a Mesh,
     times: Vec<Value>,
+    /// The CPU's views of each shot, once it drew them.
+    exact: Vec<Vec<View>>,
 }
 
 impl Bench<'_> {
@@ -139,11 +141,20 @@ impl Bench<'_> {
             self.times.push(json!({
                 "who": who, "count": shot.count, "size": shot.size, "wall_ms": wall, "cpu_ms": cpu,
             }));
+            if let Some(exact) = self.exact.get(k) {
+                println!(
+                    "    {:.3} % of the pixels see the CPU's triangle",
+                    100.0 * same(exact, &views)
+                );
+            }
             if let Some(folder) = &self.order.folder {
                 write_pictures(folder, &format!("{who}-{}x{}", shot.count, shot.size), &views)?;
             }
             if let Some(sheet) = self.order.sheet.as_ref().filter(|_| k == 0) {
                 save_sheet(&views, sheet)?;
+            }
+            if who == "cpu" {
+                self.exact.push(views);
             }
         }
         Ok(())
@@ -199,7 +210,7 @@ fn bench_driver(_: &mut Bench<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-fn bench_lift(bench: &mut Bench<'_>) -> Result<(), Failure> {
+fn bench_lift(bench: &Bench<'_>) -> Result<(), Failure> {
     let (mesh, task) = (bench.mesh, Task::default());
     let cameras = rig(mesh, &RigSettings::default())?;
     let views = render(mesh, &Paint::GREY, &cameras, &RenderSettings::default(), &task)?;
@@ -240,6 +251,14 @@ fn noise_tokens(view: &View) -> EmbeddedView {
         valid: vec![true; side * side],
     };
     EmbeddedView { camera: view.camera, patches }
+}
+
+/// Share of the pixels that see the same triangle.
+fn same(one: &[View], other: &[View]) -> f64 {
+    let all = |views: &[View]| views.iter().flat_map(|view| view.triangles.clone()).collect();
+    let (one, other): (Vec<i32>, Vec<i32>) = (all(one), all(other));
+    let n_same = one.iter().zip(&other).filter(|(a, b)| a == b).count();
+    n_same as f64 / one.len().max(other.len()) as f64
 }
 
 /// All views of a shot, one after the other, as raw arrays.

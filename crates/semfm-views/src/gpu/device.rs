@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::{Error, Result};
 
-/// A driver that has not finished a batch after this long hangs. The slowest software driver takes
-/// a hundredth of it.
+/// A driver that has not finished a batch after this long hangs: lavapipe fills the largest there
+/// are in a tenth of it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Less than what the driver has, so that tests meet its limits.

@@ -293,19 +293,13 @@ impl Shader<'_> {
             let [a, b, c] = known.corners;
             // Lanes beyond the run's end are overwritten by the next one.
             for first in columns.step_by(LANES) {
-                let mut weights = [[0f32; LANES]; 3];
-                for lane in 0..LANES {
+                let weights: [[f32; 3]; LANES] = std::array::from_fn(|lane| {
                     let u = raster.position(raster.columns.start + first + lane);
-                    let exact = forms.barycentric(u, v);
-                    (0..3).for_each(|k| weights[k][lane] = exact[k] as f32);
-                }
+                    forms.barycentric(u, v).map(|weight| weight as f32)
+                });
                 for (k, line) in line.colours.iter_mut().enumerate() {
-                    let place: &mut [f32; LANES] =
-                        line[first..].first_chunk_mut().expect("room for a block");
-                    for lane in 0..LANES {
-                        let [wa, wb, wc] = [0, 1, 2].map(|corner| weights[corner][lane]);
-                        place[lane] = wa * a[k] + wb * b[k] + wc * c[k];
-                    }
+                    let place = line[first..].first_chunk_mut().expect("room for a block");
+                    *place = weights.map(|[wa, wb, wc]| wa * a[k] + wb * b[k] + wc * c[k]);
                 }
             }
         }
