@@ -48,6 +48,15 @@ pub enum Error {
         /// Eigenpairs there are.
         available: usize,
     },
+    /// A mesh without two sides, or whose triangles do not agree which is which.
+    #[error(
+        "two triangles run through the edge {} – {} the same way: orientation needs a mesh wound consistently, \
+         and no edge of three triangles", edge[0], edge[1]
+    )]
+    NotOriented {
+        /// The vertices of the edge, in the direction of both triangles.
+        edge: [u32; 2],
+    },
     /// Dense linear algebra failed for a reason of its own.
     #[error("linear algebra failed in {0}")]
     LinearAlgebra(&'static str),
