@@ -14,7 +14,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use semfm_geom::Eigenbasis;
 
-use super::operators::{Operators, Parity};
+use super::operators::{Operators, Parity, Terms};
 use crate::{Error, Result};
 
 /// Directions of the descriptors whose squares sum to less than this share of all are left out of
@@ -185,10 +185,14 @@ pub(super) fn multiplications(coefficients: MatRef<'_, f64>, basis: &Eigenbasis)
     Operators::new(Parity::Symmetric, basis.n_vertices(), coefficients, |first, products, f| {
         let places = f.nrows();
         f.copy_from(phi.subrows(first, places));
-        for ((i, j), column) in Parity::Symmetric.pairs(k).zip(products.col_iter_mut()) {
-            let pair = f.col(i).iter().zip(f.col(j).iter()).zip(&basis.mass[first..]);
-            for (x, ((a, b), m)) in column.iter_mut().zip(pair) {
-                *x = m * a * b;
+        let mass = &basis.mass[first..first + places];
+        let mut weighted = vec![0.0; places];
+        let mut columns = products.col_iter_mut();
+        for j in 0..k {
+            let of_j = f.col_as_slice(j).iter().zip(mass);
+            weighted.iter_mut().zip(of_j).for_each(|(x, (phi, m))| *x = phi * m);
+            for (i, out) in (0..=j).zip(&mut columns) {
+                Terms::product(out, &weighted, f.col_as_slice(i)).write();
             }
         }
     })

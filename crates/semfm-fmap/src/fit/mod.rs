@@ -39,7 +39,7 @@ pub struct FitSide<'a> {
     /// Its eigenbasis (n × k).
     pub basis: &'a Eigenbasis,
     /// The triangles on its n vertices.
-    pub surface: Option<OrientedSurface<'a>>,
+    pub surface: Option<&'a OrientedSurface>,
 }
 
 impl<'a> From<&'a Eigenbasis> for FitSide<'a> {
@@ -107,7 +107,7 @@ pub fn fit<'a>(
     let surfaces = match (on_source.surface, on_target.surface) {
         _ if settings.orientation == 0.0 => None,
         (Some(s), Some(t)) => {
-            orientation::check((source, &s), (target, &t))?;
+            orientation::check((source, s), (target, t))?;
             Some((s, t))
         }
         _ => {
@@ -143,7 +143,7 @@ pub fn fit<'a>(
                 let (s, t) = (multiplications(a, source), multiplications(b, target));
                 energy.commute_with_multiplications(settings.descriptors, s, t);
             }
-            if let Some((s, t)) = &surfaces {
+            if let Some((s, t)) = surfaces {
                 let (s, mut t) = (turns(a, source, s), turns(b, target, t));
                 if settings.reversing {
                     t.scale(-1.0);
@@ -301,7 +301,7 @@ mod tests {
     fn the_map_is_that_of_the_dense_normal_equations() {
         let (source, target) = (shape(&blob(1.0), 9), shape(&blob(1.6), 9));
         let surfaces = [&source, &target].map(|s| OrientedSurface::new(s.mesh()).unwrap());
-        let sides = [(&source, surfaces[0]), (&target, surfaces[1])]
+        let sides = [(&source, &surfaces[0]), (&target, &surfaces[1])]
             .map(|(shape, surface)| FitSide { basis: shape.basis(), surface: Some(surface) });
         for p in [2, 5, 30] {
             let a = Mat::from_fn(9, p, |i, j| ((3 * i + 7 * j * j) as f64).sin());
@@ -371,10 +371,8 @@ mod tests {
     fn signatures_cannot_tell_left_from_right_but_the_orientation_can() {
         let (mesh, partner) = mirror_symmetric();
         let shape = shape(&mesh, 20);
-        let side = FitSide {
-            basis: shape.basis(),
-            surface: Some(OrientedSurface::new(shape.mesh()).unwrap()),
-        };
+        let surface = OrientedSurface::new(shape.mesh()).unwrap();
+        let side = FitSide { basis: shape.basis(), surface: Some(&surface) };
         let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
         let off = |map: &FunctionalMap, to: &[u32]| off(map, to, shape.basis(), shape.basis());
         let kept = by_signatures(side, side, false);
@@ -398,10 +396,9 @@ mod tests {
         )
         .unwrap();
         let (one, other) = (shape(&mesh, 15), shape(&mirrored, 15));
-        let [source, target] = [&one, &other].map(|shape| FitSide {
-            basis: shape.basis(),
-            surface: Some(OrientedSurface::new(shape.mesh()).unwrap()),
-        });
+        let surfaces = [&one, &other].map(|shape| OrientedSurface::new(shape.mesh()).unwrap());
+        let source = FitSide { basis: one.basis(), surface: Some(&surfaces[0]) };
+        let target = FitSide { basis: other.basis(), surface: Some(&surfaces[1]) };
         let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
         let off = |map: &FunctionalMap| off(map, &identity, source.basis, target.basis);
         let (swapped, kept) =
@@ -426,7 +423,8 @@ mod tests {
         }
         // A surface of other vertices is not that of the basis.
         let ball = semfm_geom::zoo::icosphere(1);
-        let side = FitSide { basis, surface: Some(OrientedSurface::new(&ball).unwrap()) };
+        let surface = OrientedSurface::new(&ball).unwrap();
+        let side = FitSide { basis, surface: Some(&surface) };
         let settings = FitSettings { orientation: 1.0, ..Default::default() };
         let error = fit(pair, side, side, &settings, &Task::default()).unwrap_err();
         assert!(matches!(error, Error::Length { .. }), "{error}");

@@ -5,7 +5,7 @@
 //! faces and meet all the functions in one matrix product.
 
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, ColMut, Mat, MatRef, Par};
 
 /// Vertices or faces at a time: 64 × 1275 products of pairs (k = 50) fill 650 kB.
 const BLOCK: usize = 64;
@@ -49,14 +49,16 @@ impl Operators {
         let mixed_first = coefficients.ncols() < k;
         let q = if mixed_first { coefficients.ncols() } else { k };
         let mut entries = Mat::<f64>::zeros(n_pairs, q);
+        let (mut products, mut functions) = (Mat::zeros(0, 0), Mat::zeros(0, 0));
         for first in (0..n).step_by(BLOCK) {
             let places = BLOCK.min(n - first);
-            let mut products = Mat::zeros(places, n_pairs);
-            let mut functions = Mat::zeros(places, k);
+            if products.nrows() != places {
+                (products, functions) = (Mat::zeros(places, n_pairs), Mat::zeros(places, k));
+            }
             block(first, &mut products, &mut functions);
-            let mixed = if mixed_first { functions * coefficients } else { functions };
-            let (p, f) = (products.transpose(), mixed.as_ref());
-            matmul(entries.as_mut(), Accum::Add, p, f, 1.0, Par::Seq);
+            let mixed = mixed_first.then(|| &functions * coefficients);
+            let (p, f) = (products.transpose(), mixed.as_ref().unwrap_or(&functions));
+            matmul(entries.as_mut(), Accum::Add, p, f.as_ref(), 1.0, Par::Seq);
         }
         let entries = if mixed_first { entries } else { entries * coefficients };
         let mut matrices = Mat::zeros(k, k * coefficients.ncols());
@@ -116,5 +118,56 @@ impl Operators {
         matrices.as_mut().subcols_mut(0, here).copy_from(&self.matrices);
         matrices.as_mut().subcols_mut(here, more).copy_from(&others.matrices);
         Self { matrices }
+    }
+}
+
+/// One column of products of a pair, written with wide registers. A value and not a closure, so that
+/// it is inlined where they are switched on.
+pub(super) struct Terms<'a> {
+    out: &'a mut [f64],
+    plus: (&'a [f64], &'a [f64]),
+    minus: Option<(&'a [f64], &'a [f64])>,
+}
+
+impl<'a> Terms<'a> {
+    /// a b
+    pub fn product(out: ColMut<'a, f64>, a: &'a [f64], b: &'a [f64]) -> Self {
+        Self { out: slice(out), plus: (a, b), minus: None }
+    }
+
+    /// a b − c d
+    pub fn difference(
+        out: ColMut<'a, f64>,
+        plus: (&'a [f64], &'a [f64]),
+        minus: (&'a [f64], &'a [f64]),
+    ) -> Self {
+        Self { out: slice(out), plus, minus: Some(minus) }
+    }
+
+    /// Writes them.
+    pub fn write(self) {
+        pulp::Arch::new().dispatch(self);
+    }
+}
+
+fn slice(column: ColMut<'_, f64>) -> &mut [f64] {
+    column.try_as_col_major_mut().expect("a column of a matrix of ours").as_slice_mut()
+}
+
+impl pulp::WithSimd for Terms<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let pairs = self.plus.0.iter().zip(self.plus.1);
+        match self.minus {
+            None => self.out.iter_mut().zip(pairs).for_each(|(x, (a, b))| *x = a * b),
+            Some((c, d)) => {
+                let all = pairs.zip(c.iter().zip(d));
+                for (x, ((a, b), (c, d))) in self.out.iter_mut().zip(all) {
+                    *x = a * b - c * d;
+                }
+            }
+        }
     }
 }
