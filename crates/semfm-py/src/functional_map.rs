@@ -68,7 +68,8 @@ impl FunctionalMap {
     /// reversing : bool, default False
     ///     Whether the orientation is to be reversed instead of preserved.
     /// source_mesh : mesh_like, optional
-    ///     Triangles on the source's vertices, wound consistently: of a `Shape` its `working` mesh.
+    ///     Triangles on the source's vertices, of a `Shape` its `working` mesh. They must be wound
+    ///     consistently (all but one in a thousand), and both meshes outward or both inward.
     /// target_mesh : mesh_like, optional
     ///     The same for the target.
     /// coefficients : bool, default False
