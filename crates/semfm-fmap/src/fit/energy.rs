@@ -105,21 +105,21 @@ impl Energy {
 
     /// Half the gradient's linear part: C ↦ C (A Aᵀ + floor) + mask ∘ C + Σ (R Sᵀ − Tᵀ R) with
     /// R = C S − T C, where Tᵀ C S = T C Sᵀ.
-    pub fn apply(&self, c: MatRef<'_, f64>) -> Mat<f64> {
+    pub fn apply(&self, c: &Mat<f64>) -> Mat<f64> {
         let (k_target, k_source, r) = (c.nrows(), c.ncols(), self.of_target.len());
         let mut out = c * &self.on_source;
         for j in 0..k_source {
-            for i in 0..k_target {
-                out[(i, j)] += self.mask[(i, j)] * c[(i, j)];
-            }
+            let masked = self.mask.col_as_slice(j).iter().zip(c.col_as_slice(j));
+            out.col_as_slice_mut(j).iter_mut().zip(masked).for_each(|(x, (m, c))| *x += m * c);
         }
         if r > 0 {
-            matmul(out.as_mut(), Accum::Add, self.on_target.as_ref(), c, 1.0, Par::Seq);
+            matmul(out.as_mut(), Accum::Add, self.on_target.as_ref(), c.as_ref(), 1.0, Par::Seq);
             // Column d + r l of C Sᵀ is column l of C S_dᵀ, so the same memory read with columns of
             // k_target r numbers has the C S_dᵀ below each other.
             let mut memory = vec![0.0; k_target * r * k_source];
             let wide = MatMut::from_column_major_slice_mut(&mut memory, k_target, r * k_source);
-            matmul(wide, Accum::Replace, c, self.of_source.as_ref(), 1.0, Par::Seq);
+            let (c, s) = (c.as_ref(), self.of_source.as_ref());
+            matmul(wide, Accum::Replace, c, s, 1.0, Par::Seq);
             let tall = MatRef::from_column_major_slice(&memory, k_target * r, k_source);
             let t = self.of_target.side_by_side();
             matmul(out.as_mut(), Accum::Add, t, tall, -2.0, Par::Seq);
@@ -147,10 +147,11 @@ impl Energy {
         });
         let mixed = entries * weights; // (k_source² × k_target)
         let block = |i: usize| {
-            let mut block = Mat::from_fn(k_source, k_source, |m, l| {
-                self.on_source[(m, l)] + mixed[(m + k_source * l, i)]
-            });
-            (0..k_source).for_each(|j| block[(j, j)] += on_target[i] + mask[(i, j)]);
+            let mut block = self.on_source.clone();
+            for (l, mixed) in mixed.col_as_slice(i).chunks_exact(k_source).enumerate() {
+                block.col_as_slice_mut(l).iter_mut().zip(mixed).for_each(|(x, m)| *x += m);
+                block[(l, l)] += on_target[i] + mask[(i, l)];
+            }
             block
         };
         (0..k_target).map(block).collect()

@@ -37,7 +37,7 @@ pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f
     };
     let preconditioner = RowBlocks::new(energy)?;
     let mut c = preconditioner.apply(energy.right.as_ref());
-    let mut residual = &energy.right - energy.apply(c.as_ref());
+    let mut residual = &energy.right - energy.apply(&c);
     let goal = CG_TOLERANCE * energy.right.norm_l2();
     let mut direction = preconditioner.apply(residual.as_ref());
     let mut size = inner(&residual, &direction);
@@ -46,7 +46,7 @@ pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f
             return Ok((c, iteration));
         }
         task.step("fit", iteration, CG_LIMIT)?;
-        let image = energy.apply(direction.as_ref());
+        let image = energy.apply(&direction);
         let step = size / inner(&direction, &image);
         c += &direction * faer::Scale(step);
         residual -= &image * faer::Scale(step);
