@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::fmap::fit::{FitSettings, FitSide, OrientedSurface, fit};
@@ -123,10 +123,9 @@ impl FunctionalMap {
         }
         let rows = |basis: &geom::Eigenbasis| if coefficients { k } else { basis.n_vertices() };
         let axes = [Axis::Is(rows(&source)), Axis::Any("p")];
-        let (a, shape) = arrays::floats(source_descriptors, "source_descriptors", &axes)?;
-        let p = shape[1];
-        let axes = [Axis::Is(rows(&target)), Axis::Is(p)];
-        let (b, _) = arrays::floats(target_descriptors, "target_descriptors", &axes)?;
+        let a = arrays::laid(source_descriptors, "source_descriptors", axes)?;
+        let axes = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
+        let b = arrays::laid(target_descriptors, "target_descriptors", axes)?;
         let mesh = |value: Option<&Bound<'_, PyAny>>, name| {
             value.map(|value| from_any(value, name)).transpose()
         };
@@ -137,9 +136,8 @@ impl FunctionalMap {
         }
         let settings = FitSettings { laplacian, descriptors, orientation, reversing };
         let map = run(py, progress, move |task| {
-            let project = |basis: &geom::Eigenbasis, f: &[f64]| {
-                let rows = if coefficients { k } else { basis.n_vertices() };
-                let f = MatRef::from_row_major_slice(f, rows, p);
+            let project = |basis: &geom::Eigenbasis, f: &arrays::Laid| {
+                let f = f.view();
                 if coefficients { f.to_owned() } else { basis.project_first(k, f) }
             };
             let (a, b) = (project(&source, &a), project(&target, &b));
