@@ -157,8 +157,13 @@ pub(super) fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::descriptors::normalised_coefficients;
+    use crate::fit::{FitSettings, FitSide, fit};
     use crate::pair::tests::{blob, shape};
-    use semfm_geom::zoo;
+    use crate::{FunctionalMap, PointMap};
+    use semfm_geom::descriptors::{WksSettings, wks};
+    use semfm_geom::math::DVec3;
+    use semfm_geom::{Task, zoo};
 
     #[test]
     fn the_form_is_that_of_the_paper_on_a_closed_surface() {
@@ -184,7 +189,7 @@ mod tests {
                                     let opposite = corners[(c + 2) % 3] - corners[(c + 1) % 3];
                                     n.cross(opposite) * g(ids[c]) / (2.0 * mesh.face_area(face))
                                 })
-                                .sum::<semfm_geom::math::DVec3>()
+                                .sum::<DVec3>()
                         };
                         let phi = |c: usize| move |v: usize| basis.functions[(v, c)];
                         let turned = gradient(&|v| f[(v, d)]).cross(gradient(&phi(j))).dot(n);
@@ -224,7 +229,7 @@ mod tests {
         assert!(error.contains("wound consistently"), "{error}");
         // Two tetrahedra that share an edge: welded, and still of two sides. One face turned: not.
         let points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1]];
-        let points = points.map(|p| semfm_geom::math::DVec3::from_array(p.map(f64::from)));
+        let points = points.map(|p| DVec3::from_array(p.map(f64::from)));
         let solid = |[a, b, c, d]: [u32; 4]| [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
         let mut faces = [solid([0, 1, 2, 3]), solid([0, 1, 4, 5])].concat();
         let welded = Mesh::new(points.to_vec(), faces.clone()).unwrap();
@@ -244,5 +249,91 @@ mod tests {
         let (out, inside) = (OrientedSurface::new(&ball), OrientedSurface::new(&inside_out));
         let basis = shape(&ball, 4).basis().clone();
         assert!(check((&basis, &out.unwrap()), (&basis, &inside.unwrap())).is_err());
+    }
+
+    /// A lumpy closed surface that the mirror y → −y maps onto itself, and where each vertex goes.
+    fn mirror_symmetric() -> (Mesh, Vec<u32>) {
+        let ball = zoo::icosphere(3);
+        let lumps = |p: DVec3| {
+            1.0 + 0.25 * (2.0 * p.x + 1.0).sin()
+                + 0.2 * (3.0 * p.y * p.y - p.z).cos()
+                + 0.15 * p.z * p.x
+        };
+        let place = |p: DVec3| DVec3::new(p.x * 1.8, p.y, p.z * 0.8) * lumps(p);
+        let vertices: Vec<DVec3> = ball.vertices().iter().map(|&p| place(p)).collect();
+        let mirrored = |p: &DVec3| DVec3::new(p.x, -p.y, p.z);
+        let nearest = |p: DVec3| {
+            let distance = |v: &u32| vertices[*v as usize].distance_squared(p);
+            (0..vertices.len() as u32).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        };
+        let partner: Vec<u32> = vertices.iter().map(|p| nearest(mirrored(p)).unwrap()).collect();
+        for (p, &v) in vertices.iter().zip(&partner) {
+            assert!(vertices[v as usize].distance(mirrored(p)) < 1e-9);
+        }
+        (Mesh::new(vertices.clone(), ball.faces().to_vec()).unwrap(), partner)
+    }
+
+    fn by_signatures(source: FitSide<'_>, target: FitSide<'_>, reversing: bool) -> FunctionalMap {
+        let describe = |basis: &Eigenbasis| {
+            let signature = wks(basis, &WksSettings::default()).unwrap();
+            normalised_coefficients(basis, signature.as_ref(), basis.k())
+        };
+        let (a, b) = (describe(source.basis), describe(target.basis));
+        let settings =
+            FitSettings { laplacian: 0.01, descriptors: 1.0, orientation: 1.0, reversing };
+        let pair = (a.as_ref(), b.as_ref());
+        fit(pair, source, target, &settings, &Task::default()).unwrap().map
+    }
+
+    /// ‖C − truth‖ / ‖truth‖ for the map of a vertex permutation.
+    fn off(
+        map: &FunctionalMap,
+        permutation: &[u32],
+        source: &Eigenbasis,
+        target: &Eigenbasis,
+    ) -> f64 {
+        let points = PointMap { source_of: permutation.to_vec() };
+        let truth = FunctionalMap::from_point_map(&points, source, target, map.k_source()).unwrap();
+        (map.matrix() - truth.matrix()).norm_l2() / truth.matrix().norm_l2()
+    }
+
+    #[test]
+    fn signatures_cannot_tell_left_from_right_but_the_orientation_can() {
+        let (mesh, partner) = mirror_symmetric();
+        let shape = shape(&mesh, 20);
+        let surface = OrientedSurface::new(shape.mesh()).unwrap();
+        let side = FitSide { basis: shape.basis(), surface: Some(&surface) };
+        let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
+        let off = |map: &FunctionalMap, to: &[u32]| off(map, to, shape.basis(), shape.basis());
+        let kept = by_signatures(side, side, false);
+        let swapped = by_signatures(side, side, true);
+        let found = [
+            off(&kept, &identity),
+            off(&kept, &partner),
+            off(&swapped, &partner),
+            off(&swapped, &identity),
+        ];
+        assert!(found[0] < 0.3 && found[1] > 0.8, "preserving: {found:?}");
+        assert!(found[2] < 0.3 && found[3] > 0.8, "reversing: {found:?}");
+    }
+
+    #[test]
+    fn a_mirrored_copy_is_reached_by_reversing_alone() {
+        let mesh = blob(1.0);
+        let mirrored = Mesh::new(
+            mesh.vertices().iter().map(|p| DVec3::new(p.x, -p.y, p.z)).collect(),
+            mesh.faces().iter().map(|&[a, b, c]| [a, c, b]).collect(),
+        )
+        .unwrap();
+        let (one, other) = (shape(&mesh, 15), shape(&mirrored, 15));
+        let surfaces = [&one, &other].map(|shape| OrientedSurface::new(shape.mesh()).unwrap());
+        let source = FitSide { basis: one.basis(), surface: Some(&surfaces[0]) };
+        let target = FitSide { basis: other.basis(), surface: Some(&surfaces[1]) };
+        let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
+        let off = |map: &FunctionalMap| off(map, &identity, source.basis, target.basis);
+        let (swapped, kept) =
+            (by_signatures(source, target, true), by_signatures(source, target, false));
+        let found = [off(&swapped), off(&kept)];
+        assert!(found[0] < 0.1 && found[1] > 0.4, "{found:?}");
     }
 }
