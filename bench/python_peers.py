@@ -19,6 +19,7 @@ import time
 
 import numpy as np
 import pyFM.refine
+import pyFM.signatures
 import pyFM.spectral
 from pyFM.functional import FunctionalMapping
 from pyFM.mesh import TriMesh
@@ -27,6 +28,7 @@ import semfm
 
 K_START, K_FINAL, STEP = 20, 100, 5
 N_DESCRIPTORS = 40
+K_SIGNATURES, N_SIGNATURES = 50, 100
 
 
 def pair(n):
@@ -55,7 +57,37 @@ def timed(repeats, *calls):
 
 def told(n, name, seconds, apart):
     ours, theirs = seconds
-    print(f"{n:6} {name:28} {ours:9.4f} {theirs:9.4f} {theirs / ours:7.1f} {apart}", flush=True)
+    print(f"{n:6} {name:36} {ours:9.4f} {theirs:9.4f} {theirs / ours:7.1f} {apart}", flush=True)
+
+
+def fit_of_theirs(meshes, functions, k, weights):
+    # Built by hand: the constructor copies both meshes, which is not what is timed.
+    model = FunctionalMapping.__new__(FunctionalMapping)
+    model.mesh1, model.mesh2 = meshes
+    model.descr1, model.descr2 = functions
+    model.fit(K=(k, k), use_resolvent_laplacian=False, **{"w_descr": 1, **weights})
+    return model.FM_12
+
+
+def compare_signatures(n, repeats, theirs, ours):
+    """100 wave kernel signatures and k = 50, the same weights on both sides."""
+    functions = [pyFM.signatures.mesh_WKS(each, N_SIGNATURES, k=K_SIGNATURES) for each in theirs]
+    meshes = [semfm.Mesh(each.vertices, each.faces) for each in theirs]
+    turned = dict(orientation=1.0, source_mesh=meshes[0], target_mesh=meshes[1])
+    for name, our_weights, their_weights in [
+        ("", dict(), dict()),
+        (" + orientation", turned, dict(w_orient=1)),
+    ]:
+        seconds, _ = timed(
+            repeats,
+            lambda ours_too=our_weights: semfm.FunctionalMap.fit(
+                *ours, *functions, k=K_SIGNATURES, laplacian=0.01, descriptors=1, **ours_too
+            ),
+            lambda theirs_too=their_weights: fit_of_theirs(
+                theirs, functions, K_SIGNATURES, dict(w_lap=0.01, w_dcomm=1, **theirs_too)
+            ),
+        )
+        told(n, f"fit 50 × 50, 100 WKS{name}", seconds, "scales of the weights differ")
 
 
 def compare(n, repeats):
@@ -78,14 +110,7 @@ def compare(n, repeats):
     for name, our_weights, their_weights in fits:
 
         def their_fit():
-            # Built by hand: the constructor copies both meshes, which is not what is timed.
-            model = FunctionalMapping.__new__(FunctionalMapping)
-            model.mesh1, model.mesh2 = theirs
-            model.descr1, model.descr2 = functions
-            model.fit(
-                K=(K_START, K_START), w_descr=1, use_resolvent_laplacian=False, **their_weights
-            )
-            return model.FM_12
+            return fit_of_theirs(theirs, functions, K_START, their_weights)
 
         def our_fit():
             return semfm.FunctionalMap.fit(*ours, *functions, k=K_START, **our_weights)
@@ -94,6 +119,7 @@ def compare(n, repeats):
         plain = not our_weights
         apart = np.linalg.norm((map.matrix - matrix)[:, 1:]) / np.linalg.norm(matrix)
         told(n, name, seconds, f"{apart:.0e}" if plain else "scales of the weights differ")
+    compare_signatures(n, repeats, theirs, ours)
     start = semfm.FunctionalMap(np.eye(K_START))
     vectors = [each.eigenvectors for each in theirs]
 
@@ -122,7 +148,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     semfm.set_num_threads(1)
-    print(f"{'n':>6} {'':28} {'ours s':>9} {'pyFM s':>9} {'ratio':>7} apart")
+    print(f"{'n':>6} {'':36} {'ours s':>9} {'pyFM s':>9} {'ratio':>7} apart")
     for n in options.n:
         compare(n, options.repeats)
 

@@ -519,7 +519,7 @@ class FunctionalMap:
         """
         ...
     @staticmethod
-    def fit(source: Eigenbasis, target: Eigenbasis, source_descriptors: ArrayLike, target_descriptors: ArrayLike, *, k: Optional[int] = None, laplacian: float = 0.0, descriptors: float = 0.0, coefficients: bool = False, progress: Optional[_Progress] = None) -> FunctionalMap:
+    def fit(source: Eigenbasis, target: Eigenbasis, source_descriptors: ArrayLike, target_descriptors: ArrayLike, *, k: Optional[int] = None, laplacian: float = 0.0, descriptors: float = 0.0, orientation: float = 0.0, reversing: bool = False, source_mesh: Optional[_MeshLike] = None, target_mesh: Optional[_MeshLike] = None, coefficients: bool = False, progress: Optional[_Progress] = None) -> FunctionalMap:
         """The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
 
         Without regularisers and with fewer descriptors than eigenfunctions the minimum-norm one.
@@ -538,6 +538,16 @@ class FunctionalMap:
             μ, weight of commutation with the Laplacian, ``‖C Λ_source − Λ_target C‖²``.
         descriptors : float, default 0.0
             ν, weight of commutation with multiplication by each descriptor (Nogneng & Ovsjanikov).
+        orientation : float, default 0.0
+            ω, weight of commutation with the turned gradient of each descriptor (Ren et al. 2018),
+            which tells left from right. Needs both meshes.
+        reversing : bool, default False
+            Whether the orientation is to be reversed instead of preserved.
+        source_mesh : mesh_like, optional
+            Triangles on the source's vertices, of a `Shape` its `working` mesh. They must be wound
+            consistently (all but one in a thousand), and both meshes outward or both inward.
+        target_mesh : mesh_like, optional
+            The same for the target.
         coefficients : bool, default False
             Whether the descriptors are given as coefficients (k × p) in the two bases.
         progress : progress, optional
@@ -2227,7 +2237,7 @@ def read_views(path: _Path) -> list[View]:
     """
     ...
 
-def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> list[View]:
+def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, occlusion: float = 0.0, edges: float = 0.0, normals: bool = False, progress: Optional[_Progress] = None) -> list[View]:
     """One picture per camera, with depth and triangle of every pixel.
 
     Parameters
@@ -2242,6 +2252,12 @@ def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]]
         Colour samples along each side of a pixel, 1 to 8.
     background : (3,) array_like, optional
         sRGB, 0 to 1; white where none is given.
+    occlusion : float, default 0.0
+        How much what is closed in is darkened, 0 to 1.
+    edges : float, default 0.0
+        How dark silhouettes and creases are drawn, 0 to 1.
+    normals : bool, default False
+        Draw the surface's directions as colours, instead of light.
     progress : progress, optional
 
     Returns
@@ -2258,7 +2274,7 @@ def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]]
     """
     ...
 
-def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True) -> list[Camera]:
+def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True, close_ups: int = 0) -> list[Camera]:
     """Cameras all around an object, each zoomed and centred on its silhouette.
 
     Parameters
@@ -2276,6 +2292,8 @@ def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: flo
         Largest zoom beyond the fit of the bounding sphere.
     principal_frame : bool, default True
         Pose the cameras in the object's principal frame, else in the file's with z up.
+    close_ups : int, default 0
+        Close-ups beside each view, along the silhouette's longer side.
 
     Returns
     -------

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import semfm
+import semfm.zoo
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], dtype=np.int64)
@@ -153,3 +154,33 @@ def test_other_arguments_are_refused_by_name():
         with pytest.raises(error) as caught:
             call()
         assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_an_orientation_needs_two_meshes_with_two_sides():
+    # A torus and its mirror image; the surface of the second is wound outward again.
+    torus = semfm.zoo.torus(30, 15)
+    vertices = np.array(torus.vertices)
+    lumpy = vertices * (1 + 0.2 * np.sin(2 * vertices[:, :1]) + 0.1 * vertices[:, 1:2])
+    source = semfm.Mesh(lumpy, torus.faces)
+    target = semfm.Mesh(lumpy * [1, 1, -1], torus.faces[:, ::-1])
+    basis = semfm.Shape(source, k=15, bridges=False).basis
+    bases = (basis, semfm.Eigenbasis(basis.values, basis.functions, basis.mass))
+    signature = semfm.wks(basis)
+
+    def fit(**settings):
+        return semfm.FunctionalMap.fit(*bases, signature, signature, laplacian=0.01, **settings)
+
+    both = dict(source_mesh=source, target_mesh=target)
+    # The target's vertices are those of the source mirrored: what reverses is the identity.
+    reversed_map = fit(descriptors=1, orientation=1, reversing=True, **both).matrix
+    kept = fit(descriptors=1, orientation=1, **both).matrix
+    assert np.linalg.norm(reversed_map - np.eye(15)) < 0.1 * np.sqrt(15)
+    assert np.linalg.norm(kept - np.eye(15)) > 0.3 * np.sqrt(15)
+    with pytest.raises(semfm.InvalidInput, match="source_mesh, target_mesh"):
+        fit(orientation=1, source_mesh=source)
+    half = np.vstack([torus.faces[:400], torus.faces[400:, ::-1]])
+    with pytest.raises(semfm.InvalidInput, match="wound consistently"):
+        fit(orientation=1, source_mesh=source, target_mesh=semfm.Mesh(vertices, half))
+    inside_out = semfm.Mesh(vertices, torus.faces[:, ::-1])
+    with pytest.raises(semfm.InvalidInput, match="outside"):
+        fit(orientation=1, source_mesh=source, target_mesh=inside_out)

@@ -168,7 +168,7 @@ def test_signatures_are_pyfms(sides):
 PIN = 1e3
 
 
-def pyfm_fit(sides, functions, w_lap, w_dcomm):
+def pyfm_fit(sides, functions, w_lap, w_dcomm, w_orient, reversing):
     """pyFM's map, solved as tightly as L-BFGS can, and ours for the same energy."""
     model = pytest.importorskip("pyFM.functional").FunctionalMapping(*sides[0])
     weights = pytest.importorskip("pyFM.optimize.weights")
@@ -178,6 +178,8 @@ def pyfm_fit(sides, functions, w_lap, w_dcomm):
         w_descr=1,
         w_lap=w_lap,
         w_dcomm=w_dcomm,
+        w_orient=w_orient,
+        orient_reversing=reversing,
         use_resolvent_laplacian=False,
         factr=1.0,
         pgtol=1e-12,
@@ -185,25 +187,46 @@ def pyfm_fit(sides, functions, w_lap, w_dcomm):
     source, target = (basis.truncated(K).project(each) for basis, each in zip(sides[1], functions))
     gap = (sides[1][1].values[:K, None] - sides[1][0].values[None, :K]) ** 2
     operators = model._compute_descr_op()
-    scales = weights.canonical_taus(source, target, operators, [], gap)
+    turns = model._compute_orientation_op(reversing)
+    scales = weights.canonical_taus(source, target, operators, turns, gap)
     # docs/coming-from-pyfm.md, "Weights": pyFM divides each term by its own scale, we by another,
     # in which the constant that pins the first column counts as a descriptor.
     pinned = [np.hstack([each, np.full((len(each), 1), PIN)]) for each in functions]
     unit = (np.trace(source @ source.T) + PIN**2) / K
-    size = sum((each**2).sum() for side in operators for each in side) / (2 * K) + PIN**2
+    size, turned = (
+        sum((each**2).sum() for side in family for each in side) / (2 * K)
+        for family in (operators, turns)
+    )
+    meshes = [semfm.Mesh(each.vertices, each.faces) for each in sides[0]]
     ours = semfm.FunctionalMap.fit(
         *sides[1],
         *pinned,
         k=K,
         laplacian=w_lap * scales[0] / scales[1] * gap.max() / unit,
-        descriptors=w_dcomm * scales[0] / scales[2] * size / unit,
+        descriptors=w_dcomm * scales[0] / scales[2] * (size + PIN**2) / unit,
+        orientation=w_orient * scales[0] / scales[3] * turned / unit,
+        reversing=reversing,
+        source_mesh=meshes[0],
+        target_mesh=meshes[1],
     )
     return model.FM_12, ours.matrix
 
 
-@pytest.mark.parametrize(("w_lap", "w_dcomm"), [(0, 0), (0.01, 0), (1, 0), (0.01, 0.1), (0.1, 1)])
-def test_a_fit_is_pyfms(sides, functions, w_lap, w_dcomm):
-    theirs, ours = pyfm_fit(sides, functions, w_lap, w_dcomm)
+@pytest.mark.parametrize(
+    ("w_lap", "w_dcomm", "w_orient", "reversing"),
+    [
+        (0, 0, 0, False),
+        (0.01, 0, 0, False),
+        (1, 0, 0, False),
+        (0.01, 0.1, 0, False),
+        (0.1, 1, 0, False),
+        (0.01, 0, 0.1, False),
+        (0.1, 1, 1, False),
+        (0.1, 1, 1, True),
+    ],
+)
+def test_a_fit_is_pyfms(sides, functions, w_lap, w_dcomm, w_orient, reversing):
+    theirs, ours = pyfm_fit(sides, functions, w_lap, w_dcomm, w_orient, reversing)
     # The first column is pinned to 1e-5, and L-BFGS stops at a gradient.
     assert np.linalg.norm(ours - theirs) < 1e-4 * np.linalg.norm(theirs)
 

@@ -48,6 +48,21 @@ pub enum Error {
         /// Eigenpairs there are.
         available: usize,
     },
+    /// A mesh without two sides, or whose triangles do not agree which is which.
+    #[error(
+        "orientation needs triangles that are wound consistently, and {found} of {n_faces} are not, \
+         first at the edge {} – {}",
+        edge[0],
+        edge[1]
+    )]
+    NotOriented {
+        /// The vertices of the first edge around which triangles do not agree.
+        edge: [u32; 2],
+        /// Triangles at such edges.
+        found: usize,
+        /// All triangles.
+        n_faces: usize,
+    },
     /// Dense linear algebra failed for a reason of its own.
     #[error("linear algebra failed in {0}")]
     LinearAlgebra(&'static str),

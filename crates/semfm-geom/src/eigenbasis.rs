@@ -5,6 +5,9 @@ use faer::{Accum, Mat, MatRef, Par};
 
 use crate::eigensolver::orthonormality_error;
 
+/// Vertices at a time in a projection: their eigenfunctions, times the mass, stay in the cache.
+const PROJECTED: usize = 512;
+
 /// The first k eigenpairs of `L φ = λ M φ`, ascending, orthonormal for the lumped mass M.
 #[derive(Clone, Debug)]
 pub struct Eigenbasis {
@@ -59,13 +62,28 @@ impl Eigenbasis {
     /// # Panics
     /// Where `functions` has not one row per vertex.
     pub fn project_all(&self, functions: MatRef<'_, f64>) -> Mat<f64> {
+        self.project_first(self.k(), functions)
+    }
+
+    /// Coefficients (k × p) of p functions F (n × p) in the first `k` eigenfunctions alone.
+    ///
+    /// # Panics
+    /// Where `functions` has not one row per vertex, or there are fewer eigenfunctions.
+    pub fn project_first(&self, k: usize, functions: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(functions.nrows(), self.n_vertices(), "one value per vertex");
-        let weighted = Mat::from_fn(functions.nrows(), functions.ncols(), |i, j| {
-            functions[(i, j)] * self.mass[i]
-        });
-        let mut coefficients = Mat::zeros(self.k(), functions.ncols());
-        let (phi_t, m_f) = (self.functions.transpose(), weighted.as_ref());
-        matmul(coefficients.as_mut(), Accum::Replace, phi_t, m_f, 1.0, Par::Seq);
+        let phi = self.first(k);
+        let mut coefficients = Mat::zeros(k, functions.ncols());
+        for first in (0..functions.nrows()).step_by(PROJECTED) {
+            let n = PROJECTED.min(functions.nrows() - first);
+            let mut weighted = phi.subrows(first, n).to_owned();
+            let mass = &self.mass[first..first + n];
+            for j in 0..k {
+                let column = weighted.col_as_slice_mut(j).iter_mut();
+                column.zip(mass).for_each(|(phi, m)| *phi *= m);
+            }
+            let (phi_t, f) = (weighted.transpose(), functions.subrows(first, n));
+            matmul(coefficients.as_mut(), Accum::Add, phi_t, f, 1.0, Par::Seq);
+        }
         coefficients
     }
 
@@ -143,6 +161,30 @@ mod tests {
         assert!((integral(&basis.diffuse(&f, 0.1)) - integral(&f)).abs() < 1e-12);
         let mean = integral(&f) / basis.mass.iter().sum::<f64>();
         assert!(basis.diffuse(&f, 1e3).iter().all(|v| (v - mean).abs() < 1e-12));
+    }
+
+    #[test]
+    fn the_first_coefficients_are_those_of_all() {
+        let mesh = crate::zoo::icosphere(3); // more vertices than are projected at a time
+        let laplacian = cotan_laplacian(&mesh).unwrap();
+        let basis = eigenbasis(&laplacian, 6, &EigenSettings::default(), &Task::default()).unwrap();
+        let n = basis.n_vertices();
+        assert!(n > PROJECTED);
+        let f = Mat::from_fn(n, 2, |i, j| ((7 * i + 11 * j) as f64).sin());
+        let all = basis.project_all(f.as_ref());
+        let first = basis.project_first(4, f.as_ref());
+        for j in 0..2 {
+            for i in 0..6 {
+                let sum: f64 =
+                    (0..n).map(|v| basis.functions[(v, i)] * basis.mass[v] * f[(v, j)]).sum();
+                assert!((all[(i, j)] - sum).abs() < 1e-12, "{i} {j}");
+                assert!(i >= 4 || (first[(i, j)] - sum).abs() < 1e-12, "{i} {j}");
+            }
+        }
+        // Row-major functions, as NumPy has them, are read where they lie.
+        let rows: Vec<f64> = (0..2 * n).map(|at| f[(at / 2, at % 2)]).collect();
+        let view = MatRef::from_row_major_slice(&rows, n, 2);
+        assert!((basis.project_first(4, view) - &first).norm_max() < 1e-14);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Every door names the argument, the array it wants and the array it found: a TypeError for kinds
 //! of numbers, `semfm.InvalidInput` (a ValueError) for shapes and values.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -69,6 +69,46 @@ pub fn matrix(value: &Bound<'_, PyAny>, name: &str, axes: [Axis; 2]) -> PyResult
     let (values, shape) = floats(value, name, &axes)?;
     let columns = shape[1];
     Ok(Mat::from_fn(shape[0], columns, |i, j| values[i * columns + j]))
+}
+
+/// A matrix as it lies in memory, row by row or column by column.
+pub struct Laid {
+    values: Vec<f64>,
+    shape: [usize; 2],
+    by_columns: bool,
+}
+
+impl Laid {
+    /// The matrix (rows × columns), a view.
+    pub fn view(&self) -> MatRef<'_, f64> {
+        let [rows, columns] = self.shape;
+        if self.by_columns {
+            MatRef::from_column_major_slice(&self.values, rows, columns)
+        } else {
+            MatRef::from_row_major_slice(&self.values, rows, columns)
+        }
+    }
+
+    /// Number of columns.
+    pub fn ncols(&self) -> usize {
+        self.shape[1]
+    }
+}
+
+/// As [`matrix`], without turning over what lies column by column, as our own functions do.
+pub fn laid(value: &Bound<'_, PyAny>, name: &str, axes: [Axis; 2]) -> PyResult<Laid> {
+    let array = checked(value, name, REAL, &axes)?;
+    let flags = array.getattr("flags")?;
+    let flag = |name| flags.get_item(name)?.extract::<bool>();
+    let by_columns = flag("F_CONTIGUOUS")? && !flag("C_CONTIGUOUS")?;
+    if by_columns {
+        let (values, shape) = contiguous::<f64>(&array.getattr("T")?, name)?;
+        if values.iter().all(|x| x.is_finite()) {
+            return Ok(Laid { values, shape: [shape[1], shape[0]], by_columns });
+        }
+    }
+    let (values, shape) = floats(&array, name, &axes)?; // names the number that is not finite
+    Ok(Laid { values, shape: [shape[0], shape[1]], by_columns: false })
 }
 
 /// Points (n × 3). Numbers that are not finite are left to the constructor behind the door, which

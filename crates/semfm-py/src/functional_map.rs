@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use faer::Mat;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use semfm::fmap::fit::{FitSettings, fit};
+use semfm::fmap::fit::{FitSettings, FitSide, OrientedSurface, fit};
 use semfm::fmap::zoomout::{self, MapSide, ZoomOutSettings};
 use semfm::{fmap, geom};
 
 use crate::arrays::{self, Axis};
 use crate::eigenbasis::Eigenbasis;
 use crate::held::Held;
-use crate::mesh::Reduced;
+use crate::mesh::{Reduced, from_any};
 use crate::point_map::PointMap;
 use crate::work::{guard, run};
 use crate::{errors, json, lend};
@@ -62,6 +62,16 @@ impl FunctionalMap {
     ///     μ, weight of commutation with the Laplacian, ``‖C Λ_source − Λ_target C‖²``.
     /// descriptors : float, default 0.0
     ///     ν, weight of commutation with multiplication by each descriptor (Nogneng & Ovsjanikov).
+    /// orientation : float, default 0.0
+    ///     ω, weight of commutation with the turned gradient of each descriptor (Ren et al. 2018),
+    ///     which tells left from right. Needs both meshes.
+    /// reversing : bool, default False
+    ///     Whether the orientation is to be reversed instead of preserved.
+    /// source_mesh : mesh_like, optional
+    ///     Triangles on the source's vertices, of a `Shape` its `working` mesh. They must be wound
+    ///     consistently (all but one in a thousand), and both meshes outward or both inward.
+    /// target_mesh : mesh_like, optional
+    ///     The same for the target.
     /// coefficients : bool, default False
     ///     Whether the descriptors are given as coefficients (k × p) in the two bases.
     /// progress : progress, optional
@@ -82,7 +92,8 @@ impl FunctionalMap {
     #[staticmethod]
     #[pyo3(signature = (
         source, target, source_descriptors, target_descriptors, *, k=None, laplacian=0.0,
-        descriptors=0.0, coefficients=false, progress=None
+        descriptors=0.0, orientation=0.0, reversing=false, source_mesh=None, target_mesh=None,
+        coefficients=false, progress=None
     ))]
     #[pyo3(name = "fit")]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
@@ -94,6 +105,10 @@ impl FunctionalMap {
         k: Option<usize>,
         laplacian: f64,
         descriptors: f64,
+        orientation: f64,
+        reversing: bool,
+        source_mesh: Option<&Bound<'_, PyAny>>,
+        target_mesh: Option<&Bound<'_, PyAny>>,
         coefficients: bool,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -107,18 +122,33 @@ impl FunctionalMap {
             check_size(py, "k", k, basis)?;
         }
         let rows = |basis: &geom::Eigenbasis| if coefficients { k } else { basis.n_vertices() };
-        let a = [Axis::Is(rows(&source)), Axis::Any("p")];
-        let a = arrays::matrix(source_descriptors, "source_descriptors", a)?;
-        let b = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
-        let b = arrays::matrix(target_descriptors, "target_descriptors", b)?;
-        let settings = FitSettings { laplacian, descriptors };
+        let axes = [Axis::Is(rows(&source)), Axis::Any("p")];
+        let a = arrays::laid(source_descriptors, "source_descriptors", axes)?;
+        let axes = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
+        let b = arrays::laid(target_descriptors, "target_descriptors", axes)?;
+        let mesh = |value: Option<&Bound<'_, PyAny>>, name| {
+            value.map(|value| from_any(value, name)).transpose()
+        };
+        let meshes = (mesh(source_mesh, "source_mesh")?, mesh(target_mesh, "target_mesh")?);
+        if orientation > 0.0 && (meshes.0.is_none() || meshes.1.is_none()) {
+            let expected = "both, where an orientation is asked for";
+            return Err(errors::invalid(py, "source_mesh, target_mesh", expected, "None"));
+        }
+        let settings = FitSettings { laplacian, descriptors, orientation, reversing };
         let map = run(py, progress, move |task| {
-            let project = |basis: &geom::Eigenbasis, f: Mat<f64>| {
-                if coefficients { f } else { basis.project_all(f.as_ref()) }
+            let project = |basis: &geom::Eigenbasis, f: &arrays::Laid| {
+                let f = f.view();
+                if coefficients { f.to_owned() } else { basis.project_first(k, f) }
             };
-            let (a, b) = (project(&source, a), project(&target, b));
-            let (a, b) = (a.as_ref().subrows(0, k), b.as_ref().subrows(0, k));
-            Ok(fit((a, b), &source, &target, &settings, task)?.map)
+            let (a, b) = (project(&source, &a), project(&target, &b));
+            let surface = |mesh: &Option<Held<semfm::Mesh>>| {
+                let mesh = mesh.as_deref().filter(|_| orientation > 0.0);
+                mesh.map(OrientedSurface::new).transpose()
+            };
+            let surfaces = (surface(&meshes.0)?, surface(&meshes.1)?);
+            let source = FitSide { basis: &source, surface: surfaces.0.as_ref() };
+            let target = FitSide { basis: &target, surface: surfaces.1.as_ref() };
+            Ok(fit((a.as_ref(), b.as_ref()), source, target, &settings, task)?.map)
         })?;
         Ok(Self { held: Held::new(map) })
     }

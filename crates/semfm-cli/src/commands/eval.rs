@@ -87,8 +87,8 @@ struct FeatureOptions {
 #[command(next_help_heading = "Methods")]
 struct MethodOptions {
     /// Which methods, by comma: fused, anchored, sinkhorn, nearest, semfm+, semfm+image, semfm,
-    /// semfm-image, wks, oracle, whole; for true correspondences wks, wks+zoomout, landmarks,
-    /// landmarks+zoomout, true20+zoomout [default: all]
+    /// semfm-image, wks, oracle, whole; for true correspondences wks, wks+zoomout,
+    /// wks+orientation+zoomout, landmarks, landmarks+zoomout, true20+zoomout [default: all]
     #[arg(long, value_delimiter = ',', value_name = "A,B")]
     methods: Vec<String>,
     /// Change a setting of a method, as fused.threshold=0.35 (repeatable)

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use faer::Mat;
 use semfm::Task;
 use semfm::fmap::descriptors::normalised_coefficients;
-use semfm::fmap::fit::{FitSettings, fit};
+use semfm::fmap::fit::{FitSettings, FitSide, OrientedSurface, fit};
 use semfm::fmap::zoomout::{MapSide, ZoomOutSettings, point_map, zoomout};
 use semfm::fmap::{FunctionalMap, PointMap};
 use semfm::geom::descriptors::{WksSettings, landmark_wks, wks};
@@ -23,6 +23,8 @@ const N_LANDMARKS: usize = 5;
 const MAP_SAMPLES: usize = 1000;
 /// Growth per turn of ZoomOut.
 const STEP: usize = 5;
+/// Weight of orientation beside the settings of the fit.
+const ORIENTATION: f64 = 1.0;
 /// Size of the true map that ZoomOut starts from.
 const TRUE_K: usize = 20;
 
@@ -33,6 +35,8 @@ pub enum MapMethod {
     Wks,
     /// The same at k = 30, then ZoomOut to 200.
     WksZoomOut,
+    /// The same with orientation preserved.
+    WksOrientationZoomOut,
     /// Wave kernels at five true landmarks beside the signatures, k = 30.
     Landmarks,
     /// The same, then ZoomOut to 200.
@@ -43,14 +47,21 @@ pub enum MapMethod {
 
 impl MapMethod {
     /// All of them, least help first.
-    pub const ALL: [Self; 5] =
-        [Self::Wks, Self::WksZoomOut, Self::Landmarks, Self::LandmarksZoomOut, Self::TrueZoomOut];
+    pub const ALL: [Self; 6] = [
+        Self::Wks,
+        Self::WksZoomOut,
+        Self::WksOrientationZoomOut,
+        Self::Landmarks,
+        Self::LandmarksZoomOut,
+        Self::TrueZoomOut,
+    ];
 
     /// The name used by files and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Wks => "wks",
             Self::WksZoomOut => "wks+zoomout",
+            Self::WksOrientationZoomOut => "wks+orientation+zoomout",
             Self::Landmarks => "landmarks",
             Self::LandmarksZoomOut => "landmarks+zoomout",
             Self::TrueZoomOut => "true20+zoomout",
@@ -68,6 +79,10 @@ impl MapMethod {
         let map = match self {
             Self::Wks => described(source, target, 50, &[], settings, task)?,
             Self::WksZoomOut => described(source, target, 30, &[], settings, task)?,
+            Self::WksOrientationZoomOut => {
+                let settings = FitSettings { orientation: ORIENTATION, ..*settings };
+                described(source, target, 30, &[], &settings, task)?
+            }
             Self::Landmarks | Self::LandmarksZoomOut => {
                 described(source, target, 30, &landmarks(source, target), settings, task)?
             }
@@ -78,7 +93,7 @@ impl MapMethod {
         let (on_source, on_target) = (samples(source), samples(target));
         let side = |shape, samples| MapSide { basis: basis_of(shape), features: None, samples };
         let (a, b) = (side(source, &on_source[..]), side(target, &on_target[..]));
-        let grows = matches!(self, Self::WksZoomOut | Self::LandmarksZoomOut | Self::TrueZoomOut);
+        let grows = !matches!(self, Self::Wks | Self::Landmarks);
         let map = if grows {
             let k_final = K.min(a.basis.k()).min(b.basis.k());
             let settings = ZoomOutSettings {
@@ -134,6 +149,10 @@ fn described(
     settings: &FitSettings,
     task: &Task,
 ) -> Result<FunctionalMap> {
+    let asked = settings.orientation > 0.0;
+    let surface =
+        |of: &MatchingShape| asked.then(|| OrientedSurface::new(of.shape.mesh())).transpose();
+    let surfaces = (surface(source)?, surface(target)?);
     let (source, target) = (shortened(basis_of(source), k), shortened(basis_of(target), k));
     let describe = |basis: &Eigenbasis, landmarks: Vec<u32>| -> Result<Mat<f64>> {
         let settings = WksSettings::default();
@@ -153,7 +172,9 @@ fn described(
     let a = describe(&source, landmarks.iter().map(|pair| pair.0).collect())?;
     let b = describe(&target, landmarks.iter().map(|pair| pair.1).collect())?;
     let k = a.nrows().min(b.nrows());
-    Ok(fit((a.subrows(0, k), b.subrows(0, k)), &source, &target, settings, task)?.map)
+    let source = FitSide { basis: &source, surface: surfaces.0.as_ref() };
+    let target = FitSide { basis: &target, surface: surfaces.1.as_ref() };
+    Ok(fit((a.subrows(0, k), b.subrows(0, k)), source, target, settings, task)?.map)
 }
 
 /// True pairs of working vertices, far apart on the source.

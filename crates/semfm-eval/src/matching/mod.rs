@@ -36,7 +36,8 @@ pub const FORMAT: &str = "semfm.eval-matching/1";
 /// FAUST_r, 250 samples: without it WKS errs by 44.7 and five landmarks by 10.4, with it by 24.1 and
 /// 3.4. μ = .001 is the same and takes longer; μ = .001 with ten times the commutation gives 24.3 and
 /// 4.4.
-const FIT: FitSettings = FitSettings { laplacian: 0.01, descriptors: 1.0 };
+const FIT: FitSettings =
+    FitSettings { laplacian: 0.01, descriptors: 1.0, orientation: 0.0, reversing: false };
 /// The list of pairs in a set's folder.
 const PAIRS: &str = "pairs.txt";
 

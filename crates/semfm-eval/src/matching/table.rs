@@ -24,6 +24,7 @@ impl MapMethod {
         match self {
             Self::Wks => "WKS, k 50",
             Self::WksZoomOut => "WKS, k 30, ZoomOut 30→200",
+            Self::WksOrientationZoomOut => "WKS + orientation, k 30, ZoomOut 30→200",
             Self::Landmarks => "5 true landmarks, k 30",
             Self::LandmarksZoomOut => "5 true landmarks, k 30, ZoomOut 30→200",
             Self::TrueZoomOut => "true 20 × 20 map, ZoomOut 20→200",

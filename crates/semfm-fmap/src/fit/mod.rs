@@ -1,31 +1,52 @@
 //! The functional map that agrees with the descriptors.
 
 mod energy;
+mod joint;
+mod operators;
+mod orientation;
+mod solve;
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, MatRef, Side};
+use faer::MatRef;
 use semfm_geom::{Eigenbasis, Task};
 use serde::{Deserialize, Serialize};
 
-use self::energy::Energy;
+use self::energy::{Energy, multiplications, principal};
+pub use self::orientation::OrientedSurface;
+use self::orientation::turns;
 use crate::functional_map::check_size;
 use crate::{Error, FunctionalMap, Result};
 
 /// Singular values below this share of the largest count as zero in the minimum-norm solution.
 const RANK_CUTOFF: f64 = 1e-12;
-/// Added to the normal equations of a regularised fit, which may still be singular at μ → 0.
-const FLOOR: f64 = 1e-9;
-/// Relative residual at which the conjugate gradients stop, and their limit.
-const CG_TOLERANCE: f64 = 1e-10;
-const CG_LIMIT: usize = 2000;
 
-/// What is asked of C besides the descriptors. Both weights are relative to the descriptor term.
+/// What is asked of C besides the descriptors. All weights are relative to the descriptor term.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct FitSettings {
     /// μ: commutation with the Laplacian, ‖C Λ_source − Λ_target C‖².
     pub laplacian: f64,
     /// ν: commutation with multiplication by each descriptor (Nogneng & Ovsjanikov 2017).
     pub descriptors: f64,
+    /// ω: commutation with the turned gradient of each descriptor, which keeps the two sides of a
+    /// surface apart (Ren et al. 2018). Needs an [`OrientedSurface`] on both sides.
+    pub orientation: f64,
+    /// Whether the orientation is to be reversed instead of preserved: left to right.
+    pub reversing: bool,
+}
+
+/// One shape as a fit sees it; an eigenbasis alone will do where the orientation does not matter.
+#[derive(Clone, Copy, Debug)]
+pub struct FitSide<'a> {
+    /// Its eigenbasis (n × k).
+    pub basis: &'a Eigenbasis,
+    /// The triangles on its n vertices.
+    pub surface: Option<&'a OrientedSurface>,
+}
+
+impl<'a> From<&'a Eigenbasis> for FitSide<'a> {
+    fn from(basis: &'a Eigenbasis) -> Self {
+        Self { basis, surface: None }
+    }
 }
 
 /// A fitted map and how well it was determined.
@@ -60,53 +81,79 @@ pub struct FitReport {
 /// Without a regulariser and with fewer descriptors than eigenfunctions the problem has many
 /// solutions; the answer is then the minimum-norm one, B A⁺, which is what the paper's equation
 /// gives for its two anchors. With the Laplacian alone the rows separate and are solved one by
-/// one; with descriptor commutation they do not, and conjugate gradients solve for all of C.
+/// one; with operators to commute with they do not, and conjugate gradients solve for all of C.
 ///
 /// # Errors
-/// [`Error::Length`] where A and B differ in shape, [`Error::BasisTooSmall`],
-/// [`Error::OutOfRange`] for negative weights, [`Error::LinearAlgebra`], cancellation.
-pub fn fit(
+/// [`Error::Length`] where A and B differ in shape or a surface is not that of its basis,
+/// [`Error::BasisTooSmall`], [`Error::OutOfRange`] for negative weights, for an orientation without
+/// surfaces and for surfaces wound against each other, [`Error::LinearAlgebra`], cancellation.
+pub fn fit<'a>(
     (a, b): (MatRef<'_, f64>, MatRef<'_, f64>),
-    source: &Eigenbasis,
-    target: &Eigenbasis,
+    source: impl Into<FitSide<'a>>,
+    target: impl Into<FitSide<'a>>,
     settings: &FitSettings,
     task: &Task,
 ) -> Result<Fit> {
+    let (on_source, on_target) = (source.into(), target.into());
+    let (source, target) = (on_source.basis, on_target.basis);
     semfm_geom::algebra::keep_sequential();
     Error::length("descriptors of the target", a.ncols(), b.ncols())?;
     Error::length("coefficients per descriptor of the target", a.nrows(), b.nrows())?;
     check_size("the descriptors", a.nrows(), source, target)?;
-    if !(settings.laplacian >= 0.0 && settings.descriptors >= 0.0) {
-        let found = format!("{} and {}", settings.laplacian, settings.descriptors);
+    let weights = [settings.laplacian, settings.descriptors, settings.orientation];
+    if !weights.iter().all(|weight| *weight >= 0.0) {
+        let found = weights.map(|weight| weight.to_string()).join(", ");
         return Error::out_of_range("fit weights", "numbers of at least 0", found);
     }
+    let surfaces = match (on_source.surface, on_target.surface) {
+        _ if settings.orientation == 0.0 => None,
+        (Some(s), Some(t)) => {
+            orientation::check((source, s), (target, t))?;
+            Some((s, t))
+        }
+        _ => {
+            let expected = "0 where a side has no triangles";
+            return Error::out_of_range("weight of orientation", expected, settings.orientation);
+        }
+    };
     let failed = |_| Error::LinearAlgebra("the singular values of the descriptors");
-    let singular = a.thin_svd().map_err(failed)?;
-    let largest = singular.S().column_vector().iter().fold(0.0f64, |m, &s| m.max(s));
-    let keep = |s: f64| s > RANK_CUTOFF * largest;
-    let rank = singular.S().column_vector().iter().filter(|&&s| keep(s)).count();
-
-    let bare = settings.laplacian == 0.0 && settings.descriptors == 0.0;
-    let (matrix, iterations) = if bare {
+    let bare = weights == [0.0; 3];
+    let (matrix, rank, iterations) = if bare {
+        let singular = a.thin_svd().map_err(failed)?;
+        let values: Vec<f64> = singular.S().column_vector().iter().copied().collect();
+        let (rank, least) = rank(&values);
         // C = B A⁺ = B V Σ⁺ Uᵀ
         let mut coefficients = b * singular.V(); // (k × rank)
-        for (j, &s) in singular.S().column_vector().iter().enumerate() {
-            let scale = if keep(s) { s.recip() } else { 0.0 };
+        for (j, &s) in values.iter().enumerate() {
+            let scale = if s > least { s.recip() } else { 0.0 };
             coefficients.col_mut(j).iter_mut().for_each(|x| *x *= scale);
         }
-        (coefficients * singular.U().transpose(), 0)
+        (coefficients * singular.U().transpose(), rank, 0)
     } else {
+        let (rank, _) = rank(&a.singular_values().map_err(failed)?);
         let mut energy = Energy::new(a, b);
         if settings.laplacian > 0.0 {
             energy.commute_with_laplacian(settings.laplacian, source, target);
         }
-        let by_rows = solve_by_rows(&energy)?;
-        if settings.descriptors > 0.0 {
-            energy.commute_with_descriptors(settings.descriptors, (a, b), source, target);
-            conjugate_gradients(&energy, by_rows, task)?
+        let (matrix, iterations) = if weights[1..] == [0.0; 2] {
+            (solve::by_rows(&energy)?, 0)
         } else {
-            (by_rows, 0)
-        }
+            let (a, b) = principal(a, b)?;
+            let (a, b) = (a.as_ref(), b.as_ref());
+            if settings.descriptors > 0.0 {
+                let (s, t) = (multiplications(a, source), multiplications(b, target));
+                energy.commute_with_multiplications(settings.descriptors, s, t);
+            }
+            if let Some((s, t)) = surfaces {
+                let (s, mut t) = (turns(a, source, s), turns(b, target, t));
+                if settings.reversing {
+                    t.scale(-1.0);
+                }
+                energy.commute_with(settings.orientation, s, t);
+            }
+            solve::conjugate_gradients(&energy, task)?
+        };
+        (matrix, rank, iterations)
     };
     let misfit = (&matrix * a - b).norm_l2() / b.norm_l2().max(f64::MIN_POSITIVE);
     let report = FitReport {
@@ -120,67 +167,20 @@ pub fn fit(
     Ok(Fit { map: FunctionalMap::new(matrix), report })
 }
 
-/// Row i of C solves (A Aᵀ + diag(maskᵢ) + floor) cᵢ = (B Aᵀ)ᵢ.
-fn solve_by_rows(energy: &Energy) -> Result<Mat<f64>> {
-    let (k_target, k_source) = (energy.right.nrows(), energy.right.ncols());
-    let mut matrix = Mat::zeros(k_target, k_source);
-    for i in 0..k_target {
-        let mut system = energy.gram.clone();
-        (0..k_source).for_each(|j| system[(j, j)] += energy.mask[(i, j)] + FLOOR);
-        let factor =
-            system.llt(Side::Lower).map_err(|_| Error::LinearAlgebra("the regularised fit"))?;
-        let row = factor.solve(energy.right.row(i).transpose());
-        matrix.row_mut(i).copy_from(row.transpose());
-    }
-    Ok(matrix)
-}
-
-/// Minimises the whole energy from `start`, preconditioned by the diagonal.
-fn conjugate_gradients(energy: &Energy, start: Mat<f64>, task: &Task) -> Result<(Mat<f64>, usize)> {
-    let (k_target, k_source) = (start.nrows(), start.ncols());
-    let diagonal = Mat::from_fn(k_target, k_source, |i, j| {
-        let commute: f64 = energy
-            .multipliers
-            .iter()
-            .map(|(s, t)| {
-                s.row(j).squared_norm_l2() + t.col(i).squared_norm_l2()
-                    - 2.0 * s[(j, j)] * t[(i, i)]
-            })
-            .sum();
-        energy.gram[(j, j)] + energy.mask[(i, j)] + commute + FLOOR
-    });
-    let apply = |c: &Mat<f64>| energy.apply(c.as_ref()) + c * faer::Scale(FLOOR);
-    let precondition =
-        |r: &Mat<f64>| Mat::from_fn(k_target, k_source, |i, j| r[(i, j)] / diagonal[(i, j)]);
-    let inner = |x: &Mat<f64>, y: &Mat<f64>| -> f64 {
-        (0..k_source).map(|j| x.col(j).transpose() * y.col(j)).sum()
-    };
-    let mut c = start;
-    let mut residual = &energy.right - apply(&c);
-    let goal = CG_TOLERANCE * energy.right.norm_l2();
-    let mut direction = precondition(&residual);
-    let mut size = inner(&residual, &direction);
-    for iteration in 0..CG_LIMIT {
-        if residual.norm_l2() <= goal {
-            return Ok((c, iteration));
-        }
-        task.step("fit", iteration, CG_LIMIT)?;
-        let image = apply(&direction);
-        let step = size / inner(&direction, &image);
-        c += &direction * faer::Scale(step);
-        residual -= &image * faer::Scale(step);
-        let conditioned = precondition(&residual);
-        let next = inner(&residual, &conditioned);
-        direction = conditioned + &direction * faer::Scale(next / size);
-        size = next;
-    }
-    Ok((c, CG_LIMIT))
+/// How many singular values count, and what they must exceed for that.
+fn rank(values: &[f64]) -> (usize, f64) {
+    let least = RANK_CUTOFF * values.iter().fold(0.0f64, |m, &s| m.max(s));
+    (values.iter().filter(|&&s| s > least).count(), least)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::solve::CG_LIMIT;
     use crate::pair::tests::{blob, shape};
+    use faer::linalg::solvers::Solve;
+    use faer::{Mat, Side};
+    use semfm_geom::Shape;
 
     /// Two descriptors on the same shape, of rank 2 in a basis of 12.
     fn two_bumps(basis: &Eigenbasis) -> Mat<f64> {
@@ -213,8 +213,8 @@ mod tests {
         let basis = shape.basis();
         let a = two_bumps(basis);
         for settings in [
-            FitSettings { laplacian: 1e-3, descriptors: 0.0 },
-            FitSettings { laplacian: 1e-3, descriptors: 1e-2 },
+            FitSettings { laplacian: 1e-3, ..Default::default() },
+            FitSettings { laplacian: 1e-3, descriptors: 1e-2, ..Default::default() },
         ] {
             let fit =
                 fit((a.as_ref(), a.as_ref()), basis, basis, &settings, &Task::default()).unwrap();
@@ -226,36 +226,118 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_solution_has_no_gradient() {
-        let (one, other) = (shape(&blob(1.0), 8), shape(&blob(1.6), 8));
-        let a = two_bumps(shape(&blob(1.0), 12).basis()).subrows(0, 8).to_owned();
-        let b = Mat::from_fn(8, 2, |i, j| a[(i, j)] * 1.1 + 0.02 * (i as f64).cos());
-        let settings = FitSettings { laplacian: 0.01, descriptors: 0.1 };
-        let fit =
-            fit((a.as_ref(), b.as_ref()), one.basis(), other.basis(), &settings, &Task::default())
-                .unwrap();
-        let mut energy = Energy::new(a.as_ref(), b.as_ref());
-        energy.commute_with_laplacian(0.01, one.basis(), other.basis());
-        energy.commute_with_descriptors(0.1, (a.as_ref(), b.as_ref()), one.basis(), other.basis());
-        let value = |c: &Mat<f64>| {
-            let descriptors = (c * &a - &b).squared_norm_l2();
-            let mask: f64 = (0..8)
-                .flat_map(|i| (0..8).map(move |j| (i, j)))
-                .map(|(i, j)| energy.mask[(i, j)] * c[(i, j)].powi(2))
-                .sum();
-            let commute: f64 =
-                energy.multipliers.iter().map(|(s, t)| (c * s - t * c).squared_norm_l2()).sum();
-            descriptors + mask + commute
+    /// Entry by entry from the definitions, descriptor by descriptor, solved as one dense system.
+    fn dense_reference(
+        (a, b): (&Mat<f64>, &Mat<f64>),
+        (source, target): (&Shape, &Shape),
+        settings: &FitSettings,
+    ) -> Mat<f64> {
+        let (k, p) = (a.nrows(), a.ncols());
+        let function = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
+            shape.basis().reconstruct_all(coefficients.as_ref().subcols(d, 1))
         };
-        let best = fit.map.matrix().to_owned();
-        let least = value(&best);
-        for (i, j) in [(0, 0), (3, 5), (7, 1)] {
-            for h in [-1e-3, 1e-3] {
-                let mut moved = best.clone();
-                moved[(i, j)] += h;
-                assert!(value(&moved) > least - 1e-9, "moving C[{i}, {j}] by {h} helps");
+        let multiplication = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
+            let (f, basis) = (function(shape, coefficients, d), shape.basis());
+            Mat::from_fn(k, k, |i, j| {
+                let at = |v: usize| basis.functions[(v, i)] * basis.functions[(v, j)];
+                (0..basis.n_vertices()).map(|v| basis.mass[v] * f[(v, 0)] * at(v)).sum()
+            })
+        };
+        let turn = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
+            let (f, phi) = (function(shape, coefficients, d), &shape.basis().functions);
+            Mat::from_fn(k, k, |i, j| {
+                let of_face = |ids: &[u32; 3]| {
+                    let [a, b, c] = ids.map(|v| v as usize);
+                    let mean = (f[(a, 0)] + f[(b, 0)] + f[(c, 0)]) / 3.0;
+                    let along = |of: usize, v: usize| phi[(v, of)] - phi[(a, of)];
+                    mean * 0.5 * (along(j, b) * along(i, c) - along(j, c) * along(i, b))
+                };
+                shape.mesh().faces().iter().map(of_face).sum()
+            })
+        };
+        let unit = a.squared_norm_l2() / k as f64;
+        // Column-major unknowns: C ↦ L C Rᵀ is R ⊗ L.
+        let mut system = Mat::<f64>::zeros(k * k, k * k);
+        let mut add = |left: &Mat<f64>, right: &Mat<f64>, weight: f64| {
+            for at in 0..k * k {
+                for to in 0..k * k {
+                    let factor = right[(at / k, to / k)] * left[(at % k, to % k)];
+                    system[(at, to)] += weight * factor;
+                }
+            }
+        };
+        let identity = Mat::<f64>::identity(k, k);
+        add(&identity, &(a * a.transpose()), 1.0);
+        let mut commute = |weight: f64, of: &dyn Fn(&Shape, &Mat<f64>, usize) -> Mat<f64>, sign| {
+            let s: Vec<_> = (0..p).map(|d| of(source, a, d)).collect();
+            let t: Vec<_> = (0..p).map(|d| of(target, b, d) * faer::Scale(sign)).collect();
+            let size: f64 = s.iter().chain(&t).map(Mat::squared_norm_l2).sum();
+            let weight = weight * unit / (size / (2 * k) as f64);
+            for (s, t) in s.iter().zip(&t) {
+                add(&identity, &(s * s.transpose()), weight);
+                add(&(t.transpose() * t), &identity, weight);
+                add(t, s, -weight);
+                add(&t.transpose().to_owned(), &s.transpose().to_owned(), -weight);
+            }
+        };
+        commute(settings.descriptors, &multiplication, 1.0);
+        commute(settings.orientation, &turn, if settings.reversing { -1.0 } else { 1.0 });
+        let gap =
+            |at: usize| (target.basis().values[at % k] - source.basis().values[at / k]).powi(2);
+        let largest = (0..k * k).map(gap).fold(0.0, f64::max);
+        for at in 0..k * k {
+            system[(at, at)] += settings.laplacian * unit * gap(at) / largest + 1e-9;
+        }
+        let right = b * a.transpose();
+        let right = Mat::from_fn(k * k, 1, |at, _| right[(at % k, at / k)]);
+        let c = system.llt(Side::Lower).unwrap().solve(&right);
+        Mat::from_fn(k, k, |i, j| c[(i + k * j, 0)])
+    }
+
+    #[test]
+    fn the_map_is_that_of_the_dense_normal_equations() {
+        let (source, target) = (shape(&blob(1.0), 9), shape(&blob(1.6), 9));
+        let surfaces = [&source, &target].map(|s| OrientedSurface::new(s.mesh()).unwrap());
+        let sides = [(&source, &surfaces[0]), (&target, &surfaces[1])]
+            .map(|(shape, surface)| FitSide { basis: shape.basis(), surface: Some(surface) });
+        for p in [2, 5, 30] {
+            let a = Mat::from_fn(9, p, |i, j| ((3 * i + 7 * j * j) as f64).sin());
+            let b = Mat::from_fn(9, p, |i, j| a[(i, j)] * 1.1 + 0.1 * ((i * j) as f64).cos());
+            for (descriptors, orientation, reversing) in
+                [(0.0, 0.0, false), (0.3, 0.0, false), (0.0, 0.2, false), (0.5, 0.2, true)]
+            {
+                let settings = FitSettings { laplacian: 0.01, descriptors, orientation, reversing };
+                let pair = (a.as_ref(), b.as_ref());
+                let found = fit(pair, sides[0], sides[1], &settings, &Task::default()).unwrap();
+                let expected = dense_reference((&a, &b), (&source, &target), &settings);
+                let apart = (found.map.matrix() - &expected).norm_l2() / expected.norm_l2();
+                assert!(apart < 1e-8, "{p} descriptors, {settings:?}: {apart:.1e}");
+                let direct = descriptors == 0.0 && orientation == 0.0;
+                assert_eq!(found.report.iterations == 0, direct, "{settings:?}");
             }
         }
+    }
+
+    #[test]
+    fn orientation_without_triangles_and_negative_weights_are_refused() {
+        let shape = shape(&blob(1.0), 12);
+        let basis = shape.basis();
+        let a = two_bumps(basis);
+        let pair = (a.as_ref(), a.as_ref());
+        for settings in [
+            FitSettings { orientation: 1.0, ..Default::default() },
+            FitSettings { descriptors: -1.0, ..Default::default() },
+            FitSettings { laplacian: f64::NAN, ..Default::default() },
+        ] {
+            let error = fit(pair, basis, basis, &settings, &Task::default()).unwrap_err();
+            assert!(matches!(error, Error::OutOfRange { .. }), "{error}");
+        }
+        // A surface of other vertices is not that of the basis.
+        let ball = semfm_geom::zoo::icosphere(1);
+        let surface = OrientedSurface::new(&ball).unwrap();
+        let side = FitSide { basis, surface: Some(&surface) };
+        let settings = FitSettings { orientation: 1.0, ..Default::default() };
+        let error = fit(pair, side, side, &settings, &Task::default()).unwrap_err();
+        assert!(matches!(error, Error::Length { .. }), "{error}");
     }
 }

@@ -2,12 +2,12 @@
 
 use faer::Mat;
 use rayon::prelude::*;
-use semfm_geom::Eigenbasis;
 use semfm_geom::descriptors::{WksSettings, wks};
+use semfm_geom::{Eigenbasis, Shape};
 
 use super::{Matched, Pair, Rule, Stages, Voter};
 use crate::descriptors::normalised_coefficients;
-use crate::fit::{Fit, fit};
+use crate::fit::{Fit, FitSide, OrientedSurface, fit};
 use crate::zoomout::{MapSide, point_map, zoomout};
 use crate::{PointMap, Result};
 
@@ -61,29 +61,39 @@ fn through_points(pair: &Pair<'_>, source_point_of: &[u32]) -> PointMap {
 
 /// The paper's baseline: wave kernel signatures, commutation with the Laplacian, plain ZoomOut.
 pub(super) fn match_by_wks(pair: &Pair<'_>, stages: &mut Stages) -> Result<Matched> {
-    let (source, target) = pair.plain_sides();
-    let road = |a: &MapSide<'_>, b: &MapSide<'_>, stages: &mut Stages| -> Result<(Fit, PointMap)> {
+    let (source, target) = (pair.source.shape(), pair.target.shape());
+    let road = |source: &Shape, target: &Shape, stages: &mut Stages| -> Result<(Fit, PointMap)> {
         let k = pair.settings.zoomout.k_start;
         let start = std::time::Instant::now();
         let describe = |basis: &Eigenbasis| -> Result<Mat<f64>> {
             let signature = wks(basis, &WksSettings::default())?;
             Ok(normalised_coefficients(basis, signature.as_ref(), k))
         };
+        let asked = pair.settings.fit.orientation > 0.0;
+        let surface = |of: &Shape| asked.then(|| OrientedSurface::new(of.mesh())).transpose();
+        let surfaces = (surface(source)?, surface(target)?);
+        let a = FitSide { basis: source.basis(), surface: surfaces.0.as_ref() };
+        let b = FitSide { basis: target.basis(), surface: surfaces.1.as_ref() };
         let (on_a, on_b) = (describe(a.basis)?, describe(b.basis)?);
-        let mut fit =
-            fit((on_a.as_ref(), on_b.as_ref()), a.basis, b.basis, &pair.settings.fit, pair.task)?;
+        let on_both = (on_a.as_ref(), on_b.as_ref());
+        let mut fit = fit(on_both, a, b, &pair.settings.fit, pair.task)?;
         stages.put("fit", start.elapsed());
         let (map, points) = stages.time("zoomout", || {
-            let map = zoomout(fit.map.clone(), a, b, &pair.settings.zoomout, pair.task)?;
-            let points = point_map(&map, a, b, pair.settings.zoomout.feature_weight);
+            let [a, b] = [source, target].map(|shape| MapSide {
+                basis: shape.basis(),
+                features: None,
+                samples: &[],
+            });
+            let map = zoomout(fit.map.clone(), &a, &b, &pair.settings.zoomout, pair.task)?;
+            let points = point_map(&map, &a, &b, pair.settings.zoomout.feature_weight);
             Ok((map, points))
         })?;
         fit.map = map;
         Ok((fit, points))
     };
-    let (forth, points) = road(&source, &target, stages)?;
+    let (forth, points) = road(source, target, stages)?;
     let back = match pair.settings.rule {
-        Rule::Image => Some(road(&target, &source, stages)?.1.source_of),
+        Rule::Image => Some(road(target, source, stages)?.1.source_of),
         Rule::Preimage => None,
     };
     Ok(Matched { point_map: points, reverse: back, map: Some(forth.map), fit: Some(forth.report) })

@@ -202,7 +202,7 @@ impl TransferSettings {
             },
             fit: FitSettings {
                 laplacian: if method == Method::Wks { 0.01 } else { 0.0 },
-                descriptors: 0.0,
+                ..FitSettings::default()
             },
             zoomout: method.zoomout(),
             feature_dims: 32,
