@@ -226,6 +226,9 @@ mod tests {
         }
     }
 
+    /// Operator d of a shape for descriptors given as coefficients.
+    type Family<'a> = &'a dyn Fn(&Shape, &Mat<f64>, usize) -> Mat<f64>;
+
     /// Entry by entry from the definitions, descriptor by descriptor, solved as one dense system.
     fn dense_reference(
         (a, b): (&Mat<f64>, &Mat<f64>),
@@ -268,7 +271,7 @@ mod tests {
         };
         let identity = Mat::<f64>::identity(k, k);
         add(&identity, &(a * a.transpose()), 1.0);
-        let mut commute = |weight: f64, of: &dyn Fn(&Shape, &Mat<f64>, usize) -> Mat<f64>, sign| {
+        let mut commute = |weight: f64, of: Family<'_>, sign| {
             let s: Vec<_> = (0..p).map(|d| of(source, a, d)).collect();
             let t: Vec<_> = (0..p).map(|d| of(target, b, d) * faer::Scale(sign)).collect();
             let size: f64 = s.iter().chain(&t).map(Mat::squared_norm_l2).sum();
