@@ -17,7 +17,7 @@ if [ -z "${BIN:-}" ]; then
     BIN=$root/target/release
 fi
 if command -v nvidia-smi >/dev/null 2>&1; then
-    nvidia-smi --query-gpu=name,driver_version --format=csv,noheader
+    nvidia-smi --query-gpu=name,driver_version --format=csv,noheader || true
 fi
 
 # Views, read back; while one batch is read the next is drawn. The CPU's beside them, in the same run.

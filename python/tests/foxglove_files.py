@@ -40,6 +40,9 @@ def read(path: Path) -> Scene:
         for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
             assert schema.encoding == channel.message_encoding == "protobuf", channel.topic
             assert message.log_time == message.publish_time
+            if hasattr(decoded, "timestamp"):
+                stamp = decoded.timestamp.seconds * 10**9 + decoded.timestamp.nanos
+                assert stamp == message.log_time, channel.topic
             scene.messages[channel.topic].append(decoded)
             scene.raw[channel.topic].append(message.data)
             scene.types[channel.topic] = schema.name

@@ -174,6 +174,8 @@ def test_many_files_go_through_one_encoder_into_a_folder(tmp_path, views, capsys
     assert "another name" in capsys.readouterr().err
     assert main([str(model), *shared]) == 2
     assert "NAME.views.mcap" in capsys.readouterr().err
+    assert main([str(pair[0]), "--output-folder", str(model), *shared[2:]]) == 2
+    assert str(model) in capsys.readouterr().err
 
 
 def test_bad_input_leaves_an_older_output_alone(tmp_path, views, capsys):

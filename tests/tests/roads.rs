@@ -83,6 +83,13 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     assert!(about["n_messages"].as_u64().unwrap() >= 6, "{about}");
     let picture = std::fs::read(out.join("transfer.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000);
+
+    // A transfer without a hand leaves no older grasps beside it.
+    let demonstrated = folder.path().join("transfer");
+    assert!(demonstrated.join("grasps.json").is_file());
+    assert_eq!(transfer(&files, &demonstrated, &[]).code, Some(0));
+    assert!(!demonstrated.join("grasps.json").exists());
+    assert!(!demonstrated.join("grasps.png").exists());
 }
 
 #[test]

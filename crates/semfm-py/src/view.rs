@@ -165,6 +165,9 @@ pub fn render(
         let values = arrays::floats32(colors, "colors", &rows)?.0;
         paint = Colors::Vertices(values.as_chunks::<3>().0.to_vec());
     }
+    if normals && colors.is_some() {
+        return Err(errors::invalid(mesh.py(), "normals", "False where colors are given", "True"));
+    }
     if normals {
         paint = Colors::Normals;
     }

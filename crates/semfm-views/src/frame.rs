@@ -1,7 +1,7 @@
 //! The object's own frame: principal axes of its surface, with signs that turn with the object.
 
 use semfm_geom::Mesh;
-use semfm_geom::math::{DMat3, DVec3};
+use semfm_geom::math::{DMat3, DVec3, bounds};
 
 use crate::Result;
 
@@ -66,6 +66,14 @@ pub(crate) fn surface_vertices(mesh: &Mesh) -> Vec<DVec3> {
         used[id as usize] = true;
     }
     mesh.vertices().iter().zip(used).filter_map(|(&p, used)| used.then_some(p)).collect()
+}
+
+/// Centre of the bounding box of what triangles use, and the distance from it to the farthest corner.
+pub(crate) fn surface_sphere(mesh: &Mesh) -> (DVec3, f64) {
+    let points = surface_vertices(mesh);
+    let (low, high) = bounds(&points).unwrap_or_default();
+    let centre = (low + high) / 2.0;
+    (centre, points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max))
 }
 
 fn area_and_centroid(mesh: &Mesh) -> (f64, DVec3) {

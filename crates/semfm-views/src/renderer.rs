@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 #[cfg(feature = "gpu")]
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use semfm_geom::{Mesh, Task};
 
@@ -46,17 +46,17 @@ impl FromStr for RendererChoice {
     }
 }
 
-/// An open renderer. Opening a driver costs 50 to 500 ms, so it is done when there is something to
+/// An open renderer. Opening a driver costs 50 to 100 ms, so it is done when there is something to
 /// draw, and once.
 #[derive(Debug)]
 pub struct Renderer {
     #[cfg(feature = "gpu")]
     gpu: Option<GpuRenderer>,
-    /// Whether the CPU takes over what the driver refuses, and whether it did the last time.
+    /// Whether the CPU takes over what the driver refuses, and why it did the last time.
     #[cfg(feature = "gpu")]
     yielding: bool,
     #[cfg(feature = "gpu")]
-    yielded: AtomicBool,
+    yielded: Mutex<Option<String>>,
     note: Option<String>,
 }
 
@@ -69,7 +69,7 @@ impl Renderer {
             #[cfg(feature = "gpu")]
             yielding: true,
             #[cfg(feature = "gpu")]
-            yielded: AtomicBool::new(false),
+            yielded: Mutex::default(),
             note: None,
         }
     }
@@ -81,7 +81,7 @@ impl Renderer {
     }
 
     /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: they
-    /// take as long and are less exact.
+    /// take longer and are less exact.
     ///
     /// # Errors
     /// For [`RendererChoice::Gpu`]: [`Error::NoGpu`] without a driver (or in a build without the
@@ -117,15 +117,25 @@ impl Renderer {
         }
     }
 
-    /// Why the CPU draws although a driver was asked for; nothing where all is as wanted.
-    pub fn note(&self) -> Option<&str> {
-        self.note.as_deref()
+    /// Why the CPU draws although a driver was asked for, known after opening or, where the driver
+    /// refused, after drawing; nothing where all is as wanted.
+    pub fn note(&self) -> Option<String> {
+        #[cfg(feature = "gpu")]
+        if let Some(reason) = self.yielded() {
+            return Some(reason);
+        }
+        self.note.clone()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn yielded(&self) -> Option<String> {
+        self.yielded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Who draws, for reports; once something was drawn, who drew it.
     pub fn name(&self) -> String {
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = self.gpu.as_ref().filter(|_| !self.yielded.load(Ordering::Relaxed)) {
+        if let Some(gpu) = self.gpu.as_ref().filter(|_| self.yielded().is_none()) {
             return gpu.name();
         }
         "CPU".to_owned()
@@ -148,12 +158,15 @@ impl Renderer {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &self.gpu {
             let answer = gpu.render(mesh, paint, cameras, settings, task);
-            let refused = matches!(
-                answer,
-                Err(Error::Gpu { .. } | Error::BeyondGpu { .. } | Error::NoGpu { .. })
-            );
-            self.yielded.store(self.yielding && refused, Ordering::Relaxed);
-            if !(self.yielding && refused) {
+            let refusal = match &answer {
+                Err(
+                    error @ (Error::Gpu { .. } | Error::BeyondGpu { .. } | Error::NoGpu { .. }),
+                ) if self.yielding => Some(format!("views are drawn on the CPU: {error}")),
+                _ => None,
+            };
+            let yields = refusal.is_some();
+            *self.yielded.lock().unwrap_or_else(PoisonError::into_inner) = refusal;
+            if !yields {
                 return answer;
             }
         }

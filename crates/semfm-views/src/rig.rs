@@ -34,7 +34,7 @@ pub struct RigSettings {
     pub principal_frame: bool,
     /// Close-ups beside each view, spread along the silhouette's longer side: each frames
     /// [`CLOSE_UP`] of what the view frames, so that thin objects and small handles fill more
-    /// patches.
+    /// patches. Where the zoom is at its limit, those of a view are alike.
     pub close_ups: usize,
 }
 

@@ -38,6 +38,12 @@ fn openness_asks_for_no_winding_and_falls_towards_a_hole() {
     let turned = Mesh::new(ring.vertices().to_vec(), turned).unwrap();
     let open = openness(&ring);
     assert_eq!(open, openness(&turned));
+    let every_second = |(k, &[a, b, c]): (usize, &[u32; 3])| match k % 2 {
+        0 => [a, b, c],
+        _ => [a, c, b],
+    };
+    let faces = ring.faces().iter().enumerate().map(every_second).collect();
+    assert_eq!(open, openness(&Mesh::new(ring.vertices().to_vec(), faces).unwrap()));
     let reach = |id: &usize| ring.vertices()[*id].truncate().length();
     let ids = 0..ring.n_vertices();
     let far = ids.clone().max_by(|a, b| reach(a).total_cmp(&reach(b))).unwrap();

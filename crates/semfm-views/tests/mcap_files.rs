@@ -464,6 +464,11 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
         spoil(&mut bad);
         assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
     }
+    let mut dark = rendered.clone();
+    dark.rgb.clear();
+    let pictures = vec![ScenePicture { view: &dark, ..scene.pictures[0] }];
+    let bad = Scene { pictures, ..scene.clone() };
+    assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
     let numbers = [("weight", short)];
     let bad = Scene { clouds: vec![ScenePoints { numbers: &numbers, ..cloud }], ..scene.clone() };
     assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());

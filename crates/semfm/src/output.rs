@@ -70,8 +70,13 @@ pub fn write_transfer(
 }
 
 /// Weights to four digits: enough for eyes, and a third of the bytes.
+/// Never up to where a vertex begins to count.
 fn rounded(weights: &[f64]) -> Vec<f64> {
-    weights.iter().map(|w| (w * 1e4).round() / 1e4).collect()
+    let to_four_digits = |w: f64| (w * 1e4).round() / 1e4;
+    let counts = |w: f64| w >= Region::COUNTS;
+    let below = Region::COUNTS - 1e-4;
+    let round = |&w: &f64| Some(to_four_digits(w)).filter(|&r| counts(r) == counts(w));
+    weights.iter().map(|w| round(w).unwrap_or(below)).collect()
 }
 
 /// A mesh as read with a weight per vertex, as property and as colour.

@@ -121,7 +121,6 @@ def _outputs(args: argparse.Namespace) -> list[str]:
         if len(args.views) != 1:
             raise expected("-o", "views", "one file (--output-folder takes more)", len(args.views))
         return [args.output]
-    os.makedirs(args.output_folder, exist_ok=True)
     names = [os.path.basename(path) for path in args.views]
     for name in names:
         if not name.endswith(_VIEWS):
@@ -129,4 +128,8 @@ def _outputs(args: argparse.Namespace) -> list[str]:
         if names.count(name) > 1:
             raise expected(name, "name", "another name for each file of a folder", repr(name))
     folder = args.output_folder
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise SidecarError(f"{folder}: {error.strerror}") from error
     return [os.path.join(folder, name[: -len(_VIEWS)] + ".emb.mcap") for name in names]

@@ -91,7 +91,8 @@ impl Demo {
         if !common.json {
             talk::say(format_args!("IoU         {overlap:.2} with the true grip"));
             let pictures = ["transfer.png", "meaning.png", "grasps.png"];
-            for picture in pictures.map(|name| folder.join(name)) {
+            // A refused region is not grasped.
+            for picture in pictures.map(|name| folder.join(name)).iter().filter(|p| p.is_file()) {
                 talk::say(format_args!("picture     {}", picture.display()));
             }
             if !common.quiet {

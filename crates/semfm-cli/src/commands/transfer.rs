@@ -242,6 +242,8 @@ impl Job<'_> {
             job.draw(&picture, carried.weights(), &found, task)?;
             files.extend([answer, picture]);
             grasps = Some(found);
+        } else {
+            forget_grasps(output)?;
         }
         let stages = stages_ms(source, target, carried);
         if common.json {
@@ -277,6 +279,19 @@ impl Job<'_> {
         }
         summary
     }
+}
+
+/// Removes what an earlier run left in the folder: its hands would stand at a region that is gone.
+fn forget_grasps(folder: &Path) -> Result<()> {
+    for path in ["grasps.json", "grasps.png"].map(|name| folder.join(name)) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| path.display().to_string());
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn tell(job: &Job<'_>, stages: &[(String, f64)], common: &Common) {

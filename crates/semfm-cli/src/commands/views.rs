@@ -165,9 +165,6 @@ impl Views {
                 .for_each(|note| talk::remark(format_args!("note: {note}")));
         }
         let renderer = Renderer::open(self.renderer).context("--renderer")?;
-        if let Some(note) = renderer.note().filter(|_| !common.quiet) {
-            talk::remark(format_args!("note: {note}"));
-        }
         let settings = ViewSettings {
             rig: self.rig.settings(),
             render: self.look.settings()?,
@@ -179,6 +176,9 @@ impl Views {
         };
         let views = make_views(&file, &settings, &renderer, &self.output, common)
             .with_context(|| self.mesh.display().to_string())?;
+        if let Some(note) = renderer.note().filter(|_| !common.quiet) {
+            talk::remark(format_args!("note: {note}"));
+        }
         talk::say(self.output.display());
         if let Some(sheet) = &self.sheet {
             let columns = (views.len() as f64).sqrt().ceil() as usize;

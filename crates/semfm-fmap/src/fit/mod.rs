@@ -100,10 +100,13 @@ pub fn fit<'a>(
     Error::length("descriptors of the target", a.ncols(), b.ncols())?;
     Error::length("coefficients per descriptor of the target", a.nrows(), b.nrows())?;
     check_size("the descriptors", a.nrows(), source, target)?;
+    if a.nrows() == 0 {
+        return Error::out_of_range("coefficients per descriptor", "at least 1", 0);
+    }
     let weights = [settings.laplacian, settings.descriptors, settings.orientation];
-    if !weights.iter().all(|weight| *weight >= 0.0) {
+    if !weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite()) {
         let found = weights.map(|weight| weight.to_string()).join(", ");
-        return Error::out_of_range("fit weights", "numbers of at least 0", found);
+        return Error::out_of_range("fit weights", "finite numbers of at least 0", found);
     }
     let surfaces = match (on_source.surface, on_target.surface) {
         _ if settings.orientation == 0.0 => None,

@@ -73,9 +73,11 @@ impl OrientedSurface {
         {
             return Err(Error::NotOriented { edge, found: odd.len(), n_faces: mesh.n_faces() });
         }
+        let (low, _) = mesh.bounds();
         let volume: f64 = (0..mesh.n_faces())
             .map(|face| {
-                let [a, b, c] = mesh.corners(face);
+                // Far from the origin volumes cancel: they are taken from a corner of the box.
+                let [a, b, c] = mesh.corners(face).map(|p| p - low);
                 a.dot(b.cross(c))
             })
             .sum();
@@ -234,6 +236,9 @@ mod tests {
         let mut faces = [solid([0, 1, 2, 3]), solid([0, 1, 4, 5])].concat();
         let welded = Mesh::new(points.to_vec(), faces.clone()).unwrap();
         assert_eq!(OrientedSurface::new(&welded).unwrap().outward(), Some(true));
+        let far = points.map(|p| p + DVec3::splat(1e7)).to_vec();
+        let far = Mesh::new(far, faces.clone()).unwrap();
+        assert_eq!(OrientedSurface::new(&far).unwrap().outward(), Some(true));
         faces[2].swap(0, 1);
         let turned = Mesh::new(points.to_vec(), faces).unwrap();
         assert!(matches!(OrientedSurface::new(&turned), Err(Error::NotOriented { .. })));

@@ -45,6 +45,9 @@ pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f
         if residual.norm_l2() <= goal {
             return Ok((c, iteration));
         }
+        if !size.is_finite() {
+            return Err(Error::LinearAlgebra("the regularised fit"));
+        }
         task.step("fit", iteration, CG_LIMIT)?;
         let image = energy.apply(&direction);
         let step = size / inner(&direction, &image);

@@ -240,6 +240,10 @@ impl TransferSettings {
                 found,
             );
         }
+        if self.fit.orientation > 0.0 && self.method != Method::Wks {
+            let expected = format!("0 ({} does not fit descriptors of the surface)", self.method);
+            return Error::out_of_range("fit.orientation", expected, self.fit.orientation);
+        }
         if self.rule == Rule::Image && !self.method.has_map() {
             let expected = format!("preimage ({} makes no map that has an image)", self.method);
             return Error::out_of_range("rule", expected, self.rule);

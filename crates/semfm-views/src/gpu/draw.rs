@@ -85,7 +85,7 @@ impl Draw<'_> {
         let stride = size_of::<CameraBlock>().next_multiple_of(alignment.max(1));
         let mut bytes = vec![0; stride * parts.len()];
         for (place, part) in bytes.chunks_exact_mut(stride).zip(parts) {
-            let camera = part.camera(&self.cameras[part.view], 1);
+            let camera = part.camera(&self.cameras[part.view]);
             let block = self.scene.camera_block(&camera, self.request.settings);
             place[..size_of::<CameraBlock>()].copy_from_slice(bytemuck::bytes_of(&block));
         }

@@ -37,16 +37,13 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The camera that sees this part alone, with `scale` pixels for each.
-    pub fn camera(&self, whole: &Camera, scale: u32) -> Camera {
-        let factor = f64::from(scale);
+    /// The camera that sees this part alone.
+    pub fn camera(&self, whole: &Camera) -> Camera {
         Camera {
-            width: self.columns.len() as u32 * scale,
-            height: self.rows.len() as u32 * scale,
-            fx: whole.fx * factor,
-            fy: whole.fy * factor,
-            cx: (whole.cx - self.columns.start as f64) * factor,
-            cy: (whole.cy - self.rows.start as f64) * factor,
+            width: self.columns.len() as u32,
+            height: self.rows.len() as u32,
+            cx: whole.cx - self.columns.start as f64,
+            cy: whole.cy - self.rows.start as f64,
             ..*whole
         }
     }
@@ -77,7 +74,7 @@ pub(super) fn batches(
     let within = |bytes: u64, scale: u32| bytes / u64::from(scale * scale);
     let most = within(limits.max_buffer_size, scale);
     let part = within(PART_BYTES, request.settings.supersampling).min(most);
-    let batch = within(batch, scale).min(most);
+    let batch = within(batch, scale).min(part);
     pack(&windows, side, batch, part)
 }
 

@@ -28,7 +28,7 @@ impl Scene {
     /// [`Error::BeyondGpu`] for a mesh that does not fit into a buffer, [`Error::Gpu`].
     pub fn new(device: &Device, request: &Request<'_>) -> Result<Self> {
         let mesh = request.mesh;
-        let (centre, radius) = mesh.bounding_sphere();
+        let (centre, radius) = request.sphere;
         let bytes_each = 3 * size_of::<Corner>() as u64;
         let largest = device.device.limits().max_buffer_size.min(u64::from(u32::MAX));
         if mesh.n_faces() as u64 > largest / bytes_each {

@@ -198,6 +198,11 @@ impl Scene<'_> {
             }
             check_finite(cloud.topic, cloud.points)?;
         }
+        for ScenePicture { name, view, .. } in &self.pictures {
+            view.camera.check(name)?;
+            let n_pixels = view.camera.width as usize * view.camera.height as usize;
+            check_length(name, "bytes", 3 * n_pixels, view.rgb.len())?;
+        }
         Ok(())
     }
 
@@ -245,13 +250,20 @@ impl Scene<'_> {
     /// Where each frame stands in the world, so that nothing overlaps: one beside the other along x,
     /// all with their lowest point at z = 0.
     fn side_by_side(&self) -> Vec<Stand<'_>> {
-        let shown = self.meshes.iter().map(|mesh| (mesh.frame_id, mesh.vertices));
-        let shown = shown.chain(self.clouds.iter().map(|cloud| (cloud.frame_id, cloud.points)));
+        // Vertices of no triangle do not count, be they in a cloud as well.
+        let corners = |mesh: &SceneMesh<'_>| {
+            let ids = mesh.faces.as_flattened().iter();
+            ids.map(|&id| mesh.vertices[id as usize]).collect::<Vec<DVec3>>()
+        };
+        let is_meshed = |frame_id| self.meshes.iter().any(|mesh| mesh.frame_id == frame_id);
+        let shown = self.meshes.iter().map(|mesh| (mesh.frame_id, corners(mesh)));
+        let clouds = self.clouds.iter().filter(|cloud| !is_meshed(cloud.frame_id));
+        let shown = shown.chain(clouds.map(|cloud| (cloud.frame_id, cloud.points.to_vec())));
         let mut stands: Vec<Stand<'_>> = Vec::new();
-        for (frame_id, points) in shown {
+        for (frame_id, mut turned) in shown {
             let frame = self.frames.iter().find(|frame| frame.frame_id == frame_id);
             let turn = frame.map_or(DMat3::IDENTITY, |frame| frame.world_from_frame);
-            let turned: Vec<DVec3> = points.iter().map(|&p| turn * p).collect();
+            turned.iter_mut().for_each(|p| *p = turn * *p);
             let Some((low, high)) = bounds(&turned) else { continue };
             match stands.iter_mut().find(|stand| stand.frame_id == frame_id) {
                 Some(stand) => (stand.low, stand.high) = (stand.low.min(low), stand.high.max(high)),

@@ -19,12 +19,12 @@ pub type Colors = Vec<[u8; 3]>;
 ///
 /// # Errors
 /// [`Error::Container`](crate::Error::Container) for a damaged file;
-/// [`Error::Format`](crate::Error::Format) where there is not one mesh.
+/// [`Error::Format`](crate::Error::Format) where there is not one mesh, or one that is none.
 pub fn read_mesh(path: &Path) -> Result<(Mesh, Option<Colors>)> {
     let mut found = None;
     read_messages(path, |message| {
-        if message.channel.topic == MESH {
-            found = Some(mesh_of(path, &message)?);
+        if message.channel.topic == MESH && found.replace(mesh_of(path, &message)?).is_some() {
+            return Err(topic_error(path, MESH, "one message", "several"));
         }
         Ok(())
     })?;
@@ -47,7 +47,9 @@ fn mesh_of(path: &Path, message: &Message<'_>) -> Result<(Mesh, Option<Colors>)>
     let vertices = list.points.iter().map(|p| DVec3::new(p.x, p.y, p.z)).collect();
     let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
     let colors = list.colors.iter().map(|c| [c.r, c.g, c.b].map(byte)).collect();
-    Ok((Mesh::new(vertices, faces.to_vec())?, Some(colors).filter(|_| !list.colors.is_empty())))
+    let mesh = Mesh::new(vertices, faces.to_vec())
+        .map_err(|error| message_error(path, message, "a sound mesh", error.to_string()))?;
+    Ok((mesh, Some(colors).filter(|_| !list.colors.is_empty())))
 }
 
 /// Points and colours of the cloud on a topic of a scene that this program wrote; nothing where there

@@ -1,9 +1,8 @@
 //! Outlines: pixels where the surface ends, jumps in depth or folds are drawn darker.
 
-use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
-use super::RenderSettings;
+use super::Request;
 use crate::View;
 
 /// A step in depth of this share of the bounding-sphere radius is an edge, where the surface behind
@@ -12,10 +11,9 @@ const JUMP: f64 = 0.03;
 const PIXELS: f64 = 2.0;
 
 /// Darkens the pixels of the object that border on something farther away or beyond a crease.
-pub(super) fn draw(view: &mut View, mesh: &Mesh, settings: &RenderSettings) {
-    let edges = Edges { view, mesh, jump: JUMP * mesh.bounding_sphere().1, settings };
-    let is_edge = edges.find();
-    let kept = 1.0 - settings.edges as f32;
+pub(super) fn draw(view: &mut View, request: &Request<'_>) {
+    let is_edge = Edges { view, request, jump: JUMP * request.sphere.1 }.find();
+    let kept = 1.0 - request.settings.edges as f32;
     for (pixel, _) in view.rgb.chunks_exact_mut(3).zip(is_edge).filter(|(_, is_edge)| *is_edge) {
         pixel.iter_mut().for_each(|byte| *byte = (f32::from(*byte) * kept + 0.5) as u8);
     }
@@ -23,9 +21,8 @@ pub(super) fn draw(view: &mut View, mesh: &Mesh, settings: &RenderSettings) {
 
 struct Edges<'a> {
     view: &'a View,
-    mesh: &'a Mesh,
+    request: &'a Request<'a>,
     jump: f64,
-    settings: &'a RenderSettings,
 }
 
 impl Edges<'_> {
@@ -50,7 +47,7 @@ impl Edges<'_> {
     /// Whether two neighbouring pixels belong to different places of the surface.
     fn is_border(&self, near: usize, far: usize) -> bool {
         let (one, other) = (self.view.triangles[near], self.view.triangles[far]);
-        if one == other {
+        if one == other || one < 0 {
             return false;
         }
         if other < 0 {
@@ -63,11 +60,11 @@ impl Edges<'_> {
         let (u, v) = ((far % width) as f64 + 0.5, (far / width) as f64 + 0.5);
         let cosine = normal.dot(camera.ray(u, v).normalize()).abs();
         let steepness = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-        depth - nearer > self.jump + PIXELS * depth / camera.fx * steepness
-            || self.normal(one).dot(normal).abs() < self.settings.crease.cos()
+        depth - nearer > self.jump + PIXELS * depth / camera.fx.min(camera.fy) * steepness
+            || self.normal(one).dot(normal).abs() < self.request.settings.crease.cos()
     }
 
     fn normal(&self, triangle: i32) -> DVec3 {
-        self.mesh.face_normal_scaled(triangle as usize).normalize_or_zero()
+        self.request.mesh.face_normal_scaled(triangle as usize).normalize_or_zero()
     }
 }

@@ -18,12 +18,14 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
+use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 
 #[cfg(feature = "gpu")]
 pub(crate) use shade::light_direction;
 pub use shade::{CornerNormals, Paint};
 
+use crate::frame::surface_sphere;
 use crate::{Camera, Error, Result, View};
 pub use occlusion::openness;
 use raster::{DrawAll, Raster};
@@ -153,6 +155,8 @@ pub(crate) struct Request<'a> {
     pub paint: &'a Paint<'a>,
     pub settings: &'a RenderSettings,
     pub normals: CornerNormals,
+    /// Centre and radius of the surface.
+    pub sphere: (DVec3, f64),
     /// Light that reaches each vertex (n) where occlusion is asked for.
     occlusion: Option<Vec<f32>>,
 }
@@ -183,10 +187,11 @@ impl<'a> Request<'a> {
             return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
         }
         let darkened = |open: f32| 1.0 - settings.occlusion as f32 * (1.0 - open);
-        let occlusion =
-            (settings.occlusion > 0.0).then(|| openness(mesh).into_iter().map(darkened).collect());
+        let is_lit = !matches!(paint, Paint::Normals);
+        let occlusion = (is_lit && settings.occlusion > 0.0)
+            .then(|| openness(mesh).into_iter().map(darkened).collect());
         let normals = CornerNormals::new(mesh, settings.crease);
-        Ok(Self { mesh, paint, settings, normals, occlusion })
+        Ok(Self { mesh, paint, settings, normals, sphere: surface_sphere(mesh), occlusion })
     }
 
     /// Share of the light that reaches a vertex.
@@ -197,7 +202,7 @@ impl<'a> Request<'a> {
     /// What is drawn over a finished picture.
     pub fn finish(&self, view: &mut View) {
         if self.settings.edges > 0.0 {
-            edges::draw(view, self.mesh, self.settings);
+            edges::draw(view, self);
         }
     }
 

@@ -8,6 +8,7 @@ use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use super::probe::inverse_depths;
 use super::triangle::Projection;
 use crate::Camera;
+use crate::frame::surface_sphere;
 use crate::rig::fibonacci_directions;
 
 /// Axes along which a vertex is looked at, from both ends: of each two opposite eyes a convex
@@ -23,29 +24,33 @@ const TOLERANCE: f64 = 0.01;
 
 /// Share of the light from all around that reaches each vertex (n), 0 to 1.
 ///
-/// Of the directions from which a vertex is in sight, weighted by the cosine to its normal, twice
-/// the share: a closed convex object has 1 everywhere, the inside of a cup less. No winding is
-/// asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
+/// Of the directions from which a vertex is in sight, weighted by how large its triangles are seen
+/// from there, twice the share: a closed convex object has 1 everywhere, the inside of a cup less. No
+/// winding is asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
 /// Vertices of no triangle have 1.
 pub fn openness(mesh: &Mesh) -> Vec<f32> {
-    let (centre, radius) = mesh.bounding_sphere();
-    let mut normals = vec![DVec3::ZERO; mesh.n_vertices()];
-    for (face, ids) in mesh.faces().iter().enumerate() {
-        ids.iter().for_each(|&id| normals[id as usize] += mesh.face_normal_scaled(face));
-    }
+    let (centre, radius) = surface_sphere(mesh);
     let directions: Vec<DVec3> =
         fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
-    let in_sight: Vec<Vec<bool>> = directions
+    let normals: Vec<DVec3> =
+        (0..mesh.n_faces()).map(|face| mesh.face_normal_scaled(face)).collect();
+    // What each eye sees, and how much that counts at each vertex.
+    let looks: Vec<(Vec<bool>, Vec<f64>)> = directions
         .par_iter()
-        .map(|&direction| vertices_in_sight(mesh, centre, radius, direction))
+        .map(|&direction| {
+            let mut weights = vec![0.0; mesh.n_vertices()];
+            for (ids, normal) in mesh.faces().iter().zip(&normals) {
+                let weight = normal.dot(direction).abs();
+                ids.iter().for_each(|&id| weights[id as usize] += weight);
+            }
+            (vertices_in_sight(mesh, centre, radius, direction), weights)
+        })
         .collect();
-    let open = normals.into_par_iter().enumerate().map(|(id, normal)| {
-        let normal = normal.normalize_or_zero();
+    let open = (0..mesh.n_vertices()).map(|id| {
         let (mut seen, mut all) = (0.0, 0.0);
-        for (direction, in_sight) in directions.iter().zip(&in_sight) {
-            let weight = normal.dot(*direction).abs();
-            all += weight;
-            seen += if in_sight[id] { weight } else { 0.0 };
+        for (in_sight, weights) in &looks {
+            all += weights[id];
+            seen += if in_sight[id] { weights[id] } else { 0.0 };
         }
         if all > 0.0 { (2.0 * seen / all).min(1.0) as f32 } else { 1.0 }
     });

@@ -64,7 +64,7 @@ pub fn write_grasp_picture(
 
 /// The better the bluer.
 pub(crate) fn hand_color(rank: usize) -> [f32; 3] {
-    let share = rank as f32 / SHOWN as f32;
+    let share = rank as f32 / (SHOWN - 1) as f32;
     std::array::from_fn(|c| BEST[c] + share * (WORST[c] - BEST[c]))
 }
 

@@ -121,13 +121,13 @@ fn width<'a>(facets: impl Iterator<Item = &'a Facet>, along: DVec3) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use semfm_geom::math::DMat3;
     use semfm_geom::zoo;
 
     use super::*;
 
-    fn turned(mesh: &Mesh, turn: DMat3) -> Mesh {
+    pub(in super::super) fn turned(mesh: &Mesh, turn: DMat3) -> Mesh {
         let vertices = mesh.vertices().iter().map(|&p| turn * p).collect();
         Mesh::new(vertices, mesh.faces().to_vec()).unwrap()
     }

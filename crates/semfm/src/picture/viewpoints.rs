@@ -294,12 +294,8 @@ fn target_from_source(source: &Mesh, target: &Mesh, source_of: &[u32]) -> Option
 mod tests {
     use semfm_geom::zoo;
 
+    use super::super::upright::tests::turned;
     use super::*;
-
-    fn turned(mesh: &Mesh, turn: DMat3) -> Mesh {
-        let vertices = mesh.vertices().iter().map(|&p| turn * p).collect();
-        Mesh::new(vertices, mesh.faces().to_vec()).unwrap()
-    }
 
     #[test]
     fn a_turned_copy_is_seen_from_the_same_sides() {

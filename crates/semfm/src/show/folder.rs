@@ -4,6 +4,8 @@ use std::path::Path;
 
 use semfm_geom::io::{MeshFile, read_mesh};
 use semfm_geom::{Mesh, Task};
+#[cfg(feature = "mcap")]
+use semfm_views::Fault;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -113,7 +115,7 @@ fn region_layer(map: &PointMapFile, source: &MeshFile, target: &MeshFile) -> Lay
 
 fn anchor_layer(map: &PointMapFile, report: &Value) -> Layer {
     let ranks = map.source_anchor.iter().chain(&map.target_anchor);
-    let n_anchors = ranks.copied().max().map_or(0, |most| (most + 1).clamp(0, 200));
+    let n_anchors = ranks.copied().max().map_or(0, |most| most.saturating_add(1).clamp(0, 200));
     let mut legend = vec![(Some(bytes(anchor_color(-1))), "no anchor".to_owned())];
     legend.extend((0..n_anchors).map(|rank| {
         let cosine = report["anchors"][rank as usize]["cosine"].as_f64();
@@ -121,7 +123,9 @@ fn anchor_layer(map: &PointMapFile, report: &Value) -> Layer {
         (Some(bytes(anchor_color(rank))), format!("anchor {}{cosine}", rank + 1))
     }));
     let classes = |ranks: &[i64]| {
-        Paint::Classes(ranks.iter().map(|&rank| (rank + 1).clamp(0, n_anchors) as u8).collect())
+        Paint::Classes(
+            ranks.iter().map(|&rank| rank.saturating_add(1).clamp(0, n_anchors) as u8).collect(),
+        )
     };
     let paints = vec![classes(&map.source_anchor), classes(&map.target_anchor)];
     Layer { name: "anchors".into(), legend, paints }
@@ -155,8 +159,12 @@ fn meaning_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     }
     let mut paints = Vec::new();
     for (topic, mesh) in ["/source/cloud", "/target/cloud"].into_iter().zip(meshes) {
-        let Some((points, colors)) = semfm_views::mcap::read_cloud(&path, topic)? else {
-            return Ok(None);
+        let (points, colors) = match semfm_views::mcap::read_cloud(&path, topic) {
+            Ok(Some(cloud)) => cloud,
+            Ok(None) => return Ok(None),
+            // A scene of millions of vertices is beyond the reader: that costs this layer, not the page.
+            Err(semfm_views::Error::Container { fault: Fault::OverLimit, .. }) => return Ok(None),
+            Err(error) => return Err(error.into()),
         };
         let index = semfm_geom::PointIndex::new(&points)?;
         let nearest = |&p: &semfm_geom::math::DVec3| colors[index.nearest(p).0];

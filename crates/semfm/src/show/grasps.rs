@@ -124,7 +124,7 @@ impl GraspsFile {
         for (part, tcp_from_part) in self.gripper.parts.iter().zip(&grasp.hand.closed) {
             for hull in &part.hulls {
                 let corners: Vec<DVec3> = hull.iter().copied().map(DVec3::from_array).collect();
-                // A flat piece has no hull and is not drawn.
+                // A piece without a hull (fewer than three corners) is not drawn.
                 let Ok((points, triangles)) = try_convex_hull(&corners) else { continue };
                 // Every triangle has corners of its own, so that edges stay sharp.
                 for triangle in triangles {

@@ -195,8 +195,10 @@ impl Group {
                 }
             }
         }
-        let (Some(source_of), [source, target, ..]) = (&self.source_of, &self.panels[..]) else {
-            return Ok(());
+        let Some(source_of) = &self.source_of else { return Ok(()) };
+        let [source, target] = &self.panels[..] else {
+            let found = self.panels.len().to_string();
+            return fault("panels joined by a point map".into(), "two".into(), found);
         };
         let n_source = source.mesh.n_vertices();
         if source_of.len() != target.mesh.n_vertices()
@@ -310,7 +312,12 @@ mod tests {
         for broken in [Some(vec![0, 1]), Some(vec![0, 1, 3])] {
             assert!(write_page(&path, "t", &[group(broken)]).is_err());
         }
-        let spoil: [fn(&mut Group); 4] = [
+        let spoil: [fn(&mut Group); 5] = [
+            |group| {
+                group.source_of = Some(vec![0, 1, 2]);
+                group.panels.truncate(1);
+                group.layers.iter_mut().for_each(|layer| layer.paints.truncate(1));
+            },
             |group| group.layers.clear(),
             |group| group.layers[0].paints[1] = Paint::Weights(vec![0.0; 2]),
             |group| group.layers[0].paints[1] = Paint::Places,

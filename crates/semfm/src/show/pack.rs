@@ -39,10 +39,10 @@ pub(super) fn packed_numbers(numbers: impl IntoIterator<Item = u32>) -> String {
     packed(&(0..4).flat_map(plane).collect::<Vec<u8>>())
 }
 
-/// Steps that the bounding box has along each axis: finer than 32-bit floats away from the origin.
+/// Steps that the bounding box has along each axis; the viewer counts from the middle, 2¹⁹.
 const STEPS: f64 = (1 << 20) as f64;
 
-/// `n`, `low`, `step`, `positions` and `faces` of a mesh.
+/// `n`, `step`, `positions` and `faces` of a mesh.
 pub(super) fn packed_mesh(mesh: &Mesh) -> Value {
     let (low, high) = bounds(mesh.vertices()).unwrap_or_default();
     let step = ((high - low) / STEPS).max(DVec3::splat(f64::MIN_POSITIVE));
@@ -50,7 +50,6 @@ pub(super) fn packed_mesh(mesh: &Mesh) -> Value {
         |k: usize| mesh.vertices().iter().map(move |p| ((p[k] - low[k]) / step[k]).round() as u32);
     json!({
         "n": mesh.n_vertices(),
-        "low": low.to_array(),
         "step": step.to_array(),
         "positions": packed_numbers((0..3).flat_map(along)),
         "faces": packed_numbers(mesh.faces().as_flattened().iter().copied()),

@@ -20,7 +20,7 @@ void main() {
 }`;
 // The number of a triangle's last vertex, plus one: what lies under the pointer.
 const IDENTITY = `#version 300 es
-precision highp float;
+precision highp float; precision highp int;
 flat in uint id; out vec4 color;
 void main() {
   color = vec4(id & 255u, (id >> 8) & 255u, (id >> 16) & 255u, (id >> 24) & 255u) / 255.0;

@@ -10,7 +10,6 @@ class Panel {
     Object.assign(this, { painter, name: data.name, positions: data.positions, faces: data.faces, keys: data.positions, paints: data.paints });
     this.n = this.positions.length / 3;
     this.colors = this.paints[0].colors;
-    this.layer = 0;
     this.spot = [0, 0, 0, 0];
     // Rows: right, away from the eye and up at the start; and where the eye stands then.
     [this.right, this.away, this.up] = [0, 3, 6].map(i => data.upright.slice(i, i + 3));
@@ -54,18 +53,14 @@ class Panel {
   }
 
   measure() {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], p = this.positions;
-    for (let i = 0; i < p.length; i += 3) for (let k = 0; k < 3; k++) {
-      if (p[i + k] < low[k]) low[k] = p[i + k];
-      if (p[i + k] > high[k]) high[k] = p[i + k];
-    }
+    const p = this.positions, [low, high] = boundsOf(p, this.faces);
     this.centre = low.map((x, k) => (x + high[k]) / 2);
     this.radius = Math.hypot(...low.map((x, k) => (high[k] - x) / 2)) || 1;
     // As seen at the start, the object fills most of the canvas; turned, it may touch the edge.
     Object.assign(this, this.home);
     const [right, up] = this.axes(), box = [Infinity, -Infinity, Infinity, -Infinity];
-    for (let i = 0; i < p.length; i += 3) {
-      const u = right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2], v = up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2];
+    for (const vertex of this.faces) {
+      const i = 3 * vertex, u = right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2], v = up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2];
       box[0] = Math.min(box[0], u); box[1] = Math.max(box[1], u);
       box[2] = Math.min(box[2], v); box[3] = Math.max(box[3], v);
     }
@@ -83,7 +78,6 @@ class Panel {
   position(vertex) { return this.positions.subarray(3 * vertex, 3 * vertex + 3); }
 
   show(layer) {
-    this.layer = layer;
     this.colors = this.paints[layer].colors;
     if (this.loaded) this.painter.recolor(this.loaded, this.colors);
     this.draw();
@@ -257,6 +251,17 @@ class Panel {
       this.point(canvas.clientWidth / 2, canvas.clientHeight / 2);
     });
   }
+}
+
+// Corners of the box around the surface: vertices of no triangle, wherever they lie, do not count.
+function boundsOf(p, faces) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (const v of faces) for (let k = 0; k < 3; k++) {
+    const x = p[3 * v + k];
+    if (x < low[k]) low[k] = x;
+    if (x > high[k]) high[k] = x;
+  }
+  return [low, high];
 }
 
 // Triangles around each vertex: those of v are triangles[start[v] .. start[v + 1]].

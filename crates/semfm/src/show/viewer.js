@@ -1,5 +1,5 @@
 // The page: groups of panels side by side, in one of several layers of colour. Data: {groups: [{title,
-// facts, linked, layers: [{name, kind, legend: [[colour, text]]}], panels: [{name, note, n, low, step,
+// facts, linked, layers: [{name, kind, legend: [[colour, text]]}], panels: [{name, note, n, step,
 // positions, faces, paints, upright, yaw, pitch}], sourceOf, pictures: [{name, png, yaw, pitch}]}]}.
 // Arrays are zlib streams in base64: of bytes (paints), or of whole numbers as `numbers` reads them.
 
@@ -22,20 +22,19 @@ async function numbers(text) {
   return out;
 }
 
-// Positions: whole numbers of steps above the lowest corner, axis by axis.
+// Positions: whole numbers of steps, axis by axis. Here they are counted from the middle of the box, since
+// 32 bits would not tell neighbours apart far from the origin.
 async function positions(panel) {
   const steps = await numbers(panel.positions), out = new Float32Array(steps.length), n = panel.n;
-  for (let k = 0; k < 3; k++) for (let v = 0; v < n; v++) out[3 * v + k] = panel.low[k] + panel.step[k] * steps[k * n + v];
+  for (let k = 0; k < 3; k++) for (let v = 0; v < n; v++) out[3 * v + k] = panel.step[k] * (steps[k * n + v] - 2 ** 19);
   return out;
 }
 
 function hex(color) { return [1, 3, 5].map(i => parseInt(color.slice(i, i + 2), 16)); }
 
 // Colours of positions, x, y and z over the bounding box, as in `transfer.png`.
-function placeColors(p) {
-  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); }
-  const out = new Uint8Array(p.length);
+function placeColors(p, faces) {
+  const [low, high] = boundsOf(p, faces), out = new Uint8ClampedArray(p.length);
   for (let i = 0; i < p.length; i++) out[i] = Math.round(255 * (0.15 + 0.8 * (p[i] - low[i % 3]) / (high[i % 3] - low[i % 3] || 1)));
   return out;
 }
@@ -55,7 +54,7 @@ async function paint(layer, packed, n, places, sourceOf) {
     for (let v = 0; v < n; v++) for (let k = 0; k < 3; k++) colors[3 * v + k] = Math.round(layer.plain[k] + data[v] / 255 * (layer.marked[k] - layer.plain[k]));
     return { colors, say: v => `weight ${(data[v] / 255).toFixed(2)}` };
   }
-  const palette = layer.legend.map(([color]) => hex(color));
+  const palette = layer.legend.map(([color]) => color && hex(color));
   for (let v = 0; v < n; v++) for (let k = 0; k < 3; k++) colors[3 * v + k] = palette[data[v]][k];
   // The first class is none of the others, and goes without saying.
   return { colors, say: v => data[v] ? layer.legend[data[v]][1] : "" };
@@ -110,7 +109,7 @@ async function group(painter, data) {
   let places = null;
   for (const [k, panel] of data.panels.entries()) {
     const [points, faces] = [await positions(panel), await numbers(panel.faces)];
-    if (k === 0 || !sourceOf) places = placeColors(points);
+    if (k === 0 || !sourceOf) places = placeColors(points, faces);
     const paints = await Promise.all(data.layers.map((layer, i) => paint(layer, panel.paints[i], panel.n, places, k ? sourceOf : null)));
     panels.push(new Panel(painter, { ...panel, positions: points, faces, paints }));
   }

@@ -16,6 +16,7 @@ const SHOWN: usize = 64;
 pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
     let file = ViewsFile::read(path)?;
     let (mesh, colors) = read_mesh(path)?;
+    file.metadata.mesh.check(&mesh, path)?;
     let colors = colors.unwrap_or_else(|| vec![[184; 3]; mesh.n_vertices()]);
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let metadata = &file.metadata;
