@@ -75,7 +75,7 @@ def draw(binary: str, mesh: Path, options: str, views: Path) -> None:
     if options == ONE_SIDE and painted.is_file():
         import semfm
 
-        plain, colors = semfm.Mesh.read(mesh), semfm.MeshFile.read(painted).vertex_colors
+        plain, colors = semfm.Mesh.read(mesh), semfm.read_mesh(painted).vertex_colors
         semfm.write_views(views, semfm.render(plain, colors=colors[:, :3] / 255), plain)
         return
     options = "" if options == ONE_SIDE else options
