@@ -35,7 +35,7 @@ pub fn write_transfer(
     write_json(&at("region.json"), &carried_json(target, transfer))?;
     write_json(&at("report.json"), &report)?;
     let exhibit = Exhibit::new(source, target, region, transfer, task)?;
-    let [source_anchor, target_anchor] = exhibit.anchors_by_vertex()?;
+    let [source_anchor, target_anchor] = &exhibit.anchors;
     write_json(
         &at("point_map.json"),
         &json!({

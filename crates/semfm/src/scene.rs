@@ -120,7 +120,7 @@ pub(crate) fn write(
 }
 
 /// What one frame holds, as the scene wants it.
-struct Side {
+struct Side<'a> {
     marked: Vec<[u8; 3]>,
     places: Vec<[u8; 3]>,
     meaning: Vec<[u8; 3]>,
@@ -128,22 +128,21 @@ struct Side {
     /// By vertex.
     weight: Vec<f32>,
     anchor: Vec<i32>,
-    source_vertex: Vec<u32>,
+    source_vertex: &'a [u32],
     /// By cloud point.
     cluster: Vec<u32>,
     cloud_anchor: Vec<i32>,
     n_views: Vec<u32>,
 }
 
-impl Side {
-    fn new(exhibit: &Exhibit<'_>, k: usize, task: &Task) -> Result<Self> {
+impl<'a> Side<'a> {
+    fn new(exhibit: &'a Exhibit<'_>, k: usize, task: &Task) -> Result<Self> {
         let all_bytes = |colors: &[[f32; 3]]| colors.iter().copied().map(bytes).collect();
         let (mesh, weights) = (exhibit.meshes()[k], exhibit.weights()[k]);
         let marked = weight_colors(weights);
         let cameras = [exhibit.sides[k].best];
         let light = RenderSettings::default();
         let mut views = render(mesh, &Paint::Vertices(&marked), &cameras, &light, task)?;
-        let ranks = &exhibit.anchors_by_vertex()?[k];
         let clusters = &exhibit.clusters[k];
         Ok(Self {
             marked: all_bytes(&marked),
@@ -151,8 +150,8 @@ impl Side {
             meaning: all_bytes(&exhibit.meaning[k]),
             view: views.swap_remove(0),
             weight: weights.iter().map(|&w| w as f32).collect(),
-            anchor: ranks.iter().map(|&rank| rank as i32).collect(),
-            source_vertex: exhibit.transfer.point_map.source_of.clone(),
+            anchor: exhibit.anchors[k].iter().map(|&rank| rank as i32).collect(),
+            source_vertex: &exhibit.transfer.point_map.source_of,
             cluster: clusters.iter().map(|cluster| cluster.0).collect(),
             cloud_anchor: clusters.iter().map(|c| c.1.map_or(-1, |rank| rank as i32)).collect(),
             n_views: exhibit.objects()[k].cloud.n_views().to_vec(),
@@ -164,7 +163,7 @@ impl Side {
         [
             ("weight", SceneNumbers::F32(&self.weight)),
             ("anchor", SceneNumbers::I32(&self.anchor)),
-            ("source_vertex", SceneNumbers::U32(&self.source_vertex)),
+            ("source_vertex", SceneNumbers::U32(self.source_vertex)),
         ]
     }
 

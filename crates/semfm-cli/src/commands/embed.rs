@@ -54,22 +54,24 @@ impl Encoder {
         common: &Common,
     ) -> Result<[EmbeddingsFile; N]> {
         let paths = files.map(|file| self.kept(file, colored));
+        let mut embeddings: Vec<Option<EmbeddingsFile>> = Vec::with_capacity(N);
         // Whatever is wrong with a kept file, a new one is the cure.
         let mut missing: Vec<(&Path, &MeshFile)> = Vec::new();
         for (path, file) in paths.iter().zip(files) {
-            let is_listed = missing.iter().any(|(other, _)| other == path);
-            if !is_listed && load::embeddings(path, &file.mesh).is_err() {
+            let kept = load::embeddings(path, &file.mesh).ok();
+            if kept.is_none() && missing.iter().all(|(other, _)| other != path) {
                 missing.push((path, file));
             }
+            embeddings.push(kept);
         }
         if !missing.is_empty() {
             self.make(&missing, colored, common)?;
         }
-        let mut made = Vec::with_capacity(N);
-        for (path, file) in paths.iter().zip(files) {
-            made.push(load::embeddings(path, &file.mesh)?);
-        }
-        made.try_into().map_err(|_| anyhow::anyhow!("one embedding for each of {N} objects"))
+        let made = embeddings.into_iter().zip(paths.iter().zip(files));
+        let all: Vec<EmbeddingsFile> = made
+            .map(|(kept, (path, file))| kept.map_or_else(|| load::embeddings(path, &file.mesh), Ok))
+            .collect::<Result<_>>()?;
+        all.try_into().map_err(|_| anyhow::anyhow!("one embedding for each of {N} objects"))
     }
 
     /// The same of one object, and what making them took, now or then.

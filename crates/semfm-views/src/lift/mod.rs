@@ -13,7 +13,7 @@ use semfm_geom::math::bounds;
 use semfm_geom::sampling::{SurfaceSample, sample_even, sample_uniform};
 use semfm_geom::{Mesh, SemanticCloud, Task};
 
-use crate::frame::surface_vertices;
+use crate::frame::{surface_sphere, surface_vertices};
 use crate::{EmbeddedView, Error, Result};
 
 /// How image features reach the surface samples.
@@ -130,15 +130,14 @@ pub fn lift(
         LiftRule::Unproject { .. } => sample_uniform(mesh, settings.n_samples, settings.seed)?,
     };
     // Both rules measure in the size of the surface, whatever stray vertices the mesh holds.
-    let vertices = surface_vertices(mesh);
-    let (low, high) = bounds(&vertices).expect("a mesh has a triangle, and that has corners");
     let features = match settings.rule {
         LiftRule::Pull { depth_tolerance } => {
-            let centre = (low + high) / 2.0;
-            let radius = vertices.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+            let (_, radius) = surface_sphere(mesh);
             pull::pull(mesh, &samples, views, dim, depth_tolerance * radius, task)?
         }
         LiftRule::Unproject { radius } => {
+            let (low, high) = bounds(&surface_vertices(mesh))
+                .expect("a mesh has a triangle, and that has corners");
             let epsilon = radius * low.distance(high);
             unproject::unproject(mesh, &samples, views, dim, epsilon, task)?
         }

@@ -21,6 +21,8 @@ pub struct Exhibit<'a> {
     pub(crate) meaning: [Vec<[f32; 3]>; 2],
     /// Cluster of each cloud point, and the rank of the anchor that it is.
     pub(crate) clusters: [Vec<ClusterOfPoint>; 2],
+    /// Rank of the anchor at each vertex, −1 outside of all.
+    pub(crate) anchors: [Vec<i64>; 2],
 }
 
 /// The cluster that a cloud point belongs to, and the rank of the anchor that it is.
@@ -58,9 +60,15 @@ impl<'a> Exhibit<'a> {
             let rank = |label: u32| anchors.iter().position(|a| side(&a.anchor) == label);
             Result::Ok(clusters.labels().iter().map(|&label| (label, rank(label))).collect())
         };
-        let clusters = [clusters(source, |a| a.source)?, clusters(target, |a| a.target)?];
+        let clusters: [Vec<ClusterOfPoint>; 2] =
+            [clusters(source, |a| a.source)?, clusters(target, |a| a.target)?];
+        let anchors = |object, clusters: &[ClusterOfPoint]| {
+            let rank = |cluster: &ClusterOfPoint| cluster.1.map_or(-1, |rank| rank as i64);
+            by_vertex(object, &clusters.iter().map(rank).collect::<Vec<i64>>())
+        };
+        let anchors = [anchors(source, &clusters[0])?, anchors(target, &clusters[1])?];
         let places = [on_source, on_target];
-        Ok(Self { source, target, region, transfer, sides, places, meaning, clusters })
+        Ok(Self { source, target, region, transfer, sides, places, meaning, clusters, anchors })
     }
 
     pub(crate) fn meshes(&self) -> [&'a Mesh; 2] {
@@ -74,18 +82,6 @@ impl<'a> Exhibit<'a> {
     /// Weight of each vertex.
     pub(crate) fn weights(&self) -> [&'a [f64]; 2] {
         [self.region.weights(), self.transfer.weights()]
-    }
-
-    /// Rank of the anchor at each vertex, −1 outside of all.
-    pub(crate) fn anchors_by_vertex(&self) -> Result<[Vec<i64>; 2]> {
-        let of = |side: usize| {
-            let ranks: Vec<i64> = self.clusters[side]
-                .iter()
-                .map(|cluster| cluster.1.map_or(-1, |rank| rank as i64))
-                .collect();
-            by_vertex(self.objects()[side], &ranks)
-        };
-        Ok([of(0)?, of(1)?])
     }
 
     /// The verdict in a line: "accept, confidence 0.93".
