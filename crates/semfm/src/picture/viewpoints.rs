@@ -77,8 +77,8 @@ pub fn paired_viewpoints(
     let ups = [upright(source.0)?, upright(target.0)?];
     let Some(turn) = turn_of_pair(source, target, source_of, ups) else {
         return Ok([
-            viewpoints(source.0, source.1, side, task)?,
-            viewpoints(target.0, target.1, side, task)?,
+            viewpoints_around(ups[0].up, source.0, source.1, side, task)?,
+            viewpoints_around(ups[1].up, target.0, target.1, side, task)?,
         ]);
     };
     let on_source = directions_around(ups[0].up);
