@@ -6,8 +6,9 @@ use image::{GrayImage, ImageBuffer, Luma};
 use semfm::aligned::read_aligned;
 use semfm::geom::io::{read_points, write_mesh};
 use semfm::geom::math::{DAffine3, DMat3, DQuat, DVec3};
+use semfm::geom::{Intrinsics, Pinhole};
 use semfm::grasp::align::Sim3;
-use semfm::views::{Camera, Paint, RenderSettings, render};
+use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Task};
 use semfm_synth::{Category, ObjectSettings, make_object};
 use semfm_tests::shell::{Answer, run, shared};
@@ -52,15 +53,18 @@ impl Scene {
     fn render(&self) {
         let metric = self.mesh.vertices().iter().map(|&p| self.truth.apply(p)).collect();
         let metric = Mesh::new(metric, self.mesh.faces().to_vec()).unwrap();
-        let camera = Camera {
-            width: SIZE.0,
-            height: SIZE.1,
-            fx: 420.0,
-            fy: 420.0,
-            cx: 160.0,
-            cy: 120.0,
-            camera_from_object: DAffine3::from_mat3(DMat3::IDENTITY),
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics {
+                width: SIZE.0,
+                height: SIZE.1,
+                fx: 420.0,
+                fy: 420.0,
+                cx: 160.0,
+                cy: 120.0,
+            },
+            DAffine3::from_mat3(DMat3::IDENTITY),
+        )
+        .unwrap();
         let settings = RenderSettings::default();
         let view = render(&metric, &Paint::GREY, &[camera], &settings, &Task::default()).unwrap();
         let (mut depth, mut mask) = (Vec::new(), Vec::new());

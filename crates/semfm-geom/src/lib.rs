@@ -7,6 +7,7 @@
 
 pub mod algebra;
 pub mod cache;
+mod camera;
 pub mod cholesky;
 pub mod clean;
 pub mod cloud;
@@ -16,12 +17,14 @@ pub mod descriptors;
 pub mod eigenbasis;
 pub mod eigensolver;
 mod error;
+mod extent;
 pub mod geodesic;
 pub mod io;
 pub mod laplacian;
 pub mod math;
 pub mod mesh;
 pub mod nearest;
+mod principal_axes;
 pub mod sampling;
 pub mod shape;
 pub mod simplify;
@@ -32,12 +35,15 @@ pub mod working;
 pub mod zoo;
 
 pub use cache::{CachedShape, ShapeCache};
+pub use camera::{Intrinsics, Pinhole, PixelDepth};
 pub use cloud::SemanticCloud;
 pub use eigenbasis::Eigenbasis;
 pub use error::{Error, Result};
+pub use extent::{Sphere, surface_sphere, surface_vertices};
 pub use laplacian::Laplacian;
 pub use mesh::{Mesh, MeshHash};
 pub use nearest::PointIndex;
+pub use principal_axes::principal_axes;
 pub use shape::{Shape, ShapeReport, ShapeSettings};
 pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::Task;

@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use semfm::geom::math::{DAffine3, DMat3, DVec3};
+use semfm::geom::{Intrinsics, Pinhole, PixelDepth};
 use semfm::views::{self, RigSettings};
 
 use crate::arrays::{self, Axis};
@@ -42,7 +43,7 @@ use crate::work::{guard, run};
 #[pyclass(frozen, module = "semfm")]
 #[derive(Clone, Copy)]
 pub struct Camera {
-    pub camera: views::Camera,
+    pub camera: Pinhole,
 }
 
 #[pymethods]
@@ -68,52 +69,53 @@ impl Camera {
         let turn = DMat3::from_cols(row(0), row(1), row(2)).transpose();
         let shift = DVec3::new(m[3], m[7], m[11]);
         let camera_from_object = DAffine3::from_mat3_translation(turn, shift);
-        let camera = views::Camera { width, height, fx, fy, cx, cy, camera_from_object };
-        guard(py, || Ok(camera.check("camera")?))?;
+        let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+        let camera =
+            guard(py, || Ok(Pinhole::with_pixel_centres_at_half(intrinsics, camera_from_object)?))?;
         Ok(Self { camera })
     }
 
     /// int: pixels.
     #[getter]
     fn width(&self) -> u32 {
-        self.camera.width
+        self.camera.width()
     }
 
     /// int: pixels.
     #[getter]
     fn height(&self) -> u32 {
-        self.camera.height
+        self.camera.height()
     }
 
     /// float: focal length along x, in pixels.
     #[getter]
     fn fx(&self) -> f64 {
-        self.camera.fx
+        self.camera.fx()
     }
 
     /// float: focal length along y, in pixels.
     #[getter]
     fn fy(&self) -> f64 {
-        self.camera.fy
+        self.camera.fy()
     }
 
     /// float: principal point, x, in pixels.
     #[getter]
     fn cx(&self) -> f64 {
-        self.camera.cx
+        self.camera.cx()
     }
 
     /// float: principal point, y, in pixels.
     #[getter]
     fn cy(&self) -> f64 {
-        self.camera.cy
+        self.camera.cy()
     }
 
     /// (4, 4) float64 array: rigid motion from the object's frame to the camera's.
     #[getter]
     fn camera_from_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (turn, shift) =
-            (self.camera.camera_from_object.matrix3, self.camera.camera_from_object.translation);
+            (self.camera.camera_from_world().matrix3, self.camera.camera_from_world().translation);
         let mut rows = Vec::with_capacity(16);
         for i in 0..3 {
             rows.extend(turn.row(i).to_array());
@@ -143,14 +145,14 @@ impl Camera {
     fn project<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let projected = arrays::points(points, "points")?;
         let projected = projected.into_iter().flat_map(|p| {
-            let (u, v, z) = self.camera.project(p);
+            let PixelDepth { u, v, z } = self.camera.project(p);
             [u, v, z]
         });
         lend::owned_rows(points.py(), projected.collect(), 3)
     }
 
     fn __repr__(&self) -> String {
-        let views::Camera { width, height, fx, .. } = self.camera;
+        let Intrinsics { width, height, fx, .. } = self.camera.intrinsics();
         format!("Camera({width} × {height}, focal length {fx:.1} px)")
     }
 
@@ -160,7 +162,7 @@ impl Camera {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let py = slf.py();
-        let views::Camera { width, height, fx, fy, cx, cy, .. } = slf.get().camera;
+        let Intrinsics { width, height, fx, fy, cx, cy } = slf.get().camera.intrinsics();
         let pose = slf.get().camera_from_object(py)?;
         let parts = (width, height, fx, fy, cx, cy, pose);
         Ok((slf.get_type(), parts.into_pyobject(py)?.into_any()))
@@ -260,7 +262,7 @@ pub fn camera_towards(
 }
 
 /// The cameras of a list.
-pub fn list(cameras: &Bound<'_, PyAny>) -> PyResult<Vec<views::Camera>> {
+pub fn list(cameras: &Bound<'_, PyAny>) -> PyResult<Vec<Pinhole>> {
     let mut out = Vec::new();
     for camera in cameras.try_iter()? {
         let camera = camera?;
@@ -275,10 +277,10 @@ pub fn list(cameras: &Bound<'_, PyAny>) -> PyResult<Vec<views::Camera>> {
 /// A tuple of a width and a height, as NumPy has them: rows first.
 pub fn rows_and_columns<'py>(
     py: Python<'py>,
-    camera: &views::Camera,
+    camera: &Pinhole,
     depth: &[usize],
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let mut shape = vec![camera.height as usize, camera.width as usize];
+    let mut shape = vec![camera.height() as usize, camera.width() as usize];
     shape.extend(depth);
     PyTuple::new(py, shape)
 }

@@ -172,11 +172,11 @@ impl Embeddings {
             let expected = format!("{}, one per camera, and at least one", cameras.len());
             return Err(errors::invalid(py, "patches", &expected, &grids.len().to_string()));
         }
-        let (width, height) = (cameras[0].width, cameras[0].height);
+        let (width, height) = (cameras[0].width(), cameras[0].height());
         let dim = grids[0].dim;
         for (view, (camera, grid)) in cameras.iter().zip(&grids).enumerate() {
-            if (camera.width, camera.height) != (width, height) {
-                let found = format!("{} × {} in view {view}", camera.width, camera.height);
+            if (camera.width(), camera.height()) != (width, height) {
+                let found = format!("{} × {} in view {view}", camera.width(), camera.height());
                 return Err(errors::invalid(py, "cameras", &format!("{width} × {height}"), &found));
             }
             if grid.dim != dim {

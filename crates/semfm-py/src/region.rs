@@ -126,7 +126,7 @@ impl Region {
         mask: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let camera = camera.get().camera;
-        let size = [Axis::Is(camera.height as usize), Axis::Is(camera.width as usize)];
+        let size = [Axis::Is(camera.height() as usize), Axis::Is(camera.width() as usize)];
         let (mask, _) = arrays::mask(mask, "mask", &size)?;
         let held = from_any(mesh, "mesh")?;
         let region = run(mesh.py(), None, move |_| regions::masked(&held, &camera, &mask))?;

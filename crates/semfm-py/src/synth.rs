@@ -109,7 +109,7 @@ impl DemoObject {
         let object = self.held.clone();
         let file = run(py, progress, move |task| {
             let pictures = render_views(&object, task).map_err(raised)?;
-            let side = pictures.first().map_or(0, |view| view.camera.width);
+            let side = pictures.first().map_or(0, |view| view.camera.width());
             let views = embed(&object, &pictures, level).map_err(raised)?;
             Ok(EmbeddingsFile {
                 path: PathBuf::new(),

@@ -53,7 +53,7 @@ impl View {
     }
 
     fn __repr__(&self) -> String {
-        format!("View({} × {})", self.held.camera.width, self.held.camera.height)
+        format!("View({} × {})", self.held.camera.width(), self.held.camera.height())
     }
 
     fn __reduce__<'py>(
@@ -85,7 +85,7 @@ pub fn _restore_view(
     triangles: &Bound<'_, PyAny>,
 ) -> PyResult<View> {
     let camera = camera.get().camera;
-    let (height, width) = (Axis::Is(camera.height as usize), Axis::Is(camera.width as usize));
+    let (height, width) = (Axis::Is(camera.height() as usize), Axis::Is(camera.width() as usize));
     let shifted = triangles.call_method1("__add__", (1,))?; // ids have no −1
     let triangles = arrays::ids(&shifted, "triangles", &[height, width])?.0;
     let view = views::View {
@@ -219,7 +219,8 @@ pub fn write_views(
         rendered.push((*view.get().held).clone());
     }
     run(mesh.py(), None, move |_| {
-        let size = rendered.first().map_or((0, 0), |view| (view.camera.width, view.camera.height));
+        let size =
+            rendered.first().map_or((0, 0), |view| (view.camera.width(), view.camera.height()));
         let metadata = ViewsMetadata {
             mesh: MeshIdentity::of(&mesh_held),
             width: size.0,

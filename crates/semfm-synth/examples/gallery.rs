@@ -6,10 +6,9 @@
 
 use std::error::Error;
 
-use semfm_geom::Task;
 use semfm_geom::math::DVec3;
+use semfm_geom::{Task, principal_axes};
 use semfm_synth::{Category, ObjectSettings, SynthObject, make_object};
-use semfm_views::frame::principal_frame;
 use semfm_views::rig::camera_towards;
 use semfm_views::{Paint, RenderSettings, RigSettings, render};
 
@@ -60,7 +59,7 @@ fn picture(
     colours: Vec<[f32; 3]>,
 ) -> Result<image::RgbImage, Box<dyn Error>> {
     let rig = RigSettings { size: SIDE, ..RigSettings::default() };
-    let longest = principal_frame(&object.mesh)?.row(2);
+    let longest = principal_axes(&object.mesh)?.row(2);
     let seen_from = longest.cross(DVec3::Z).normalize() + 0.3 * longest + 0.7 * DVec3::Z;
     let camera = camera_towards(&object.mesh, seen_from, DVec3::Z, &rig)?;
     let paint = Paint::Vertices(&colours);

@@ -220,7 +220,7 @@ impl Appearance {
 
     fn embed(&self, object: &SynthObject, view: &View, number: usize) -> Result<EmbeddedView> {
         let (rows, cols) =
-            ((view.camera.height / PATCH) as usize, (view.camera.width / PATCH) as usize);
+            ((view.camera.height() / PATCH) as usize, (view.camera.width() / PATCH) as usize);
         let seen = (0..rows * cols)
             .map(|patch| self.look(object, view, patch / cols, patch % cols))
             .collect::<Result<Vec<Glance>>>()?;
@@ -249,7 +249,7 @@ impl Appearance {
         let patch = PATCH as usize;
         for y in row * patch..(row + 1) * patch {
             for x in col * patch..(col + 1) * patch {
-                let pixel = y * view.camera.width as usize + x;
+                let pixel = y * view.camera.width() as usize + x;
                 let Ok(triangle) = usize::try_from(view.triangles[pixel]) else { continue };
                 let Some(corners) = object.mesh.faces().get(triangle) else {
                     return Err(Error::Views(semfm_views::Error::Invalid {

@@ -95,10 +95,10 @@ impl Seen {
 
 /// The part that covers all of a patch, if one does.
 fn only_part(object: &SynthObject, view: &View, patch: usize, cols: usize) -> Option<&'static str> {
-    let side = view.camera.width as usize / cols;
+    let side = view.camera.width() as usize / cols;
     let (row, col) = (patch / cols * side, patch % cols * side);
     let part_at = |x: usize, y: usize| {
-        let triangle = view.triangles[y * view.camera.width as usize + x];
+        let triangle = view.triangles[y * view.camera.width() as usize + x];
         let corner = object.mesh.faces().get(usize::try_from(triangle).ok()?)?[0];
         Some(object.part_names[usize::from(object.parts[corner as usize])])
     };

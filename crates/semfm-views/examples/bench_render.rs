@@ -13,10 +13,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Pinhole, Task};
 use semfm_views::{
-    Camera, EmbeddedView, LiftSettings, Paint, PatchEmbeddings, RenderSettings, RigSettings, View,
-    lift, render, rig,
+    EmbeddedView, LiftSettings, Paint, PatchEmbeddings, RenderSettings, RigSettings, View, lift,
+    render, rig,
 };
 use serde_json::{Value, json};
 
@@ -97,16 +97,16 @@ impl Shot {
         Ok(Self { count: count.parse()?, size: size.parse()? })
     }
 
-    fn cameras(self, mesh: &Mesh) -> semfm_views::Result<Vec<Camera>> {
+    fn cameras(self, mesh: &Mesh) -> semfm_views::Result<Vec<Pinhole>> {
         rig(mesh, &RigSettings { count: self.count, size: self.size, ..Default::default() })
     }
 
     /// For other programs: matrices are rows.
-    fn told(self, cameras: &[Camera]) -> Value {
+    fn told(self, cameras: &[Pinhole]) -> Value {
         let cameras = cameras.iter().map(|camera| {
-            let pose = camera.camera_from_object;
+            let pose = camera.camera_from_world();
             json!({
-                "fx": camera.fx, "fy": camera.fy, "cx": camera.cx, "cy": camera.cy,
+                "fx": camera.fx(), "fy": camera.fy(), "cx": camera.cx(), "cy": camera.cy(),
                 "rotation": pose.matrix3.transpose().to_cols_array_2d(),
                 "translation": pose.translation.to_array(),
             })
@@ -128,7 +128,7 @@ impl Bench<'_> {
     fn draw(
         &mut self,
         who: &str,
-        draw: &dyn Fn(&[Camera]) -> semfm_views::Result<Vec<View>>,
+        draw: &dyn Fn(&[Pinhole]) -> semfm_views::Result<Vec<View>>,
     ) -> Result<(), Failure> {
         for (k, shot) in self.order.shots.iter().enumerate() {
             let cameras = shot.cameras(self.mesh)?;
@@ -240,13 +240,13 @@ fn cpu_seconds() -> f64 {
 
 /// Tokens of the right shape without an encoder: patches of 16 pixels.
 fn noise_tokens(view: &View) -> EmbeddedView {
-    let side = view.camera.width as usize / 16;
+    let side = view.camera.width() as usize / 16;
     let patches = PatchEmbeddings {
         rows: side,
         cols: side,
         dim: DIM,
         data: (0..side * side * DIM).map(|i| (i as f32 * 0.37).sin()).collect(),
-        rect: [0.0, 0.0, view.camera.width as f32, view.camera.height as f32],
+        rect: [0.0, 0.0, view.camera.width() as f32, view.camera.height() as f32],
         coverage: vec![255; side * side],
         valid: vec![true; side * side],
     };
@@ -271,7 +271,7 @@ fn write_pictures(folder: &Path, name: &str, views: &[View]) -> std::io::Result<
 }
 
 fn save_sheet(views: &[View], path: &Path) -> image::ImageResult<()> {
-    let side = views[0].camera.width;
+    let side = views[0].camera.width();
     let columns = 5;
     let mut sheet =
         image::RgbImage::new(side * columns, side * (views.len() as u32).div_ceil(columns));

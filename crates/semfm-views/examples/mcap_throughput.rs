@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Instant;
 
-use semfm_geom::math::DAffine3;
-use semfm_geom::{Mesh, math::DVec3};
+use semfm_geom::math::{DAffine3, DVec3};
+use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata, read_messages};
-use semfm_views::{Camera, EmbeddedView, PatchEmbeddings};
+use semfm_views::{EmbeddedView, PatchEmbeddings};
 
 const ROWS: usize = 37;
 const DIM: usize = 768;
@@ -108,15 +108,11 @@ fn embeddings() -> Result<EmbeddingsFile, semfm_geom::Error> {
         (state >> 8) as f32 / (1 << 24) as f32 - 0.5
     };
     let mut view = |_| EmbeddedView {
-        camera: Camera {
-            width: 518,
-            height: 518,
-            fx: 600.0,
-            fy: 600.0,
-            cx: 259.0,
-            cy: 259.0,
-            camera_from_object: DAffine3::IDENTITY,
-        },
+        camera: Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: 518, height: 518, fx: 600.0, fy: 600.0, cx: 259.0, cy: 259.0 },
+            DAffine3::IDENTITY,
+        )
+        .unwrap(),
         patches: PatchEmbeddings {
             rows: ROWS,
             cols: ROWS,

@@ -6,13 +6,13 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
+use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{
     Dtype, EmbeddingsFile, EmbeddingsMetadata, Scene, SceneMesh, ScenePoints, ViewsMetadata,
     write_views,
 };
-use semfm_views::{Camera, EmbeddedView, PatchEmbeddings, Result, View};
+use semfm_views::{EmbeddedView, PatchEmbeddings, Result, View};
 
 const N_VIEWS: usize = 3;
 const WIDTH: u32 = 16;
@@ -78,18 +78,14 @@ fn tetrahedron() -> Result<Mesh> {
     Ok(Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])?)
 }
 
-/// Camera number `index`: turned by half a radian each, four units away.
-fn camera(index: usize) -> Camera {
+/// Pinhole number `index`: turned by half a radian each, four units away.
+fn camera(index: usize) -> Pinhole {
     let turn = DMat3::from_rotation_y(0.5 * index as f64);
-    Camera {
-        width: WIDTH,
-        height: HEIGHT,
-        fx: 20.0,
-        fy: 21.0,
-        cx: 8.0,
-        cy: 6.0,
-        camera_from_object: DAffine3::from_mat3_translation(turn, DVec3::new(0.0, 0.0, 4.0)),
-    }
+    Pinhole::with_pixel_centres_at_half(
+        Intrinsics { width: WIDTH, height: HEIGHT, fx: 20.0, fy: 21.0, cx: 8.0, cy: 6.0 },
+        DAffine3::from_mat3_translation(turn, DVec3::new(0.0, 0.0, 4.0)),
+    )
+    .unwrap()
 }
 
 /// Every fifth pixel is background; the others lie on triangle p mod 4 at depth 1 + p / 256.

@@ -1,6 +1,7 @@
 //! What an encoder says about a view: one vector per image patch.
 
-use crate::{Camera, Error, Result};
+use crate::{Error, Result};
+use semfm_geom::Pinhole;
 
 /// A grid of patch embeddings of one view.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +82,7 @@ impl PatchEmbeddings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmbeddedView {
     /// The camera the picture was taken with.
-    pub camera: Camera,
+    pub camera: Pinhole,
     /// Its patches.
     pub patches: PatchEmbeddings,
 }

@@ -5,10 +5,8 @@
 //! surface as a [`SemanticCloud`](semfm_geom::SemanticCloud). Views and embeddings travel in MCAP
 //! files (feature `mcap`).
 
-pub mod camera;
 pub mod embeddings;
 mod error;
-pub mod frame;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod lift;
@@ -19,7 +17,6 @@ pub mod renderer;
 pub mod rig;
 pub mod view;
 
-pub use camera::Camera;
 pub use embeddings::{EmbeddedView, PatchEmbeddings};
 pub use error::{Error, Fault, Result};
 #[cfg(feature = "gpu")]

@@ -5,11 +5,11 @@ use std::str::FromStr;
 #[cfg(feature = "gpu")]
 use std::sync::{Mutex, PoisonError};
 
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Pinhole, Task};
 
 #[cfg(feature = "gpu")]
 use crate::GpuRenderer;
-use crate::{Camera, Error, Paint, RenderSettings, Result, View, render};
+use crate::{Error, Paint, RenderSettings, Result, View, render};
 
 /// Which renderer is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -151,7 +151,7 @@ impl Renderer {
         &self,
         mesh: &Mesh,
         paint: &Paint<'_>,
-        cameras: &[Camera],
+        cameras: &[Pinhole],
         settings: &RenderSettings,
         task: &Task,
     ) -> Result<Vec<View>> {

@@ -2,12 +2,11 @@
 
 use std::fmt;
 
-use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
+use semfm_geom::{Intrinsics, Mesh, Pinhole, principal_axes, surface_vertices};
 
-use crate::camera::MAX_IMAGE_SIDE;
-use crate::frame::{principal_frame, surface_vertices};
-use crate::{Camera, Error, Result};
+use crate::render::MAX_IMAGE_SIDE;
+use crate::{Error, Result};
 
 /// The camera stands so that the bounding sphere fits its view with this much to spare.
 const STAND_OFF: f64 = 1.02;
@@ -116,7 +115,7 @@ impl RigSettings {
 /// follow it.
 ///
 /// ```
-/// use semfm_geom::{Mesh, math::DVec3};
+/// use semfm_geom::{Mesh, Pinhole, math::DVec3};
 /// use semfm_views::rig::{RigSettings, rig};
 /// let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]])?;
 /// let cameras = rig(&mesh, &RigSettings { count: 6, ..Default::default() })?;
@@ -127,16 +126,16 @@ impl RigSettings {
 /// # Errors
 /// [`Error::Invalid`] for settings outside their range, [`semfm_geom::Error::NoArea`] for a
 /// surface without area.
-pub fn rig(mesh: &Mesh, settings: &RigSettings) -> Result<Vec<Camera>> {
+pub fn rig(mesh: &Mesh, settings: &RigSettings) -> Result<Vec<Pinhole>> {
     settings.check()?;
-    let frame = principal_frame(mesh)?;
+    let frame = principal_axes(mesh)?;
     let frame = if settings.principal_frame { frame } else { DMat3::IDENTITY };
     let object = Extent::new(mesh, frame);
     let mut cameras = Vec::with_capacity(settings.count * (1 + settings.close_ups));
     for direction in fibonacci_directions(settings.count) {
         let whole = object.camera(direction, settings)?;
         cameras.push(whole);
-        cameras.extend(object.close_ups(&whole, settings));
+        cameras.extend(object.close_ups(&whole, settings)?);
     }
     Ok(cameras)
 }
@@ -151,7 +150,7 @@ pub fn camera_towards(
     direction: DVec3,
     up: DVec3,
     settings: &RigSettings,
-) -> Result<Camera> {
+) -> Result<Pinhole> {
     settings.check()?;
     let unit = |what: &str, v: DVec3| {
         v.try_normalize()
@@ -203,7 +202,7 @@ impl Extent {
     }
 
     /// The camera in direction `direction` (in the frame) that frames the silhouette.
-    fn camera(&self, direction: DVec3, settings: &RigSettings) -> Result<Camera> {
+    fn camera(&self, direction: DVec3, settings: &RigSettings) -> Result<Pinhole> {
         // Rows of the rotation: image right, image down, and forward, away from the direction.
         let right = DVec3::Z.cross(direction).try_normalize().unwrap_or(DVec3::X);
         let up = direction.cross(right);
@@ -219,17 +218,15 @@ impl Extent {
         let side = f64::from(settings.size);
         let focal = settings.fill * side / 2.0 / half.max(half_of_sphere / settings.max_zoom);
         let middle = (low + high) / 2.0;
-        let camera = Camera {
+        let intrinsics = Intrinsics {
             width: settings.size,
             height: settings.size,
             fx: focal,
             fy: focal,
             cx: side / 2.0 - focal * middle.x,
             cy: side / 2.0 - focal * middle.y,
-            camera_from_object,
         };
-        camera.check("fitted camera")?;
-        Ok(camera)
+        Ok(Pinhole::with_pixel_centres_at_half(intrinsics, camera_from_object)?)
     }
 
     /// Bounding rectangle of the silhouette as slopes x/z, y/z (third component 1).
@@ -247,11 +244,11 @@ impl Extent {
 
     /// Cameras at the place of `whole` that frame [`CLOSE_UP`] of it each, from one end of the
     /// silhouette's longer side to the other.
-    fn close_ups(&self, whole: &Camera, settings: &RigSettings) -> Vec<Camera> {
-        let (low, high) = self.silhouette(whole.camera_from_object);
+    fn close_ups(&self, whole: &Pinhole, settings: &RigSettings) -> Result<Vec<Pinhole>> {
+        let (low, high) = self.silhouette(whole.camera_from_world());
         let (middle, extent) = ((low + high) / 2.0, high - low);
         let axis = usize::from(extent.y > extent.x);
-        let (side, focal) = (f64::from(settings.size), whole.fx / CLOSE_UP);
+        let (side, focal) = (f64::from(settings.size), whole.fx() / CLOSE_UP);
         // At either end the silhouette keeps the margin that it has in the whole view.
         let travel = ((extent[axis] - settings.fill * side / focal) / 2.0).max(0.0);
         let close_up = |k: usize| {
@@ -260,7 +257,8 @@ impl Extent {
             let mut centre = middle;
             centre[axis] += along * travel;
             let [cx, cy] = [centre.x, centre.y].map(|slope| side / 2.0 - focal * slope);
-            Camera { fx: focal, fy: focal, cx, cy, ..*whole }
+            let intrinsics = Intrinsics { fx: focal, fy: focal, cx, cy, ..whole.intrinsics() };
+            Ok(Pinhole::with_pixel_centres_at_half(intrinsics, whole.camera_from_world())?)
         };
         (0..settings.close_ups).map(close_up).collect()
     }
@@ -269,6 +267,7 @@ impl Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use semfm_geom::PixelDepth;
 
     fn knife() -> Mesh {
         // A long thin wedge: 20 long, 2 wide, .3 thick, heavier at one end.
@@ -278,13 +277,13 @@ mod tests {
         Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap()
     }
 
-    fn extents(mesh: &Mesh, camera: &Camera) -> (DVec3, DVec3) {
-        mesh.vertices()
-            .iter()
-            .map(|&p| camera.project(p))
-            .fold((DVec3::INFINITY, -DVec3::INFINITY), |(low, high), (u, v, z)| {
+    fn extents(mesh: &Mesh, camera: &Pinhole) -> (DVec3, DVec3) {
+        mesh.vertices().iter().map(|&p| camera.project(p)).fold(
+            (DVec3::INFINITY, -DVec3::INFINITY),
+            |(low, high), PixelDepth { u, v, z }| {
                 (low.min(DVec3::new(u, v, z)), high.max(DVec3::new(u, v, z)))
-            })
+            },
+        )
     }
 
     #[test]
@@ -316,13 +315,13 @@ mod tests {
             let along = usize::from((high - low).y > (high - low).x);
             let mut seen = [f64::INFINITY, f64::NEG_INFINITY];
             for camera in ends {
-                assert!((camera.fx * CLOSE_UP / whole.fx - 1.0).abs() < 1e-12);
-                assert_eq!(camera.camera_from_object, whole.camera_from_object);
+                assert!((camera.fx() * CLOSE_UP / whole.fx() - 1.0).abs() < 1e-12);
+                assert_eq!(camera.camera_from_world(), whole.camera_from_world());
                 for &p in mesh.vertices() {
-                    let (u, v, _) = camera.project(p);
+                    let PixelDepth { u, v, .. } = camera.project(p);
                     let place = [u, v][along];
                     if (0.0..=224.0).contains(&place) {
-                        let (u, v, _) = whole.project(p);
+                        let PixelDepth { u, v, .. } = whole.project(p);
                         let place = [u, v][along];
                         seen = [seen[0].min(place), seen[1].max(place)];
                     }
@@ -339,8 +338,8 @@ mod tests {
     fn the_longest_axis_stands_upright() {
         let mesh = knife();
         for camera in rig(&mesh, &RigSettings::default()).unwrap() {
-            let (u0, v0, _) = camera.project(DVec3::new(0.0, 1.0, 0.0));
-            let (u1, v1, _) = camera.project(DVec3::new(20.0, 0.5, 0.05));
+            let PixelDepth { u: u0, v: v0, .. } = camera.project(DVec3::new(0.0, 1.0, 0.0));
+            let PixelDepth { u: u1, v: v1, .. } = camera.project(DVec3::new(20.0, 0.5, 0.05));
             assert!((v1 - v0).abs() > 2.0 * (u1 - u0).abs(), "{u0} {v0} {u1} {v1}");
             // The tip is the longer tail, so it is up: towards smaller v.
             assert!(v1 < v0);
@@ -357,8 +356,8 @@ mod tests {
         let (still, moved) = (rig(&mesh, &settings).unwrap(), rig(&turned, &settings).unwrap());
         for (a, b) in still.iter().zip(&moved) {
             for (&p, &q) in mesh.vertices().iter().zip(turned.vertices()) {
-                let ((u, v, z), (u2, v2, z2)) = (a.project(p), b.project(q));
-                assert!((u - u2).abs() + (v - v2).abs() + (z - z2).abs() < 1e-6);
+                let (a, b) = (a.project(p), b.project(q));
+                assert!((a.u - b.u).abs() + (a.v - b.v).abs() + (a.z - b.z).abs() < 1e-6);
             }
         }
     }
@@ -368,10 +367,10 @@ mod tests {
         let mesh = knife();
         let settings = RigSettings { size: 400, ..Default::default() };
         let camera = camera_towards(&mesh, DVec3::Z, DVec3::Y, &settings).unwrap();
-        let (u, v, z) = camera.project(DVec3::new(5.0, 1.0, 0.0));
-        let (right, _, _) = camera.project(DVec3::new(6.0, 1.0, 0.0));
-        let (_, above, _) = camera.project(DVec3::new(5.0, 2.0, 0.0));
-        let (_, _, nearer) = camera.project(DVec3::new(5.0, 1.0, 1.0));
+        let PixelDepth { u, v, z } = camera.project(DVec3::new(5.0, 1.0, 0.0));
+        let right = camera.project(DVec3::new(6.0, 1.0, 0.0)).u;
+        let above = camera.project(DVec3::new(5.0, 2.0, 0.0)).v;
+        let nearer = camera.project(DVec3::new(5.0, 1.0, 1.0)).z;
         assert!(right > u && above < v && (z - nearer - 1.0).abs() < 1e-9);
         assert!(camera_towards(&mesh, DVec3::ZERO, DVec3::Y, &settings).is_err());
         assert!(camera_towards(&mesh, DVec3::Y, DVec3::Y, &settings).is_ok());

@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
 use semfm_views::{
-    Camera, Error, GpuRenderer, Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View,
-    render, rig,
+    Error, GpuRenderer, Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View, render,
+    rig,
 };
 use shapes::{lumpy_torus, zoo};
 
@@ -41,7 +41,7 @@ fn gpu() -> Option<&'static GpuRenderer> {
     }
 }
 
-fn both(gpu: &GpuRenderer, mesh: &Mesh, paint: &Paint<'_>, cameras: &[Camera]) -> [Vec<View>; 2] {
+fn both(gpu: &GpuRenderer, mesh: &Mesh, paint: &Paint<'_>, cameras: &[Pinhole]) -> [Vec<View>; 2] {
     let (settings, task) = (RenderSettings::default(), Task::default());
     let by_gpu = gpu.render(mesh, paint, cameras, &settings, &task).unwrap();
     [by_gpu, render(mesh, paint, cameras, &settings, &task).unwrap()]
@@ -78,7 +78,7 @@ fn compare(name: &str, [by_gpu, by_cpu]: &[Vec<View>; 2]) -> (usize, usize) {
     (different, n)
 }
 
-fn cameras(mesh: &Mesh, count: usize, size: u32) -> Vec<Camera> {
+fn cameras(mesh: &Mesh, count: usize, size: u32) -> Vec<Pinhole> {
     rig(mesh, &RigSettings { count, size, ..Default::default() }).unwrap()
 }
 
@@ -130,9 +130,11 @@ fn views_of_several_sizes_come_back_in_order() {
 fn what_is_behind_the_camera_is_not_drawn() {
     let Some(gpu) = gpu() else { return };
     let mesh = lumpy_torus(16);
-    let mut inside = cameras(&mesh, 1, 96).remove(0);
+    let inside = cameras(&mesh, 1, 96).remove(0);
     // Into the middle of the hole, with triangles on all sides.
-    inside.camera_from_object.translation = DVec3::ZERO;
+    let mut pose = inside.camera_from_world();
+    pose.translation = DVec3::ZERO;
+    let inside = inside.posed(pose).unwrap();
     let (different, n) = compare("inside", &both(gpu, &mesh, &Paint::GREY, &[inside]));
     assert!(different as f64 <= 5.0 * OTHER_TRIANGLE * n as f64, "{different} of {n}");
 }
@@ -142,7 +144,10 @@ fn other_settings_look_the_same() {
     let Some(gpu) = gpu() else { return };
     let (mesh, task) = (lumpy_torus(20), Task::default());
     let mut shots = cameras(&mesh, 2, 90);
-    shots[1].cx += 60.0; // cut off by the picture's right side
+    // Cut off by the picture's right side.
+    let shifted = Intrinsics { cx: shots[1].cx() + 60.0, ..shots[1].intrinsics() };
+    let pose = shots[1].camera_from_world();
+    shots[1] = Pinhole::with_pixel_centres_at_half(shifted, pose).unwrap();
     let background = [0.5, 0.1, 0.9];
     let mut looks: Vec<RenderSettings> = [1, 3, 4]
         .map(|supersampling| RenderSettings { supersampling, background, ..Default::default() })

@@ -77,7 +77,7 @@ fn edges_are_drawn_where_the_surface_ends_and_nowhere_else() {
     let black = RenderSettings { edges: 1.0, ..Default::default() };
     let drawn = views(&ball, &Paint::GREY, &black);
     for (plain, drawn) in plain.iter().zip(&drawn) {
-        let width = plain.camera.width as usize;
+        let width = plain.camera.width() as usize;
         let mut n_edges = 0;
         for (pixel, rgb) in drawn.rgb.chunks_exact(3).enumerate() {
             if plain.triangles[pixel] < 0 {

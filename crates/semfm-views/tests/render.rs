@@ -3,17 +3,17 @@
 mod shapes;
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
-use semfm_geom::{Mesh, Task};
-use semfm_views::{Camera, Paint, RenderSettings, RigSettings, View, render, rig};
+use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
+use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
 use shapes::{ellipsoid, lumpy_torus, together, zoo};
 
-fn shot(mesh: &Mesh, camera: Camera) -> View {
+fn shot(mesh: &Mesh, camera: Pinhole) -> View {
     let settings = RenderSettings::default();
     render(mesh, &Paint::GREY, &[camera], &settings, &Task::default()).unwrap().remove(0)
 }
 
 /// Nearest triangle and its depth on the ray through a pixel's centre (Möller & Trumbore 1997).
-fn ray_oracle(mesh: &Mesh, camera: &Camera, column: usize, row: usize) -> (i32, f64) {
+fn ray_oracle(mesh: &Mesh, camera: &Pinhole, column: usize, row: usize) -> (i32, f64) {
     let (eye, ray) = (camera.eye(), camera.ray(column as f64 + 0.5, row as f64 + 0.5));
     let mut nearest = (-1, f64::INFINITY);
     for face in 0..mesh.n_faces() {
@@ -32,9 +32,9 @@ fn ray_oracle(mesh: &Mesh, camera: &Camera, column: usize, row: usize) -> (i32, 
     nearest
 }
 
-fn compare_with_rays(mesh: &Mesh, camera: &Camera) {
+fn compare_with_rays(mesh: &Mesh, camera: &Pinhole) {
     let view = shot(mesh, *camera);
-    let width = camera.width as usize;
+    let width = camera.width() as usize;
     let mut different = 0;
     for (pixel, (&triangle, &depth)) in view.triangles.iter().zip(&view.depth).enumerate() {
         let (oracle_triangle, oracle_depth) =
@@ -69,15 +69,18 @@ fn a_camera_inside_the_object_sees_what_is_in_front_and_nothing_behind() {
         let turn =
             DMat3::from_rotation_y(f64::from(k)) * DMat3::from_rotation_x(0.7 * f64::from(k));
         let eye = DVec3::new(2.7, 0.1, 0.2); // inside the tube of the torus
-        let camera = Camera {
-            width: 60,
-            height: 44,
-            fx: 25.0, // a wide view: 100°
-            fy: 30.0,
-            cx: 31.5,
-            cy: 20.25,
-            camera_from_object: DAffine3::from_mat3_translation(turn, -(turn * eye)),
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics {
+                width: 60,
+                height: 44,
+                fx: 25.0, // a wide view: 100°
+                fy: 30.0,
+                cx: 31.5,
+                cy: 20.25,
+            },
+            DAffine3::from_mat3_translation(turn, -(turn * eye)),
+        )
+        .unwrap();
         compare_with_rays(&mesh, &camera);
         let view = shot(&mesh, camera);
         assert!(view.triangles.iter().all(|&id| id >= 0), "the outer shell is all around");
@@ -100,15 +103,11 @@ fn neighbouring_triangles_leave_no_crack_and_no_pixel_sees_past_them() {
         .collect();
     let grid = Mesh::new(vertices, faces).unwrap();
     for depth in [2.0, 3.0, 7.0] {
-        let camera = Camera {
-            width: 16,
-            height: 16,
-            fx: depth,
-            fy: depth,
-            cx: 0.5,
-            cy: 0.5,
-            camera_from_object: DAffine3::from_translation(DVec3::new(0.0, 0.0, depth)),
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: 16, height: 16, fx: depth, fy: depth, cx: 0.5, cy: 0.5 },
+            DAffine3::from_translation(DVec3::new(0.0, 0.0, depth)),
+        )
+        .unwrap();
         let view = shot(&grid, camera);
         assert!(view.triangles.iter().all(|&id| id >= 0), "{:?}", view.triangles);
         assert!(view.depth.iter().all(|&z| (f64::from(z) / depth - 1.0).abs() < 1e-6));
@@ -118,15 +117,11 @@ fn neighbouring_triangles_leave_no_crack_and_no_pixel_sees_past_them() {
 #[test]
 fn the_light_comes_from_the_viewer_s_side_slightly_above_and_right() {
     let sphere = ellipsoid(60, DVec3::ONE, DVec3::ZERO);
-    let camera = Camera {
-        width: 101,
-        height: 101,
-        fx: 150.0,
-        fy: 150.0,
-        cx: 50.5,
-        cy: 50.5,
-        camera_from_object: DAffine3::from_translation(DVec3::Z * 4.0),
-    };
+    let camera = Pinhole::with_pixel_centres_at_half(
+        Intrinsics { width: 101, height: 101, fx: 150.0, fy: 150.0, cx: 50.5, cy: 50.5 },
+        DAffine3::from_translation(DVec3::Z * 4.0),
+    )
+    .unwrap();
     let view = shot(&sphere, camera);
     let grey = |u: usize, v: usize| i32::from(view.rgb[(v * 101 + u) * 3]);
     assert!(grey(60, 40) > grey(50, 50) && grey(50, 50) > grey(40, 60));
@@ -156,15 +151,11 @@ fn creases_stay_sharp_and_gentle_bends_are_smoothed() {
     };
     let step_at_edge = |mesh: &Mesh| {
         let pose = DAffine3::from_translation(DVec3::new(0.0, 0.0, 6.0));
-        let camera = Camera {
-            width: 64,
-            height: 64,
-            fx: 150.0,
-            fy: 150.0,
-            cx: 32.0,
-            cy: 32.0,
-            camera_from_object: pose,
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: 64, height: 64, fx: 150.0, fy: 150.0, cx: 32.0, cy: 32.0 },
+            pose,
+        )
+        .unwrap();
         let view = shot(mesh, camera);
         let grey = |u: usize| i32::from(view.rgb[(32 * 64 + u) * 3]);
         (grey(31) - grey(32)).abs()
@@ -231,7 +222,9 @@ fn bands_threads_and_repetition_change_nothing() {
     let draw = || render(&mesh, &Paint::GREY, &cameras, &settings, &Task::default()).unwrap();
     let views = draw();
     // 500 px · 3² samples take several bands; a window of the same picture takes one.
-    let window = Camera { height: 40, cy: cameras[0].cy - 217.0, ..cameras[0] };
+    let whole = cameras[0];
+    let window = Intrinsics { height: 40, cy: whole.cy() - 217.0, ..whole.intrinsics() };
+    let window = Pinhole::with_pixel_centres_at_half(window, whole.camera_from_world()).unwrap();
     let part = render(&mesh, &Paint::GREY, &[window], &settings, &Task::default()).unwrap();
     let offset = 217 * 500;
     assert_eq!(part[0].triangles, views[0].triangles[offset..][..40 * 500]);
@@ -247,15 +240,16 @@ fn absurd_orders_are_refused() {
     let mesh = lumpy_torus(8);
     let camera = rig(&mesh, &RigSettings::default()).unwrap()[0];
     let settings = RenderSettings::default();
-    let order = |mesh: &Mesh, cameras: &[Camera], settings: &RenderSettings| {
+    let order = |mesh: &Mesh, cameras: &[Pinhole], settings: &RenderSettings| {
         render(mesh, &Paint::GREY, cameras, settings, &Task::default()).unwrap_err().to_string()
     };
-    assert!(
-        order(&mesh, &[camera, Camera { width: 0, ..camera }], &settings)
-            .starts_with("view 1: width")
-    );
-    assert!(order(&mesh, &[Camera { height: 8193, ..camera }], &settings).contains("height"));
-    let giant = Camera { width: 8192, height: 8192, ..camera };
+    let sized = |width, height| {
+        let intrinsics = Intrinsics { width, height, ..camera.intrinsics() };
+        Pinhole::with_pixel_centres_at_half(intrinsics, camera.camera_from_world()).unwrap()
+    };
+    assert!(order(&mesh, &[camera, sized(8193, 224)], &settings).starts_with("view 1: width"));
+    assert!(order(&mesh, &[sized(224, 8193)], &settings).contains("height"));
+    let giant = sized(8192, 8192);
     assert!(order(&mesh, &[giant; 5], &settings).starts_with("pixels of all views"));
     let none = RenderSettings { supersampling: 0, ..settings.clone() };
     assert!(order(&mesh, &[camera], &none).contains("supersampling"));

@@ -2,8 +2,7 @@
 
 use semfm_geom::geodesic::{HeatGeodesics, HeatSettings};
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, SurfaceIndex};
-use semfm_views::Camera;
+use semfm_geom::{Mesh, Pinhole, PixelDepth, SurfaceIndex};
 
 use crate::{Error, Region, Result};
 
@@ -46,8 +45,8 @@ const SIGHT_TOLERANCE: f64 = 0.01;
 ///
 /// # Errors
 /// [`Error::Invalid`] where the mask is not of the camera's size or shows no vertex.
-pub fn masked(mesh: &Mesh, camera: &Camera, mask: &[bool]) -> Result<Region> {
-    let (width, height) = (camera.width as usize, camera.height as usize);
+pub fn masked(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result<Region> {
+    let (width, height) = (camera.width() as usize, camera.height() as usize);
     if mask.len() != width * height {
         let expected = format!("{} pixels ({width} × {height}, as the view)", width * height);
         return Err(Error::invalid("mask", expected, format!("{} pixels", mask.len())));
@@ -59,7 +58,7 @@ pub fn masked(mesh: &Mesh, camera: &Camera, mask: &[bool]) -> Result<Region> {
         .vertices()
         .iter()
         .map(|&p| {
-            let (u, v, z) = camera.project(p);
+            let PixelDepth { u, v, z } = camera.project(p);
             let on_image = z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64;
             on_image && mask[v as usize * width + u as usize] && !surface.blocked(eye, p, margin)
         })
@@ -112,7 +111,8 @@ pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Reg
 #[cfg(test)]
 mod tests {
     use super::*;
-    use semfm_geom::zoo;
+    use semfm_geom::math::DAffine3;
+    use semfm_geom::{Intrinsics, zoo};
 
     #[test]
     fn near_takes_a_geodesic_disc() {
@@ -133,17 +133,11 @@ mod tests {
     #[test]
     fn a_mask_marks_what_faces_the_camera_only() {
         let sphere = zoo::icosphere(3);
-        let camera = Camera {
-            width: 64,
-            height: 64,
-            fx: 100.0,
-            fy: 100.0,
-            cx: 32.0,
-            cy: 32.0,
-            camera_from_object: semfm_geom::math::DAffine3::from_translation(DVec3::new(
-                0.0, 0.0, 4.0,
-            )),
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: 64, height: 64, fx: 100.0, fy: 100.0, cx: 32.0, cy: 32.0 },
+            DAffine3::from_translation(DVec3::new(0.0, 0.0, 4.0)),
+        )
+        .unwrap();
         let region = masked(&sphere, &camera, &[true; 64 * 64]).unwrap();
         let seen = region.vertices();
         assert!(

@@ -100,7 +100,7 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     let (metadata, view) = read_view(path, number)?;
     metadata.mesh.check(mesh, path)?;
     let picture = image::open(mask).with_context(|| mask.display().to_string())?.into_luma8();
-    let (width, height) = (view.camera.width, view.camera.height);
+    let (width, height) = (view.camera.width(), view.camera.height());
     if picture.dimensions() != (width, height) {
         let (w, h) = picture.dimensions();
         bail!(

@@ -9,8 +9,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use semfm::geom::Pinhole;
 use semfm::picture::{position_colors, viewpoints};
-use semfm::views::{Camera, Paint, RenderSettings, render};
+use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Region, Task};
 use serde::Deserialize;
 
@@ -36,7 +37,7 @@ pub(super) struct Subject {
     pub name: String,
     mesh: Mesh,
     truth: Region,
-    cameras: [Camera; 2],
+    cameras: [Pinhole; 2],
     /// Number of its style class.
     place: usize,
     /// The picture with its true region.
@@ -241,7 +242,7 @@ impl Subject {
         let settings = RenderSettings { supersampling: 3, ..RenderSettings::default() };
         let views =
             render(&self.mesh, &Paint::Vertices(colors), &[camera], &settings, task).ok()?;
-        data_uri::jpeg(&views.first()?.rgb, camera.width, camera.height)
+        data_uri::jpeg(&views.first()?.rgb, camera.width(), camera.height())
     }
 }
 

@@ -1,6 +1,7 @@
 //! A batch on its way: sent to the driver, and read back into the views.
 
 use rayon::prelude::*;
+use semfm_geom::Pinhole;
 
 use super::Driver;
 use super::frame::{COLOR_BYTES, Extent, Frame, ID_BYTES, padded};
@@ -8,14 +9,14 @@ use super::parts::{Part, extent};
 use super::pipelines::CameraBlock;
 use super::scene::Scene;
 use crate::render::Request;
-use crate::{Camera, Result, View};
+use crate::{Result, View};
 
 /// One call's work.
 pub(super) struct Draw<'a> {
     pub driver: &'a Driver,
     pub request: &'a Request<'a>,
     pub scene: &'a Scene,
-    pub cameras: &'a [Camera],
+    pub cameras: &'a [Pinhole],
     /// What every batch fits into.
     pub room: Extent,
 }
@@ -121,7 +122,7 @@ impl Draw<'_> {
         batch.frame.read(|ids, colors| {
             each_part(batch.parts, views, |view, part| {
                 for (row, line) in part.rows.clone().zip(part.top..) {
-                    let first = row * view.camera.width as usize;
+                    let first = row * view.camera.width() as usize;
                     let pixels = first + part.columns.start..first + part.columns.end;
                     let hits = ids[line * id_row..].as_chunks::<{ ID_BYTES as usize }>().0;
                     let places = view.triangles[pixels.clone()].iter_mut();

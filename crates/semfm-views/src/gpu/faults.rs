@@ -5,12 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Task, zoo};
+use semfm_geom::{Mesh, Pinhole, Task, zoo};
 
 use super::{GpuRenderer, Restraint};
-use crate::{
-    Camera, Error, Paint, RenderSettings, Renderer, Result, RigSettings, View, render, rig,
-};
+use crate::{Error, Paint, RenderSettings, Renderer, Result, RigSettings, View, render, rig};
 
 fn open(restraint: &Restraint) -> Option<GpuRenderer> {
     match GpuRenderer::within(restraint) {
@@ -23,7 +21,7 @@ fn open(restraint: &Restraint) -> Option<GpuRenderer> {
     }
 }
 
-fn scene() -> (Mesh, Vec<Camera>) {
+fn scene() -> (Mesh, Vec<Pinhole>) {
     let mesh = zoo::torus(40, 24);
     let cameras = rig(&mesh, &RigSettings { count: 5, size: 150, ..Default::default() }).unwrap();
     (mesh, cameras)
@@ -31,13 +29,13 @@ fn scene() -> (Mesh, Vec<Camera>) {
 
 fn draw(
     gpu: &GpuRenderer,
-    (mesh, cameras): &(Mesh, Vec<Camera>),
+    (mesh, cameras): &(Mesh, Vec<Pinhole>),
     task: &Task,
 ) -> Result<Vec<View>> {
     gpu.render(mesh, &Paint::GREY, cameras, &RenderSettings::default(), task)
 }
 
-fn by_cpu((mesh, cameras): &(Mesh, Vec<Camera>)) -> Vec<View> {
+fn by_cpu((mesh, cameras): &(Mesh, Vec<Pinhole>)) -> Vec<View> {
     render(mesh, &Paint::GREY, cameras, &RenderSettings::default(), &Task::default()).unwrap()
 }
 
@@ -170,12 +168,16 @@ fn views_that_see_nothing_cost_nothing() {
     let Some(gpu) = open(&Restraint::default()) else { return };
     let mut scene = scene();
     for camera in &mut scene.1 {
-        camera.camera_from_object.translation += DVec3::X * 100.0;
+        let mut pose = camera.camera_from_world();
+        pose.translation += DVec3::X * 100.0;
+        *camera = camera.posed(pose).unwrap();
     }
     assert_eq!(draw(&gpu, &scene, &Task::default()).unwrap(), by_cpu(&scene));
     assert!(gpu.current().frames.lock().unwrap().is_empty());
     for camera in &mut scene.1 {
-        camera.camera_from_object.translation = -DVec3::Z * 100.0;
+        let mut pose = camera.camera_from_world();
+        pose.translation = -DVec3::Z * 100.0;
+        *camera = camera.posed(pose).unwrap();
     }
     assert_eq!(draw(&gpu, &scene, &Task::default()).unwrap(), by_cpu(&scene));
 }

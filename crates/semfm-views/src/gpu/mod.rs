@@ -22,10 +22,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Pinhole, Task};
 
 use crate::render::{Request, blank};
-use crate::{Camera, Error, Paint, RenderSettings, Result, View};
+use crate::{Error, Paint, RenderSettings, Result, View};
 use device::{Device, Restraint};
 use draw::Draw;
 use frame::{Extent, Frame};
@@ -83,7 +83,7 @@ impl GpuRenderer {
         &self,
         mesh: &Mesh,
         paint: &Paint<'_>,
-        cameras: &[Camera],
+        cameras: &[Pinhole],
         settings: &RenderSettings,
         task: &Task,
     ) -> Result<Vec<View>> {
@@ -126,7 +126,7 @@ impl Driver {
         Ok(Self { device, pipelines, frames: Mutex::default(), failed: AtomicBool::new(false) })
     }
 
-    fn render(&self, request: &Request<'_>, cameras: &[Camera], task: &Task) -> Result<Vec<View>> {
+    fn render(&self, request: &Request<'_>, cameras: &[Pinhole], task: &Task) -> Result<Vec<View>> {
         task.step("render", 0, cameras.len())?;
         let scene = Scene::new(&self.device, request)?;
         let per_pixel = request.settings.supersampling;

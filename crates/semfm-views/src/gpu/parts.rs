@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use semfm_geom::{Intrinsics, Pinhole};
 
 use super::device::Device;
 use super::frame::{COLOR_BYTES, Extent, ID_BYTES, padded};
-use crate::Camera;
 use crate::render::Request;
 use crate::render::triangle::Projection;
 
@@ -38,14 +38,16 @@ pub(super) struct Part {
 
 impl Part {
     /// The camera that sees this part alone.
-    pub fn camera(&self, whole: &Camera) -> Camera {
-        Camera {
+    pub fn camera(&self, whole: &Pinhole) -> Pinhole {
+        let intrinsics = Intrinsics {
             width: self.columns.len() as u32,
             height: self.rows.len() as u32,
-            cx: whole.cx - self.columns.start as f64,
-            cy: whole.cy - self.rows.start as f64,
-            ..*whole
-        }
+            cx: whole.cx() - self.columns.start as f64,
+            cy: whole.cy() - self.rows.start as f64,
+            ..whole.intrinsics()
+        };
+        Pinhole::with_pixel_centres_at_half(intrinsics, whole.camera_from_world())
+            .expect("a part has pixels and its camera the numbers of a sound one")
     }
 }
 
@@ -62,7 +64,7 @@ pub(super) fn extent(batch: &[Part]) -> Extent {
 pub(super) fn batches(
     device: &Device,
     request: &Request<'_>,
-    cameras: &[Camera],
+    cameras: &[Pinhole],
     scale: u32,
 ) -> Vec<Vec<Part>> {
     let windows: Vec<[Range<usize>; 2]> =
@@ -78,7 +80,7 @@ pub(super) fn batches(
     pack(&windows, side, batch, part)
 }
 
-fn window(request: &Request<'_>, camera: &Camera) -> [Range<usize>; 2] {
+fn window(request: &Request<'_>, camera: &Pinhole) -> [Range<usize>; 2] {
     let [columns, rows] = Projection::new(request.mesh, camera).window();
     let wider = |pixels: Range<usize>, side: u32| {
         if pixels.is_empty() {
@@ -86,7 +88,7 @@ fn window(request: &Request<'_>, camera: &Camera) -> [Range<usize>; 2] {
         }
         pixels.start.saturating_sub(MARGIN)..(pixels.end + MARGIN).min(side as usize)
     };
-    [wider(columns, camera.width), wider(rows, camera.height)]
+    [wider(columns, camera.width()), wider(rows, camera.height())]
 }
 
 /// Cuts windows to parts of at most `side` pixels along each side and `part_bytes`, and puts them in

@@ -1,11 +1,12 @@
 //! The mesh as the driver gets it.
 
 use semfm_geom::math::{DAffine3, DMat4, DVec3, DVec4};
+use semfm_geom::{Pinhole, Sphere};
 
 use super::device::Device;
 use super::pipelines::{CameraBlock, Corner};
 use crate::render::{Request, light_direction};
-use crate::{Camera, Error, Paint, RenderSettings, Result};
+use crate::{Error, Paint, RenderSettings, Result};
 
 /// What lies nearer to the camera than this share of the object's radius is cut off.
 const NEAR: f64 = 1e-4;
@@ -28,7 +29,7 @@ impl Scene {
     /// [`Error::BeyondGpu`] for a mesh that does not fit into a buffer, [`Error::Gpu`].
     pub fn new(device: &Device, request: &Request<'_>) -> Result<Self> {
         let mesh = request.mesh;
-        let (centre, radius) = request.sphere;
+        let Sphere { centre, radius } = request.sphere;
         let bytes_each = 3 * size_of::<Corner>() as u64;
         let largest = device.device.limits().max_buffer_size.min(u64::from(u32::MAX));
         if mesh.n_faces() as u64 > largest / bytes_each {
@@ -61,17 +62,17 @@ impl Scene {
         Ok(Self { corners, n_corners, centre, radius })
     }
 
-    pub fn camera_block(&self, camera: &Camera, settings: &RenderSettings) -> CameraBlock {
-        let pose = camera.camera_from_object;
+    pub fn camera_block(&self, camera: &Pinhole, settings: &RenderSettings) -> CameraBlock {
+        let pose = camera.camera_from_world();
         let pose = DAffine3::from_mat3_translation(
             pose.matrix3,
             pose.transform_point3(self.centre) / self.radius,
         );
-        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
         let clip_from_camera = DMat4::from_cols(
-            DVec4::new(2.0 * camera.fx / width, 0.0, 0.0, 0.0),
-            DVec4::new(0.0, -2.0 * camera.fy / height, 0.0, 0.0),
-            DVec4::new(2.0 * camera.cx / width - 1.0, 1.0 - 2.0 * camera.cy / height, 0.0, 1.0),
+            DVec4::new(2.0 * camera.fx() / width, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, -2.0 * camera.fy() / height, 0.0, 0.0),
+            DVec4::new(2.0 * camera.cx() / width - 1.0, 1.0 - 2.0 * camera.cy() / height, 0.0, 1.0),
             DVec4::new(0.0, 0.0, NEAR, 0.0),
         );
         let [x, y, z] = light_direction(camera, settings).as_vec3().to_array();

@@ -11,9 +11,8 @@ mod unproject;
 
 use semfm_geom::math::bounds;
 use semfm_geom::sampling::{SurfaceSample, sample_even, sample_uniform};
-use semfm_geom::{Mesh, SemanticCloud, Task};
+use semfm_geom::{Mesh, SemanticCloud, Task, surface_sphere, surface_vertices};
 
-use crate::frame::{surface_sphere, surface_vertices};
 use crate::{EmbeddedView, Error, Result};
 
 /// How image features reach the surface samples.
@@ -132,7 +131,7 @@ pub fn lift(
     // Both rules measure in the size of the surface, whatever stray vertices the mesh holds.
     let features = match settings.rule {
         LiftRule::Pull { depth_tolerance } => {
-            let (_, radius) = surface_sphere(mesh);
+            let radius = surface_sphere(mesh).radius;
             pull::pull(mesh, &samples, views, dim, depth_tolerance * radius, task)?
         }
         LiftRule::Unproject { radius } => {
@@ -159,7 +158,6 @@ fn check(views: &[EmbeddedView]) -> Result<usize> {
     let dim = first.patches.dim;
     for (k, view) in views.iter().enumerate() {
         let name = format!("view {k}");
-        view.camera.check(&name)?;
         view.patches.check(&name)?;
         if view.patches.dim != dim {
             let expected = format!("{dim} dimensions, as in view 0");

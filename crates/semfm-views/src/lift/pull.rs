@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use semfm_geom::sampling::SurfaceSample;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, PixelDepth, Task};
 
 use super::nearest_seen::nearest_seen;
 use super::{Features, nothing_in_sight};
@@ -90,13 +90,13 @@ fn sightings(
     tolerance: f64,
 ) -> Vec<Option<Sighting>> {
     let camera = &view.camera;
-    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let projected: Vec<(f64, f64, f64)> = samples.iter().map(|s| camera.project(s.point)).collect();
-    let in_image = |&(u, v, z): &(f64, f64, f64)| {
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
+    let projected: Vec<PixelDepth> = samples.iter().map(|s| camera.project(s.point)).collect();
+    let in_image = |&PixelDepth { u, v, z }: &PixelDepth| {
         z > 0.0 && (0.0..=width).contains(&u) && (0.0..=height).contains(&v)
     };
     let positions: Vec<[f64; 2]> =
-        projected.iter().map(|p| if in_image(p) { [p.0, p.1] } else { [f64::NAN; 2] }).collect();
+        projected.iter().map(|p| if in_image(p) { [p.u, p.v] } else { [f64::NAN; 2] }).collect();
     let nearest = inverse_depths(&Projection::new(mesh, camera), &positions);
     let eye = camera.eye();
     samples
@@ -105,10 +105,10 @@ fn sightings(
         .zip(&nearest)
         .map(|((sample, p), &inverse_depth)| {
             // No surface at all (1/0 = ∞) is rounding at the very edge of the silhouette.
-            if !in_image(p) || p.2 > 1.0 / inverse_depth + tolerance {
+            if !in_image(p) || p.z > 1.0 / inverse_depth + tolerance {
                 return None;
             }
-            let patches = patch_mix(&view.patches, p.0, p.1)?;
+            let patches = patch_mix(&view.patches, p.u, p.v)?;
             let cosine = (eye - sample.point).normalize_or_zero().dot(sample.normal).abs();
             Some(Sighting { patches, weight: cosine as f32 + GRAZING_WEIGHT })
         })

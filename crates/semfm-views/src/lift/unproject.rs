@@ -63,7 +63,7 @@ pub(super) fn unproject(
 /// The valid patches of view `k` whose centres see the surface, with the points they see.
 fn lifted_patches(mesh: &Mesh, views: &[EmbeddedView], k: usize) -> Vec<LiftedPatch> {
     let EmbeddedView { camera, patches } = &views[k];
-    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
     let centres: Vec<[f64; 2]> = (0..patches.rows * patches.cols)
         .map(|patch| {
             let [u, v] = patches.centre(patch);

@@ -133,7 +133,7 @@ impl EmbeddingsFile {
         let size = (self.metadata.views.width, self.metadata.views.height);
         for (view, embedded) in self.views.iter().enumerate() {
             check_camera(view, &embedded.camera)?;
-            let found = (embedded.camera.width, embedded.camera.height);
+            let found = (embedded.camera.width(), embedded.camera.height());
             if found != size {
                 let what = format!("image size of view {view:03}");
                 return Err(invalid(what, format!("{size:?}"), format!("{found:?}")));

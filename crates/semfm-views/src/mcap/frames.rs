@@ -4,9 +4,9 @@
 
 use foxglove::messages::{CameraCalibration, FrameTransform, Quaternion, Vector3};
 use semfm_geom::math::{DAffine3, DMat3, DQuat, DVec3};
+use semfm_geom::{Intrinsics, Pinhole};
 
 use super::writer::timestamp;
-use crate::Camera;
 
 /// The frame of the mesh file.
 pub(super) const OBJECT: &str = "object";
@@ -46,18 +46,18 @@ fn parse_number(text: &str) -> Option<usize> {
 }
 
 /// Intrinsics of a view's camera.
-pub(super) fn calibration(view: usize, time: u64, camera: &Camera) -> CameraCalibration {
+pub(super) fn calibration(view: usize, time: u64, camera: &Pinhole) -> CameraCalibration {
     calibration_in(frame(view), time, camera)
 }
 
 /// Intrinsics of a camera whose frame is `frame_id`.
-pub(super) fn calibration_in(frame_id: String, time: u64, camera: &Camera) -> CameraCalibration {
-    let Camera { fx, fy, cx, cy, .. } = *camera;
+pub(super) fn calibration_in(frame_id: String, time: u64, camera: &Pinhole) -> CameraCalibration {
+    let Intrinsics { fx, fy, cx, cy, .. } = camera.intrinsics();
     CameraCalibration {
         timestamp: Some(timestamp(time)),
         frame_id,
-        width: camera.width,
-        height: camera.height,
+        width: camera.width(),
+        height: camera.height(),
         distortion_model: String::new(),
         d: Vec::new(),
         k: vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
@@ -67,7 +67,7 @@ pub(super) fn calibration_in(frame_id: String, time: u64, camera: &Camera) -> Ca
 }
 
 /// The camera's pose in the object's frame.
-pub(super) fn transform(view: usize, time: u64, camera: &Camera) -> FrameTransform {
+pub(super) fn transform(view: usize, time: u64, camera: &Pinhole) -> FrameTransform {
     transform_in(OBJECT, frame(view), time, camera)
 }
 
@@ -76,9 +76,9 @@ pub(super) fn transform_in(
     parent: &str,
     child: String,
     time: u64,
-    camera: &Camera,
+    camera: &Pinhole,
 ) -> FrameTransform {
-    let object_from_camera = camera.camera_from_object.inverse();
+    let object_from_camera = camera.camera_from_world().inverse();
     let DVec3 { x, y, z } = object_from_camera.translation;
     let q = DQuat::from_mat3(&object_from_camera.matrix3).normalize();
     FrameTransform {
@@ -115,7 +115,7 @@ pub(super) fn read_camera(
     message: &CameraCalibration,
     view: usize,
     camera_from_object: DAffine3,
-) -> Result<Camera, Mismatch> {
+) -> Result<Pinhole, Mismatch> {
     let mismatch = |expected: &str, found: String| Err((expected.to_owned(), found));
     if message.frame_id != frame(view) {
         return mismatch(
@@ -147,5 +147,8 @@ pub(super) fn read_camera(
         return mismatch("R = identity", format!("{:?}", message.r));
     }
     let (width, height) = (message.width, message.height);
-    Ok(Camera { width, height, fx, fy, cx, cy, camera_from_object })
+    // Foxglove's message leaves open where a pixel's centre lies; our files count as our cameras do.
+    let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+    Pinhole::with_pixel_centres_at_half(intrinsics, camera_from_object)
+        .map_err(|error| ("a pinhole camera".to_owned(), error.to_string()))
 }

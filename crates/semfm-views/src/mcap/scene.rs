@@ -199,8 +199,7 @@ impl Scene<'_> {
             check_finite(cloud.topic, cloud.points)?;
         }
         for ScenePicture { name, view, .. } in &self.pictures {
-            view.camera.check(name)?;
-            let n_pixels = view.camera.width as usize * view.camera.height as usize;
+            let n_pixels = view.camera.width() as usize * view.camera.height() as usize;
             check_length(name, "bytes", 3 * n_pixels, view.rgb.len())?;
         }
         Ok(())
@@ -324,7 +323,7 @@ impl ScenePicture<'_> {
         let topic = |what: &str| format!("/{frame_id}/{name}/{what}");
         file.log(TF, 0, &transform_in(frame_id, own.clone(), 0, camera))?;
         file.log(&topic("camera"), 0, &calibration_in(own.clone(), 0, camera))?;
-        let png = encode_png(&view.rgb, (camera.width, camera.height)).map_err(|error| {
+        let png = encode_png(&view.rgb, (camera.width(), camera.height())).map_err(|error| {
             Error::Io { path: path.to_path_buf(), source: std::io::Error::other(error) }
         })?;
         let image = CompressedImage {

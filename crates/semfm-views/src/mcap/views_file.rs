@@ -8,7 +8,7 @@ use foxglove::bytes::Bytes;
 use foxglove::messages::{CompressedImage, RawImage};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
-use semfm_geom::Mesh;
+use semfm_geom::{Mesh, Pinhole};
 
 use super::cameras::{
     Cameras, check_camera, check_count, decode, insert_once, message_error, topic_error,
@@ -170,10 +170,10 @@ impl Pictures {
         &self,
         path: &Path,
         view: usize,
-        camera: crate::Camera,
+        camera: Pinhole,
         metadata: &ViewsMetadata,
     ) -> Result<View> {
-        let size = (camera.width, camera.height);
+        let size = (camera.width(), camera.height());
         let rgb = {
             let topic = topic(view, "image");
             let image = self
@@ -246,7 +246,7 @@ fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), (Str
     match view.depth.iter().zip(&view.triangles).position(is_wrong) {
         None => Ok(()),
         Some(pixel) => {
-            let width = view.camera.width as usize;
+            let width = view.camera.width() as usize;
             let (row, col) = (pixel / width, pixel % width);
             let (depth, triangle) = (view.depth[pixel], view.triangles[pixel]);
             let expected = format!(
@@ -269,7 +269,7 @@ fn invalid(
 fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<()> {
     let what = format!("view {view:03}");
     check_camera(view, &rendered.camera)?;
-    let (width, height) = (rendered.camera.width, rendered.camera.height);
+    let (width, height) = (rendered.camera.width(), rendered.camera.height());
     if (width, height) != (metadata.width, metadata.height) {
         let expected = format!("{} × {} pixels", metadata.width, metadata.height);
         return Err(invalid(what, expected, format!("{width} × {height}")));
@@ -286,7 +286,7 @@ fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<
 
 fn write_view(path: &Path, file: &mut McapFile<'_>, view: usize, rendered: &View) -> Result<()> {
     let View { camera, rgb, depth, triangles } = rendered;
-    let (width, height) = (camera.width, camera.height);
+    let (width, height) = (camera.width(), camera.height());
     let time = time_of(view);
     file.log(TF, time, &transform(view, time, camera))?;
     file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;

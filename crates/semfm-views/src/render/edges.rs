@@ -12,7 +12,7 @@ const PIXELS: f64 = 2.0;
 
 /// Darkens the pixels of the object that border on something farther away or beyond a crease.
 pub(super) fn draw(view: &mut View, request: &Request<'_>) {
-    let is_edge = Edges { view, request, jump: JUMP * request.sphere.1 }.find();
+    let is_edge = Edges { view, request, jump: JUMP * request.sphere.radius }.find();
     let kept = 1.0 - request.settings.edges as f32;
     for (pixel, _) in view.rgb.chunks_exact_mut(3).zip(is_edge).filter(|(_, is_edge)| *is_edge) {
         pixel.iter_mut().for_each(|byte| *byte = (f32::from(*byte) * kept + 0.5) as u8);
@@ -28,7 +28,8 @@ struct Edges<'a> {
 impl Edges<'_> {
     /// Which pixels (height × width) are edges, each on the nearer side of its border.
     fn find(&self) -> Vec<bool> {
-        let (width, height) = (self.view.camera.width as usize, self.view.camera.height as usize);
+        let (width, height) =
+            (self.view.camera.width() as usize, self.view.camera.height() as usize);
         let mut is_edge = vec![false; width * height];
         for here in 0..width * height {
             let right = (here % width + 1 < width).then_some(here + 1);
@@ -56,11 +57,11 @@ impl Edges<'_> {
         let camera = &self.view.camera;
         let normal = self.normal(other);
         let [nearer, depth] = [near, far].map(|pixel| f64::from(self.view.depth[pixel]));
-        let width = camera.width as usize;
+        let width = camera.width() as usize;
         let (u, v) = ((far % width) as f64 + 0.5, (far / width) as f64 + 0.5);
         let cosine = normal.dot(camera.ray(u, v).normalize()).abs();
         let steepness = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-        depth - nearer > self.jump + PIXELS * depth / camera.fx.min(camera.fy) * steepness
+        depth - nearer > self.jump + PIXELS * depth / camera.fx().min(camera.fy()) * steepness
             || self.normal(one).dot(normal).abs() < self.request.settings.crease.cos()
     }
 

@@ -18,18 +18,19 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Pinhole, Sphere, Task, surface_sphere};
 
 #[cfg(feature = "gpu")]
 pub(crate) use shade::light_direction;
 pub use shade::{CornerNormals, Paint};
 
-use crate::frame::surface_sphere;
-use crate::{Camera, Error, Result, View};
+use crate::{Error, Result, View};
 pub use occlusion::openness;
 use raster::{DrawAll, Raster};
 use triangle::Projection;
+
+/// Largest width or height of a view, in pixels.
+pub(crate) const MAX_IMAGE_SIDE: u32 = 8192;
 
 /// Samples of one z-buffer: larger pictures are drawn in bands of rows, which bounds the memory.
 const BAND_SAMPLES: usize = 1 << 20;
@@ -131,7 +132,7 @@ impl RenderSettings {
 pub fn render(
     mesh: &Mesh,
     paint: &Paint<'_>,
-    cameras: &[Camera],
+    cameras: &[Pinhole],
     settings: &RenderSettings,
     task: &Task,
 ) -> Result<Vec<View>> {
@@ -156,7 +157,7 @@ pub(crate) struct Request<'a> {
     pub settings: &'a RenderSettings,
     pub normals: CornerNormals,
     /// Centre and radius of the surface.
-    pub sphere: (DVec3, f64),
+    pub sphere: Sphere,
     /// Light that reaches each vertex (n) where occlusion is asked for.
     occlusion: Option<Vec<f32>>,
 }
@@ -167,15 +168,16 @@ impl<'a> Request<'a> {
     pub fn new(
         mesh: &'a Mesh,
         paint: &'a Paint<'a>,
-        cameras: &[Camera],
+        cameras: &[Pinhole],
         settings: &'a RenderSettings,
     ) -> Result<Self> {
         settings.check()?;
         paint.check(mesh)?;
         for (k, camera) in cameras.iter().enumerate() {
-            camera.check(&format!("view {k}"))?;
+            check_size(k, camera)?;
         }
-        let n_pixels: u64 = cameras.iter().map(|c| u64::from(c.width) * u64::from(c.height)).sum();
+        let n_pixels: u64 =
+            cameras.iter().map(|c| u64::from(c.width()) * u64::from(c.height())).sum();
         if n_pixels > MAX_PIXELS {
             return Err(Error::invalid(
                 "pixels of all views",
@@ -216,16 +218,31 @@ impl<'a> Request<'a> {
         samples: impl Iterator<Item = (i32, f32)>,
     ) {
         let projection = Projection::new(self.mesh, &view.camera);
-        let width = view.camera.width as usize;
+        let width = view.camera.width() as usize;
         let first = rows.start * width * 3;
         let raster = Raster::of(self.settings.supersampling, columns, rows, samples);
         shade::Shader::new(&projection, self).mix(&raster, &mut view.rgb[first..], width);
     }
 }
 
+/// Refuses a view that is larger than any encoder would look at.
+fn check_size(view: usize, camera: &Pinhole) -> Result<()> {
+    for (field, side) in [("width", camera.width()), ("height", camera.height())] {
+        if side > MAX_IMAGE_SIDE {
+            let expected = format!("1 to {MAX_IMAGE_SIDE} pixels");
+            return Err(Error::invalid(
+                format!("view {view}: {field}"),
+                expected,
+                side.to_string(),
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// A view in which nothing is seen.
-pub(crate) fn blank(camera: &Camera, settings: &RenderSettings) -> View {
-    let n_pixels = camera.width as usize * camera.height as usize;
+pub(crate) fn blank(camera: &Pinhole, settings: &RenderSettings) -> View {
+    let n_pixels = camera.width() as usize * camera.height() as usize;
     View {
         camera: *camera,
         rgb: shade::background(settings).repeat(n_pixels),
@@ -234,9 +251,9 @@ pub(crate) fn blank(camera: &Camera, settings: &RenderSettings) -> View {
     }
 }
 
-fn render_one(request: &Request<'_>, camera: &Camera) -> View {
+fn render_one(request: &Request<'_>, camera: &Pinhole) -> View {
     let settings = request.settings;
-    let (width, height) = (camera.width as usize, camera.height as usize);
+    let (width, height) = (camera.width() as usize, camera.height() as usize);
     let projection = Projection::new(request.mesh, camera);
     let light = shade::Shader::new(&projection, request);
     let mut view = blank(camera, settings);

@@ -2,13 +2,11 @@
 //! illumination model*, 1998), at the vertices.
 
 use rayon::prelude::*;
-use semfm_geom::Mesh;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
+use semfm_geom::{Intrinsics, Mesh, Pinhole, PixelDepth, Sphere, surface_sphere};
 
 use super::probe::inverse_depths;
 use super::triangle::Projection;
-use crate::Camera;
-use crate::frame::surface_sphere;
 use crate::rig::fibonacci_directions;
 
 /// Axes along which a vertex is looked at, from both ends: of each two opposite eyes a convex
@@ -29,7 +27,7 @@ const TOLERANCE: f64 = 0.01;
 /// winding is asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
 /// Vertices of no triangle have 1.
 pub fn openness(mesh: &Mesh) -> Vec<f32> {
-    let (centre, radius) = surface_sphere(mesh);
+    let Sphere { centre, radius } = surface_sphere(mesh);
     let directions: Vec<DVec3> =
         fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
     let normals: Vec<DVec3> =
@@ -62,19 +60,14 @@ fn vertices_in_sight(mesh: &Mesh, centre: DVec3, radius: f64, direction: DVec3) 
     let right = direction.any_orthonormal_vector();
     let turn = DMat3::from_cols(right, right.cross(direction), -direction).transpose();
     let eye = centre + DISTANCE * radius * direction;
-    let camera = Camera {
-        width: 1,
-        height: 1,
-        fx: DISTANCE,
-        fy: DISTANCE,
-        cx: 0.0,
-        cy: 0.0,
-        camera_from_object: DAffine3::from_mat3_translation(turn, turn * -eye),
-    };
-    let projected: Vec<(f64, f64, f64)> =
-        mesh.vertices().iter().map(|&p| camera.project(p)).collect();
-    let positions: Vec<[f64; 2]> = projected.iter().map(|p| [p.0, p.1]).collect();
+    let intrinsics =
+        Intrinsics { width: 1, height: 1, fx: DISTANCE, fy: DISTANCE, cx: 0.0, cy: 0.0 };
+    let pose = DAffine3::from_mat3_translation(turn, turn * -eye);
+    let camera = Pinhole::with_pixel_centres_at_half(intrinsics, pose)
+        .expect("a mesh has finite bounds, so the eye does");
+    let projected: Vec<PixelDepth> = mesh.vertices().iter().map(|&p| camera.project(p)).collect();
+    let positions: Vec<[f64; 2]> = projected.iter().map(|p| [p.u, p.v]).collect();
     let nearest = inverse_depths(&Projection::new(mesh, &camera), &positions);
     let tolerance = TOLERANCE * radius;
-    projected.iter().zip(nearest).map(|(p, inverse)| p.2 <= 1.0 / inverse + tolerance).collect()
+    projected.iter().zip(nearest).map(|(p, inverse)| p.z <= 1.0 / inverse + tolerance).collect()
 }

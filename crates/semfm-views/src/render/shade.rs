@@ -2,13 +2,13 @@
 
 use std::fmt;
 
-use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, Pinhole};
 
 use super::raster::{Hit, Raster};
 use super::triangle::{Projection, TriangleForms};
 use super::{RenderSettings, Request};
-use crate::{Camera, Error, Result};
+use crate::{Error, Result};
 
 /// Colour of the surface before lighting, as sRGB values 0 to 1.
 ///
@@ -97,11 +97,11 @@ impl CornerNormals {
 }
 
 /// Unit vector towards the light, in the object's frame.
-pub(crate) fn light_direction(camera: &Camera, settings: &RenderSettings) -> DVec3 {
+pub(crate) fn light_direction(camera: &Pinhole, settings: &RenderSettings) -> DVec3 {
     let [right, up, back] = settings.light;
     // The camera's own axes are x right, y down, z forward.
     let light = DVec3::new(right, -up, -back).normalize_or_zero();
-    camera.camera_from_object.matrix3.transpose() * light
+    camera.camera_from_world().matrix3.transpose() * light
 }
 
 /// The bytes of a pixel of which every sample sees the background.
@@ -155,7 +155,7 @@ impl<'a> Shader<'a> {
         self.request.normals.0[face].map(|normal| {
             let normal = DVec3::from_array(normal.map(f64::from)) * side;
             let [right, down, forward] =
-                camera.camera_from_object.transform_vector3(normal).as_vec3().to_array();
+                camera.camera_from_world().transform_vector3(normal).as_vec3().to_array();
             [right, -down, -forward].map(|x| 0.5 + 0.5 * x)
         })
     }

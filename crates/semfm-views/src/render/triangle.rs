@@ -15,10 +15,8 @@
 
 use std::ops::Range;
 
-use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
-
-use crate::Camera;
+use semfm_geom::{Mesh, Pinhole};
 
 /// Bounding rectangles are widened by this many pixels, so that rounding in the projection never
 /// cuts off what the exact half-planes would keep.
@@ -71,7 +69,7 @@ pub(crate) struct PixelBox {
 
 /// A mesh before a camera: vertices in camera coordinates and where they fall in the image.
 pub(crate) struct Projection<'a> {
-    pub camera: &'a Camera,
+    pub camera: &'a Pinhole,
     pub mesh: &'a Mesh,
     lens: Lens,
     points: Vec<DVec3>,
@@ -91,22 +89,26 @@ pub(crate) struct TriangleForms {
 }
 
 impl<'a> Projection<'a> {
-    pub fn new(mesh: &'a Mesh, camera: &'a Camera) -> Self {
+    pub fn new(mesh: &'a Mesh, camera: &'a Pinhole) -> Self {
         let points: Vec<DVec3> = mesh
             .vertices()
             .iter()
-            .map(|&p| camera.camera_from_object.transform_point3(p))
+            .map(|&p| camera.camera_from_world().transform_point3(p))
             .collect();
         let pixel = |p: &DVec3| {
             if p.z > 0.0 {
-                [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy]
+                [camera.fx() * p.x / p.z + camera.cx(), camera.fy() * p.y / p.z + camera.cy()]
             } else {
                 [f64::NAN; 2]
             }
         };
         let pixels = points.iter().map(pixel).collect();
-        let lens =
-            Lens { per_fx: 1.0 / camera.fx, per_fy: 1.0 / camera.fy, cx: camera.cx, cy: camera.cy };
+        let lens = Lens {
+            per_fx: 1.0 / camera.fx(),
+            per_fy: 1.0 / camera.fy(),
+            cx: camera.cx(),
+            cy: camera.cy(),
+        };
         Self { camera, mesh, lens, points, pixels }
     }
 
@@ -136,7 +138,7 @@ impl<'a> Projection<'a> {
     /// behind the camera.
     pub fn window(&self) -> [Range<usize>; 2] {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let sides = [self.camera.width, self.camera.height].map(f64::from);
+        let sides = [self.camera.width(), self.camera.height()].map(f64::from);
         for pixel in &self.pixels {
             for k in 0..2 {
                 if pixel[k].is_nan() {

@@ -184,7 +184,7 @@ pub(crate) fn bytes(color: [f32; 3]) -> [u8; 3] {
 
 /// Width and height that all pictures have.
 fn size_of<'a>(pictures: impl IntoIterator<Item = &'a View>) -> Result<(usize, usize)> {
-    let size = |view: &View| (view.camera.width as usize, view.camera.height as usize);
+    let size = |view: &View| (view.camera.width() as usize, view.camera.height() as usize);
     let mut sizes = pictures.into_iter().map(size);
     let Some(first) = sizes.next() else {
         return Err(Error::invalid("pictures of a sheet", "at least one", "none"));
@@ -284,22 +284,18 @@ fn distance(p: [f32; 2], a: [f32; 2], b: [f32; 2]) -> f32 {
 #[cfg(test)]
 mod tests {
     use semfm_geom::math::DAffine3;
-    use semfm_views::Camera;
+    use semfm_geom::{Intrinsics, Pinhole};
 
     use super::*;
 
     fn view(side: u32, color: u8) -> View {
         let n = (side * side) as usize;
         let (f, c) = (f64::from(side), f64::from(side) / 2.0);
-        let camera = Camera {
-            width: side,
-            height: side,
-            fx: f,
-            fy: f,
-            cx: c,
-            cy: c,
-            camera_from_object: DAffine3::IDENTITY,
-        };
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: side, height: side, fx: f, fy: f, cx: c, cy: c },
+            DAffine3::IDENTITY,
+        )
+        .unwrap();
         View { camera, rgb: vec![color; 3 * n], depth: vec![1.0; n], triangles: vec![0; n] }
     }
 

@@ -1,8 +1,7 @@
 //! Which way is up: pictures of an object lying on its side are hard to read.
 
-use semfm_geom::Mesh;
 use semfm_geom::math::{DVec3, bounds};
-use semfm_views::frame::principal_frame;
+use semfm_geom::{Mesh, principal_axes};
 use semfm_views::rig::fibonacci_directions;
 
 use crate::Result;
@@ -48,7 +47,7 @@ pub(super) fn upright(mesh: &Mesh) -> Result<Upright> {
         .map(|(up, bonus)| (up, bonus * stand(&facets, up)))
         .fold((DVec3::Z, 0.0), |best, next| if next.1 > best.1 { next } else { best });
     let is_sure = share >= LEAST_STAND;
-    Ok(Upright { up: if is_sure { up } else { principal_frame(mesh)?.row(2) }, is_sure })
+    Ok(Upright { up: if is_sure { up } else { principal_axes(mesh)?.row(2) }, is_sure })
 }
 
 /// A triangle: its normal, twice its area long, and its corners.

@@ -3,9 +3,9 @@
 
 use faer::{Mat, Side};
 use semfm_geom::math::{DMat3, DQuat, DVec3};
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Pinhole, Task};
 use semfm_views::rig::{camera_towards, fibonacci_directions};
-use semfm_views::{Camera, Paint, RenderSettings, RigSettings, render};
+use semfm_views::{Paint, RenderSettings, RigSettings, render};
 
 use super::upright::{Upright, upright};
 use crate::{Region, Result};
@@ -31,9 +31,9 @@ const OFF_CENTRE: f64 = 0.3;
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
     /// From where the region shows best.
-    pub best: Camera,
+    pub best: Pinhole,
     /// The best view from another side.
-    pub other: Camera,
+    pub other: Pinhole,
     /// How the object stands: z up, x to the right and y away from the eye of the best side.
     pub upright_from_object: DMat3,
 }
@@ -143,7 +143,7 @@ fn directions_around(up: DVec3) -> Vec<Direction> {
         .collect()
 }
 
-fn towards(mesh: &Mesh, direction: &Direction, size: u32) -> Result<Camera> {
+fn towards(mesh: &Mesh, direction: &Direction, size: u32) -> Result<Pinhole> {
     let settings = RigSettings { size, ..Default::default() };
     Ok(camera_towards(mesh, direction.towards_eye, direction.up, &settings)?)
 }
@@ -160,7 +160,7 @@ fn visible(
     directions: &[Direction],
     task: &Task,
 ) -> Result<Vec<Visible>> {
-    let cameras: Vec<Camera> =
+    let cameras: Vec<Pinhole> =
         directions.iter().map(|d| towards(mesh, d, SCOUT)).collect::<Result<_>>()?;
     let views = render(mesh, &Paint::default(), &cameras, &RenderSettings::default(), task)?;
     let inside =
@@ -314,15 +314,15 @@ mod tests {
         let [source, target] =
             paired_viewpoints((&mesh, &weights), (&copy, &weights), &identity, 64, &task).unwrap();
         for (a, b) in [
-            (source.best.camera_from_object.matrix3, target.best.camera_from_object.matrix3),
-            (source.other.camera_from_object.matrix3, target.other.camera_from_object.matrix3),
+            (source.best.camera_from_world().matrix3, target.best.camera_from_world().matrix3),
+            (source.other.camera_from_world().matrix3, target.other.camera_from_world().matrix3),
             (source.upright_from_object, target.upright_from_object),
         ] {
             assert!((b * turn - a).to_cols_array().iter().all(|x| x.abs() < 1e-9));
         }
         // The eye of the best side looks along +y, and x is to the right of its picture.
         let upright_from_camera =
-            source.upright_from_object * source.best.camera_from_object.matrix3.transpose();
+            source.upright_from_object * source.best.camera_from_world().matrix3.transpose();
         assert!(upright_from_camera.z_axis.y > 0.0 && upright_from_camera.x_axis.x > 0.999);
     }
 

@@ -104,7 +104,7 @@ impl Panel {
 
     fn json(&self, paints: Vec<Value>) -> Value {
         let upright = self.sides.upright_from_object;
-        let forward = self.sides.best.camera_from_object.matrix3.row(2);
+        let forward = self.sides.best.camera_from_world().matrix3.row(2);
         let (yaw, pitch) = angles(upright, -forward);
         let mut json = packed_mesh(&self.mesh);
         json["name"] = json!(self.name);

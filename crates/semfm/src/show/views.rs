@@ -39,7 +39,7 @@ pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
                 expected: "a picture".into(),
                 found: source.to_string(),
             })?;
-            let towards_eye = -view.camera.camera_from_object.matrix3.row(2);
+            let towards_eye = -view.camera.camera_from_world().matrix3.row(2);
             Ok(Picture { name: format!("{i:03}"), png, towards_eye })
         })
         .collect::<Result<_>>()?;
@@ -57,7 +57,7 @@ pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
 
 fn png(view: &View) -> image::ImageResult<Vec<u8>> {
     let mut png = Vec::new();
-    let (width, height) = (view.camera.width, view.camera.height);
+    let (width, height) = (view.camera.width(), view.camera.height());
     image::codecs::png::PngEncoder::new(&mut png).write_image(
         &view.rgb,
         width,

@@ -1,9 +1,7 @@
 //! The object's own frame: principal axes of its surface, with signs that turn with the object.
 
-use semfm_geom::Mesh;
-use semfm_geom::math::{DMat3, DVec3, bounds};
-
-use crate::Result;
+use crate::math::{DMat3, DVec3};
+use crate::{Error, Mesh, Result};
 
 /// Skewness (third moment over σ³) below which an axis counts as symmetric and takes its sign
 /// from the file's frame: sampling noise of mirror-symmetric meshes stays under it.
@@ -21,12 +19,12 @@ const JACOBI_SWEEPS: usize = 12;
 /// variances differ.
 ///
 /// # Errors
-/// [`semfm_geom::Error::NoArea`] where every triangle is degenerate.
-pub fn principal_frame(mesh: &Mesh) -> Result<DMat3> {
+/// [`Error::NoArea`] where every triangle is degenerate.
+pub fn principal_axes(mesh: &Mesh) -> Result<DMat3> {
     let scale = mesh.diagonal();
     let (area, centroid) = area_and_centroid(mesh);
     if !(area > 0.0 && area.is_finite() && scale.is_finite()) {
-        return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
+        return Err(Error::NoArea { n_faces: mesh.n_faces() });
     }
     // In units of the diagonal, so that neither kilometres nor micrometres leave f64's range.
     let to_unit = |p: DVec3| (p - centroid) / scale;
@@ -57,23 +55,6 @@ pub fn principal_frame(mesh: &Mesh) -> Result<DMat3> {
         let y = signed(1);
         DMat3::from_cols(y.cross(z), y, z).transpose()
     })
-}
-
-/// Positions of the vertices that some triangle uses: strays must not shrink the object's pictures.
-pub(crate) fn surface_vertices(mesh: &Mesh) -> Vec<DVec3> {
-    let mut used = vec![false; mesh.n_vertices()];
-    for &id in mesh.faces().iter().flatten() {
-        used[id as usize] = true;
-    }
-    mesh.vertices().iter().zip(used).filter_map(|(&p, used)| used.then_some(p)).collect()
-}
-
-/// Centre of the bounding box of what triangles use, and the distance from it to the farthest corner.
-pub(crate) fn surface_sphere(mesh: &Mesh) -> (DVec3, f64) {
-    let points = surface_vertices(mesh);
-    let (low, high) = bounds(&points).unwrap_or_default();
-    let centre = (low + high) / 2.0;
-    (centre, points.iter().map(|p| p.distance(centre)).fold(0.0, f64::max))
 }
 
 fn area_and_centroid(mesh: &Mesh) -> (f64, DVec3) {
@@ -160,12 +141,12 @@ mod tests {
     #[test]
     fn the_frame_turns_with_the_object() {
         let mesh = lopsided();
-        let frame = principal_frame(&mesh).unwrap();
+        let frame = principal_axes(&mesh).unwrap();
         assert!((frame.determinant() - 1.0).abs() < 1e-12);
         for (k, scale) in [1e-6, 1.0, 1e5].into_iter().enumerate() {
             let turn = DMat3::from_rotation_z(1.0 + k as f64) * DMat3::from_rotation_x(2.0);
             let turned = moved(&mesh, turn, scale, DVec3::splat(3.0 * scale));
-            let difference = principal_frame(&turned).unwrap() * turn - frame;
+            let difference = principal_axes(&turned).unwrap() * turn - frame;
             assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-9), "{difference}");
         }
     }
@@ -182,7 +163,7 @@ mod tests {
             faces.extend([[a, b, middle], [b, c, middle], [c, a, middle]]);
         }
         let finer = Mesh::new(vertices, faces).unwrap();
-        let difference = principal_frame(&finer).unwrap() - principal_frame(&mesh).unwrap();
+        let difference = principal_axes(&finer).unwrap() - principal_axes(&mesh).unwrap();
         assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-12), "{difference}");
     }
 
@@ -191,10 +172,10 @@ mod tests {
         let corners = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]];
         let faces = vec![[0, 1, 2], [0, 2, 3]];
         let plate = Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap();
-        let frame = principal_frame(&plate).unwrap();
+        let frame = principal_axes(&plate).unwrap();
         assert!((frame.row(2) - DVec3::X).length() < 1e-12);
         assert!(frame.row(0).z.abs() > 1.0 - 1e-12);
         let line = Mesh::new(vec![DVec3::ZERO, DVec3::X, 2.0 * DVec3::X], vec![[0, 1, 2]]).unwrap();
-        assert!(principal_frame(&line).unwrap_err().to_string().contains("no area"));
+        assert!(principal_axes(&line).unwrap_err().to_string().contains("no area"));
     }
 }
