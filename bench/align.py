@@ -1,7 +1,7 @@
 """Alignment of meshes to partial clouds, beside Open3D's scaled ICP and small_gicp in the same run.
 
     pip install numpy open3d==0.20.0 small_gicp==1.0.1
-    cargo build --release -p semfm-grasp --example bench_align
+    cargo build --release -p semfm-align --example bench_align
     python bench/align.py DATA target/release/examples/bench_align [--objects train|test|all]
 
 DATA is a folder with `ycb/NAME/textured.obj` and `objects/CATEGORY/NAME.obj`. Each object is put at a

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, ImageBuffer, Luma};
+use semfm::align::Sim3;
 use semfm::aligned::read_aligned;
 use semfm::geom::io::{read_points, write_mesh};
 use semfm::geom::math::{DAffine3, DMat3, DQuat, DVec3};
 use semfm::geom::{Intrinsics, Pinhole};
-use semfm::grasp::align::Sim3;
 use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Task};
 use semfm_synth::{Category, ObjectSettings, make_object};

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use semfm::Region;
+use semfm::align::Sim3;
 use semfm::geom::io::write_mesh;
 use semfm::geom::math::{DQuat, DVec3};
-use semfm::grasp::align::Sim3;
 use semfm::region_file::write_region;
 use semfm::views::mcap::{POSES_TOPIC, inspect};
 use semfm_synth::{Category, ObjectSettings, make_object};

@@ -11,7 +11,9 @@ use std::time::Instant;
 use semfm_geom::Task;
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
-use semfm_grasp::{BoxHand, GraspObject, GraspSettings, Hand, Scene, find_grasps_with};
+use semfm_grasp::{
+    BoxGripper, GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with,
+};
 
 #[allow(clippy::print_stdout)] // The numbers are what this program is for.
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
@@ -51,7 +53,7 @@ fn bench(
     let start = Instant::now();
     let object = GraspObject::from_mesh(&mesh, 1.0)?;
     let prepared = start.elapsed().as_secs_f64();
-    let hand = Hand::of_boxes(&BoxHand::default())?;
+    let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let mut regions = vec![("whole", vec![1.0; mesh.n_vertices()])];
     if let Some(radius) = small {
         regions.push(("small", far_patch(mesh.vertices(), object.centre_of_mass(), radius)));

@@ -15,10 +15,10 @@ use semfm_geom::io::read_mesh;
 use semfm_geom::math::{DMat3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, SurfaceIndex, Task};
-use semfm_grasp::select::hand_distance;
+use semfm_grasp::select::gripper_distance;
 use semfm_grasp::{
-    BoxHand, Grasp, GraspObject, GraspSettings, Hand, Scene, Separation, examine_poses,
-    find_grasps_with,
+    BoxGripper, Grasp, GraspObject, GraspSettings, GripperGeometry, Scene, Separation,
+    examine_poses, find_grasps_with,
 };
 
 const APPROACHES: usize = 24;
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Box<dyn Error>> {
     let mesh = read_mesh(path)?.mesh;
     let object = GraspObject::from_mesh(&mesh, 1.0)?;
-    let hand = Hand::of_boxes(&BoxHand::default())?;
+    let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let (region, scene) = (vec![1.0; mesh.n_vertices()], Scene::new());
     let poses = dense_poses(&mesh, &hand, points)?;
     let good: Vec<Grasp> = examine_poses(&object, &region, &hand, &scene, settings, &poses)?
@@ -89,7 +89,7 @@ fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Bo
 
 fn share(good: &[Grasp], found: &[Grasp]) -> f64 {
     let near = |a: &Pose, b: &Pose| {
-        let (translation, rotation) = hand_distance(a, b);
+        let (translation, rotation) = gripper_distance(a, b);
         translation <= NEAR.0 && rotation <= NEAR.1.to_radians()
     };
     let hit = |g: &&Grasp| found.iter().any(|f| near(&g.object_from_tcp, &f.object_from_tcp));
@@ -99,7 +99,7 @@ fn share(good: &[Grasp], found: &[Grasp]) -> f64 {
 /// Hands whose pads lie at a surface point and at the next surface behind it.
 fn dense_poses(
     mesh: &Mesh,
-    hand: &Hand,
+    hand: &GripperGeometry,
     points: usize,
 ) -> Result<Vec<(Pose, f64)>, Box<dyn Error>> {
     let surface = SurfaceIndex::new(mesh)?;

@@ -14,7 +14,7 @@ use rand::{Rng, RngExt};
 use semfm_geom::math::{DQuat, DVec3};
 
 use crate::candidate::{Candidate, rotation};
-use crate::hand::Hand;
+use crate::gripper_geometry::GripperGeometry;
 use crate::object::{GraspObject, Seed, Surface};
 
 /// Rays from each seed: one along the normal, the rest inside the friction cone.
@@ -36,7 +36,7 @@ const SAME_SURFACE: f64 = 1e-5;
 /// only, for a cloud has no surface for a ray to hit.
 pub(crate) fn antipodal(
     object: &GraspObject,
-    hand: &Hand,
+    hand: &GripperGeometry,
     seed: &Seed,
     friction: f64,
     rng: &mut impl Rng,
@@ -80,7 +80,7 @@ fn opposes(normal: DVec3, direction: DVec3, object: &GraspObject, least_cosine: 
 
 /// One candidate for each approach about the line from `point` to `point + t · closing`.
 fn pair(
-    hand: &Hand,
+    hand: &GripperGeometry,
     point: DVec3,
     closing: DVec3,
     t: f64,
@@ -113,7 +113,7 @@ fn in_cone(axis: DVec3, friction: f64, rng: &mut impl Rng) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::BoxHand;
+    use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
     use crate::test_shapes::cylinder;
     use rand::SeedableRng;
@@ -124,7 +124,7 @@ mod tests {
     fn pairs_on_a_cylinder_span_it_inside_both_cones() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.1, 128), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut candidates = Vec::new();
         for _ in 0..50 {
@@ -150,7 +150,7 @@ mod tests {
         let object = GraspObject::from_mesh(&mesh, 0.03).unwrap();
         assert!(!object.is_signed());
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut candidates = Vec::new();
         for _ in 0..20 {

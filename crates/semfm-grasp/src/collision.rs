@@ -4,14 +4,14 @@ use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
 
 use crate::contact::{Closing, TOUCH_GAP};
-use crate::gripper::Role;
-use crate::hand::{Hand, PosedHand};
+use crate::gripper_geometry::{GripperGeometry, PosedGripper};
 use crate::object::GraspObject;
 use crate::obstacle::Obstacle;
 use crate::rejection::Reason;
 use crate::scene::Scene;
 use crate::settings::GraspSettings;
 use crate::solid::Solid;
+use semfm_robot::gripper::Role;
 
 /// The hand keeps at least this away from everything but at its pads, metres.
 const MARGIN: f64 = TOUCH_GAP / 2.0;
@@ -45,7 +45,7 @@ pub(crate) struct Fit {
 pub(crate) struct Collision<'a> {
     object: &'a GraspObject,
     scene: &'a Scene,
-    hand: &'a Hand,
+    hand: &'a GripperGeometry,
     settings: &'a GraspSettings,
 }
 
@@ -53,7 +53,7 @@ impl<'a> Collision<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
         scene: &'a Scene,
-        hand: &'a Hand,
+        hand: &'a GripperGeometry,
         settings: &'a GraspSettings,
     ) -> Self {
         Self { object, scene, hand, settings }
@@ -93,7 +93,7 @@ impl<'a> Collision<'a> {
     fn fit_open(
         &self,
         closing: &Closing,
-        open: &PosedHand<'a>,
+        open: &PosedGripper<'a>,
         opening: f64,
     ) -> Result<(f64, f64), (Reason, f64)> {
         let tcp = &closing.tcp;
@@ -113,7 +113,7 @@ impl<'a> Collision<'a> {
     }
 
     /// The open hand from `retreat` behind the grasp up to it.
-    fn way_in(&self, open: &PosedHand<'_>, tcp: &Pose) -> Result<(), Reason> {
+    fn way_in(&self, open: &PosedGripper<'_>, tcp: &Pose) -> Result<(), Reason> {
         let behind = *tcp * Pose::from_translation(-DVec3::Z * self.settings.retreat);
         for (_, shape, pose) in open.pieces() {
             let at = *tcp * *pose;
@@ -170,7 +170,7 @@ impl<'a> Collision<'a> {
     }
 
     /// Nothing was touched, so each piece is wholly inside or wholly outside of anything closed.
-    fn inside(&self, open: &PosedHand<'_>, tcp: &Pose) -> bool {
+    fn inside(&self, open: &PosedGripper<'_>, tcp: &Pose) -> bool {
         let encloses = |obstacle: &Obstacle, p| obstacle.encloses(p);
         open.pieces().any(|(_, shape, pose)| {
             let centre = shape.at(&(*tcp * *pose)).centre();
@@ -181,7 +181,7 @@ impl<'a> Collision<'a> {
 
     /// Distance of the open hand at the grasp to object, scene and table, at most [`FAR`] or the
     /// asked clearance.
-    fn clearance(&self, open: &PosedHand<'_>, tcp: &Pose) -> f64 {
+    fn clearance(&self, open: &PosedGripper<'_>, tcp: &Pose) -> f64 {
         let mut least = FAR.max(self.settings.limits.clearance);
         for (_, shape, pose) in open.pieces() {
             let solid = shape.at(&(*tcp * *pose));
@@ -223,12 +223,12 @@ impl<'a> Collision<'a> {
         [Some(widest), (fitted < widest - SLACK).then_some(fitted)].into_iter().flatten()
     }
 
-    fn open(&self, opening: f64, closed: &PosedHand<'a>) -> PosedHand<'a> {
+    fn open(&self, opening: f64, closed: &PosedGripper<'a>) -> PosedGripper<'a> {
         self.hand.at(opening).with_palm_of(closed)
     }
 
     /// How much deeper than allowed the hand is in the table, at the grasp or behind it.
-    fn below_table(&self, hand: &PosedHand<'_>, tcp: &Pose) -> f64 {
+    fn below_table(&self, hand: &PosedGripper<'_>, tcp: &Pose) -> f64 {
         let Some(table) = self.scene.table() else { return f64::NEG_INFINITY };
         let lowest = hand
             .pieces()
@@ -245,7 +245,11 @@ impl<'a> Collision<'a> {
 }
 
 /// Whether each piece is half-way between its ends, unturned, when the hand is half open.
-fn moves_straight(open: &PosedHand<'_>, middle: &PosedHand<'_>, closed: &PosedHand<'_>) -> bool {
+fn moves_straight(
+    open: &PosedGripper<'_>,
+    middle: &PosedGripper<'_>,
+    closed: &PosedGripper<'_>,
+) -> bool {
     let ends = open.pieces().zip(closed.pieces());
     middle.pieces().zip(ends).all(|((_, _, m), ((_, _, a), (_, _, b)))| {
         let halfway = a.translation.midpoint(b.translation).distance(m.translation) < 1e-9;
@@ -256,7 +260,7 @@ fn moves_straight(open: &PosedHand<'_>, middle: &PosedHand<'_>, closed: &PosedHa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::BoxHand;
+    use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
     use crate::test_shapes::{cuboid, joined, moved};
     use semfm_geom::Mesh;
@@ -265,7 +269,7 @@ mod tests {
         let settings = GraspSettings::default();
         let object = GraspObject::from_mesh(mesh, 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let closing =
             crate::contact::close(&object, &region, &hand, tcp, [-0.015, 0.015], 1.5e-3).unwrap();
         let collision = Collision::new(&object, scene, &hand, &settings);

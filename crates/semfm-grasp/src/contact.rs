@@ -6,7 +6,7 @@ use parry3d_f64::shape::Triangle;
 use semfm_geom::math::{DMat3, DVec3};
 
 use crate::clip::Polygon;
-use crate::hand::Hand;
+use crate::gripper_geometry::GripperGeometry;
 use crate::object::{GraspObject, Region, Surface};
 use crate::solid::Solid;
 
@@ -63,7 +63,7 @@ struct Piece {
 pub(crate) fn close(
     object: &GraspObject,
     region: &Region,
-    hand: &Hand,
+    hand: &GripperGeometry,
     tcp: &Pose,
     seed: [f64; 2],
     compliance: f64,
@@ -307,12 +307,12 @@ impl Gathered {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::BoxHand;
+    use crate::gripper_geometry::BoxGripper;
     use crate::test_shapes::{cuboid, cylinder, joined, moved};
 
     fn closing(object: &GraspObject, tcp: &Pose, half: f64) -> Option<Closing> {
         let region = Region::new(object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         close(object, &region, &hand, tcp, [-half, half], 1.5e-3)
     }
 

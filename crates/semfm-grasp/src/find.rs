@@ -9,14 +9,14 @@ use semfm_geom::Task;
 use crate::Result;
 use crate::candidate::Candidate;
 use crate::grasp::Grasp;
-use crate::gripper::Gripper;
-use crate::hand::Hand;
+use crate::gripper_geometry::GripperGeometry;
 use crate::object::{GraspObject, Region};
 use crate::rejection::{Miss, Rejected};
 use crate::scene::Scene;
 use crate::search::{Found, Search};
 use crate::select::diverse;
 use crate::settings::GraspSettings;
+use semfm_robot::Gripper;
 
 /// Grasps of one region by one hand in one scene, and what became of the other candidates.
 #[derive(Clone, Debug)]
@@ -55,20 +55,20 @@ pub fn find_grasps(
     settings: &GraspSettings,
     task: &Task,
 ) -> Result<Grasps> {
-    find_grasps_with(object, region, &Hand::new(gripper)?, scene, settings, task)
+    find_grasps_with(object, region, &GripperGeometry::new(gripper)?, scene, settings, task)
 }
 
 /// [`find_grasps`] with a hand that was prepared before.
 ///
 /// ```
 /// use semfm_geom::{Mesh, Task, math::DVec3};
-/// use semfm_grasp::{BoxHand, GraspObject, GraspSettings, Hand, Scene, find_grasps_with};
+/// use semfm_grasp::{BoxGripper, GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with};
 /// // A plate of 10 × 10 × 1 cm on a table.
 /// let corner = |i: usize| DVec3::new((i & 1) as f64 * 0.1, (i >> 1 & 1) as f64 * 0.1, (i >> 2) as f64 * 0.01);
 /// let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 /// let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
 /// let plate = GraspObject::from_mesh(&Mesh::new((0..8).map(corner).collect(), faces)?, 1.0)?;
-/// let hand = Hand::of_boxes(&BoxHand::default())?;
+/// let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
 /// let settings = GraspSettings { n_samples: 200, ..GraspSettings::default() };
 /// let whole = vec![1.0; plate.n_weights()];
 /// let found = find_grasps_with(&plate, &whole, &hand, &Scene::new(), &settings, &Task::default())?;
@@ -81,7 +81,7 @@ pub fn find_grasps(
 pub fn find_grasps_with(
     object: &GraspObject,
     region: &[f64],
-    hand: &Hand,
+    hand: &GripperGeometry,
     scene: &Scene,
     settings: &GraspSettings,
     task: &Task,
@@ -124,7 +124,7 @@ pub fn find_grasps_with(
 pub fn examine_poses(
     object: &GraspObject,
     region: &[f64],
-    hand: &Hand,
+    hand: &GripperGeometry,
     scene: &Scene,
     settings: &GraspSettings,
     poses: &[(Pose, f64)],

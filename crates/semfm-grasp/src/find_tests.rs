@@ -7,16 +7,16 @@ use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, Task, zoo};
 
 use crate::find::{Grasps, examine_poses, find_grasps_with};
-use crate::hand::{BoxHand, Hand};
+use crate::gripper_geometry::{BoxGripper, GripperGeometry};
 use crate::object::GraspObject;
 use crate::rejection::Reason;
 use crate::scene::Scene;
-use crate::select::hand_distance;
+use crate::select::gripper_distance;
 use crate::settings::{ApproachCone, GraspSettings};
 use crate::test_shapes::{cuboid, cylinder, joined, moved};
 
-fn hand() -> Hand {
-    Hand::of_boxes(&BoxHand::default()).unwrap()
+fn hand() -> GripperGeometry {
+    GripperGeometry::from_boxes(&BoxGripper::default()).unwrap()
 }
 
 fn few(n_samples: usize) -> GraspSettings {
@@ -233,7 +233,7 @@ proptest! {
             if let (Ok(here), Ok(there)) = (here, there) {
                 good += 1;
                 let expected = motion * here.object_from_tcp;
-                let (translation, rotation) = hand_distance(&expected, &there.object_from_tcp);
+                let (translation, rotation) = gripper_distance(&expected, &there.object_from_tcp);
                 prop_assert!(translation < 1e-7 && rotation < 1e-6);
                 prop_assert!((here.width - there.width).abs() < 1e-9);
                 prop_assert!((here.score - there.score).abs() < 1e-3);

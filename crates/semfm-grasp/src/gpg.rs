@@ -14,7 +14,7 @@ use parry3d_f64::math::{Pose, Rotation};
 use semfm_geom::math::{DMat3, DQuat, DVec3};
 
 use crate::candidate::{Candidate, rotation};
-use crate::hand::{Hand, HandReach};
+use crate::gripper_geometry::{GripperExtents, GripperGeometry};
 use crate::object::{GraspObject, Seed};
 
 /// Turns about the approach axis, over half a turn: the hand is symmetric.
@@ -47,7 +47,7 @@ const PUSH_GAP: f64 = 2e-3;
 /// Reusable memory, and what all seeds share.
 pub(crate) struct Gpg<'a> {
     object: &'a GraspObject,
-    hand: &'a Hand,
+    hand: &'a GripperGeometry,
     /// Cosine of the widest angle that sampled normals and closing axis may have.
     least_cosine: f64,
     /// Samples near the seed, from the seed, with their normals.
@@ -59,7 +59,7 @@ pub(crate) struct Gpg<'a> {
 }
 
 impl<'a> Gpg<'a> {
-    pub(crate) fn new(object: &'a GraspObject, hand: &'a Hand, friction: f64) -> Self {
+    pub(crate) fn new(object: &'a GraspObject, hand: &'a GripperGeometry, friction: f64) -> Self {
         let least_cosine = (friction.atan() + NORMAL_SLACK).cos();
         let (points, slab, first) = (Vec::new(), Vec::new(), Vec::new());
         Self { object, hand, least_cosine, points, slab, first }
@@ -184,7 +184,7 @@ impl<'a> Gpg<'a> {
         Some(([low, high], faces(low) && faces(high)))
     }
 
-    fn gather(&mut self, turn: &Rotation, span: f64, reach: HandReach) {
+    fn gather(&mut self, turn: &Rotation, span: f64, reach: GripperExtents) {
         self.slab.clear();
         self.first.clear();
         self.first.resize((2.0 * span / BIN) as usize + 2, f64::INFINITY);
@@ -207,7 +207,7 @@ impl<'a> Gpg<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand::BoxHand;
+    use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
     use crate::test_shapes::cylinder;
     use rand::SeedableRng;
@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn the_frame_on_a_cylinder_knows_normal_and_axis() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let gpg = Gpg::new(&object, &hand, 0.5);
         let seed = Seed { point: DVec3::X * 0.02, normal: DVec3::X, item: 0 };
         let (normal, axis) = gpg.darboux(&seed).unwrap();
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn hands_are_pushed_until_they_hold_the_cylinder() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut candidates = Vec::new();

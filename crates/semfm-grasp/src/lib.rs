@@ -1,11 +1,9 @@
-//! Parallel-jaw grasps inside a region of a mesh or a point cloud, and the pose and scale of a
-//! reconstruction in what a camera sees.
+//! Parallel-jaw grasps inside a region of a mesh or a point cloud.
 //!
-//! A [`Gripper`] comes from a URDF or from a built-in parameter set. Frames, once and for all: a
-//! gripper's own frame (TCP) has its origin between the finger pads, +z along the approach and y
-//! along the closing direction; lengths are metres.
+//! A [`Gripper`](semfm_robot::Gripper) comes from a URDF or from a built-in parameter set. Its
+//! frame (TCP) has its origin between the finger pads, +z along the approach and y along the
+//! closing direction; lengths are metres.
 
-pub mod align;
 mod antipodal;
 mod candidate;
 mod clip;
@@ -18,8 +16,7 @@ pub mod find;
 mod find_tests;
 mod gpg;
 pub mod grasp;
-pub mod gripper;
-pub mod hand;
+pub mod gripper_geometry;
 pub mod object;
 mod obstacle;
 mod pose_grid;
@@ -33,17 +30,15 @@ mod solid;
 mod spread;
 #[cfg(test)]
 mod test_shapes;
-pub mod urdf;
 mod wrench_hull;
 
 pub use error::{Error, Result};
 pub use find::{Grasps, examine_poses, find_grasps, find_grasps_with};
 pub use grasp::Grasp;
-pub use gripper::Gripper;
-pub use hand::{BoxHand, Hand};
+pub use gripper_geometry::{BoxGripper, GripperGeometry};
 pub use object::GraspObject;
-/// A rotation and a translation, metres: the pose type of the whole crate.
-pub use parry3d_f64::math::Pose;
 pub use rejection::{Miss, Reason, Rejected};
 pub use scene::Scene;
+/// A rotation and a translation, metres: the pose type of the whole crate.
+pub use semfm_robot::Pose;
 pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation};

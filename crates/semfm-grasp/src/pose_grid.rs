@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
 
-use crate::select::hand_distance;
+use crate::select::gripper_distance;
 use crate::settings::Separation;
 
 /// A set of hand poses under a grid of cells as wide as the separation.
@@ -29,7 +29,7 @@ impl PoseGrid {
         let Separation { translation, rotation } = self.separation;
         let near = |other: &Pose| {
             other.translation.distance_squared(pose.translation) < translation * translation
-                && hand_distance(other, pose).1 < rotation
+                && gripper_distance(other, pose).1 < rotation
         };
         let middle = self.cell(pose.translation);
         (0..27).any(|k| {
@@ -63,7 +63,7 @@ mod tests {
         let mut found = 0;
         for query in (1000..1400).map(pose) {
             let near = (0..300).any(|i| {
-                let (translation, rotation) = hand_distance(&pose(i), &query);
+                let (translation, rotation) = gripper_distance(&pose(i), &query);
                 translation < separation.translation && rotation < separation.rotation
             });
             assert_eq!(grid.has_near(&query), near);

@@ -5,7 +5,7 @@ use semfm_geom::math::DVec3;
 use crate::closure::{SoftContact, ferrari_canny};
 use crate::collision::{FAR, Fit};
 use crate::contact::Closing;
-use crate::hand::Hand;
+use crate::gripper_geometry::GripperGeometry;
 use crate::object::GraspObject;
 use crate::settings::GraspSettings;
 
@@ -46,7 +46,7 @@ pub(crate) struct Score {
 impl<'a> Scorer<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
-        hand: &Hand,
+        hand: &GripperGeometry,
         settings: &'a GraspSettings,
         down: Option<DVec3>,
     ) -> Self {
@@ -127,7 +127,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use crate::contact::close;
-    use crate::hand::BoxHand;
+    use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
     use crate::test_shapes::cuboid;
     use parry3d_f64::math::Pose;
@@ -136,7 +136,7 @@ mod tests {
     fn the_middle_of_a_bar_is_best_and_each_term_tells_why() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::new(0.2, 0.03, 0.03)), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let settings = GraspSettings::default();
         let scorer = Scorer::new(&object, &hand, &settings, Some(DVec3::NEG_Z));
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 0.02 };
@@ -165,7 +165,7 @@ mod tests {
     fn the_demonstrated_approach_counts_where_it_is_given() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::splat(0.03)), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = Hand::of_boxes(&BoxHand::default()).unwrap();
+        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let closing =
             close(&object, &region, &hand, &Pose::IDENTITY, [-0.015, 0.015], 1.5e-3).unwrap();
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 1.0 };

@@ -19,7 +19,7 @@ use crate::collision::{Collision, Fit};
 use crate::contact::{Closing, TOUCH_GAP, close};
 use crate::gpg::Gpg;
 use crate::grasp::Grasp;
-use crate::hand::Hand;
+use crate::gripper_geometry::GripperGeometry;
 use crate::object::{GraspObject, Region, Surface};
 use crate::rejection::{Miss, Reason, Rejected};
 use crate::scene::Scene;
@@ -60,7 +60,7 @@ pub(crate) struct Near {
 pub(crate) struct Search<'a> {
     object: &'a GraspObject,
     region: &'a Region,
-    hand: &'a Hand,
+    hand: &'a GripperGeometry,
     settings: &'a GraspSettings,
     collision: Collision<'a>,
     scorer: Scorer<'a>,
@@ -70,7 +70,7 @@ impl<'a> Search<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
         region: &'a Region,
-        hand: &'a Hand,
+        hand: &'a GripperGeometry,
         scene: &'a Scene,
         settings: &'a GraspSettings,
     ) -> Self {

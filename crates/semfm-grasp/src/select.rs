@@ -12,7 +12,7 @@ const HALF_TURN: DQuat = DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0);
 
 /// Distance between the TCPs (metres) and the angle between the hands (radians), a hand and the same
 /// hand with its fingers exchanged being one.
-pub fn hand_distance(a: &Pose, b: &Pose) -> (f64, f64) {
+pub fn gripper_distance(a: &Pose, b: &Pose) -> (f64, f64) {
     let turn = a.rotation.inverse() * b.rotation;
     let angle = |q: DQuat| 2.0 * q.xyz().length().atan2(q.w.abs());
     (a.translation.distance(b.translation), angle(turn).min(angle(HALF_TURN * turn)))
@@ -41,7 +41,7 @@ pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f6
         return grasps;
     }
     let apart = |a: &Grasp, b: &Grasp| {
-        let (translation, rotation) = hand_distance(&a.object_from_tcp, &b.object_from_tcp);
+        let (translation, rotation) = gripper_distance(&a.object_from_tcp, &b.object_from_tcp);
         ((translation / radius).min(1.0) + rotation / std::f64::consts::PI) / 2.0
     };
     let mut distance = vec![1.0; grasps.len()];
@@ -81,12 +81,12 @@ mod tests {
     #[test]
     fn exchanged_fingers_are_the_same_hand() {
         let (a, b) = (grasp(0.0, 0.1, 1.0), grasp(0.003, 0.1 + std::f64::consts::PI, 1.0));
-        let (translation, rotation) = hand_distance(&a.object_from_tcp, &b.object_from_tcp);
+        let (translation, rotation) = gripper_distance(&a.object_from_tcp, &b.object_from_tcp);
         assert!((translation - 0.003).abs() < 1e-12 && rotation < 1e-7, "{rotation}");
         let c = grasp(0.0, 0.6, 1.0);
-        assert!((hand_distance(&a.object_from_tcp, &c.object_from_tcp).1 - 0.5).abs() < 1e-12);
+        assert!((gripper_distance(&a.object_from_tcp, &c.object_from_tcp).1 - 0.5).abs() < 1e-12);
         let upside_down = Pose::new(DVec3::ZERO, DVec3::X * std::f64::consts::PI);
-        let (_, turned) = hand_distance(&Pose::IDENTITY, &upside_down);
+        let (_, turned) = gripper_distance(&Pose::IDENTITY, &upside_down);
         assert!((turned - std::f64::consts::PI).abs() < 1e-9);
     }
 

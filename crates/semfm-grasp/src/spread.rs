@@ -56,7 +56,7 @@ fn turned(angle: f64, axis: DVec3) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::select::hand_distance;
+    use crate::select::gripper_distance;
 
     #[test]
     fn neighbours_keep_their_distance_from_all() {
@@ -78,7 +78,8 @@ mod tests {
         assert!(found.len() < 20);
         for candidate in &found {
             for other in &two {
-                let (translation, rotation) = hand_distance(&other.object_from_tcp, &candidate.tcp);
+                let (translation, rotation) =
+                    gripper_distance(&other.object_from_tcp, &candidate.tcp);
                 assert!(translation >= 0.01 || rotation >= 0.25);
             }
         }

@@ -1,8 +1,8 @@
 //! `align`: the pose and scale of an object in what a camera sees.
 
 use pyo3::prelude::*;
-use semfm::grasp::align::Alignment as Found;
-use semfm::grasp::align::{self, AlignSettings, Observation, Sim3};
+use semfm::align::Alignment as Found;
+use semfm::align::{self, AlignSettings, Observation, Sim3};
 
 use crate::arrays::{self, Axis};
 use crate::held::Held;

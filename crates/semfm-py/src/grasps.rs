@@ -418,7 +418,7 @@ fn rigid(value: &Bound<'_, PyAny>) -> PyResult<Pose> {
     let name = "camera_from_object";
     let (numbers, _) = arrays::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
     let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
-    let sim3 = grasp::align::Sim3::from_rows(rows)
+    let sim3 = semfm::align::Sim3::from_rows(rows)
         .map_err(|error| errors::raise(value.py(), &error.into()))?;
     if (sim3.scale - 1.0).abs() > 1e-3 {
         let found = format!("a scale of {}", sim3.scale);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use semfm::grasp::{self, Pose, gripper::GripperSettings};
+use semfm::robot::{self, Pose, gripper::GripperSettings};
 
 use crate::held::Held;
 use crate::lend;
@@ -30,7 +30,7 @@ use crate::work::run;
 /// {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
 #[pyclass(frozen, module = "semfm")]
 pub struct Gripper {
-    pub held: Held<grasp::Gripper>,
+    pub held: Held<robot::Gripper>,
     source: PathBuf,
     packages: Vec<(String, PathBuf)>,
 }
@@ -54,7 +54,7 @@ impl Gripper {
         let (source, folders) = (name_or_path.clone(), packages.iter().cloned().collect());
         let gripper = run(py, None, move |_| {
             let settings = GripperSettings { packages: folders, ..Default::default() };
-            Ok(grasp::Gripper::open(&name_or_path.to_string_lossy(), &settings)?)
+            Ok(robot::Gripper::open(&name_or_path.to_string_lossy(), &settings)?)
         })?;
         Ok(Self { held: Held::new(gripper), source, packages })
     }

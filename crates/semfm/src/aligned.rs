@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use semfm_align::{AlignSettings, Alignment, Sim3, Verdict};
 use semfm_geom::Mesh;
-use semfm_grasp::align::{AlignSettings, Alignment, Sim3, Verdict};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -118,7 +118,7 @@ pub fn read_pose(path: &Path) -> Result<Sim3> {
 
 fn similarity(path: &Path, place: &str, rows: [[f64; 4]; 4]) -> Result<Sim3> {
     Sim3::from_rows(rows).map_err(|error| match error {
-        semfm_grasp::Error::OutOfRange { expected, found, .. } => {
+        semfm_align::Error::OutOfRange { expected, found, .. } => {
             fault(path, place, expected, found)
         }
         other => other.into(),

@@ -18,9 +18,15 @@ pub enum Error {
     /// Maps and regions.
     #[error(transparent)]
     Fmap(#[from] semfm_fmap::Error),
-    /// Grippers, robot descriptions, grasps and alignment.
+    /// Robot descriptions and grippers.
+    #[error(transparent)]
+    Robot(#[from] semfm_robot::Error),
+    /// Grasps.
     #[error(transparent)]
     Grasp(#[from] semfm_grasp::Error),
+    /// The pose of a model in what a camera sees.
+    #[error(transparent)]
+    Align(#[from] semfm_align::Error),
     /// An argument outside what it may be.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
@@ -60,7 +66,9 @@ impl Error {
             Self::Geom(cause) => cause.code(),
             Self::Views(cause) => cause.code(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.code(),
+            Self::Robot(cause) => cause.code(),
             Self::Grasp(cause) => cause.code(),
+            Self::Align(cause) => cause.code(),
             Self::Fmap(_) | Self::Invalid { .. } => "invalid",
             Self::Format { .. } => "format",
         }
@@ -72,7 +80,9 @@ impl Error {
             Self::Geom(cause) => cause.place(),
             Self::Views(cause) => cause.place(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.place(),
+            Self::Robot(cause) => cause.place(),
             Self::Grasp(cause) => cause.place(),
+            Self::Align(cause) => cause.place(),
             Self::Fmap(_) => None,
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format { place, .. } => Some(place.clone()),

@@ -26,9 +26,11 @@
 //! # Ok::<(), semfm::Error>(())
 //! ```
 
+pub use semfm_align as align;
 pub use semfm_fmap as fmap;
 pub use semfm_geom as geom;
 pub use semfm_grasp as grasp;
+pub use semfm_robot as robot;
 pub use semfm_views as views;
 
 pub mod aligned;

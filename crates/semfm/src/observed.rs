@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::DynamicImage;
-use semfm_grasp::align::{DepthImage, Intrinsics};
+use semfm_align::{DepthImage, Intrinsics};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -106,9 +106,9 @@ fn picture(path: &Path) -> Result<DynamicImage> {
 }
 
 /// An error about the contents, with the file's name.
-fn within(path: &Path, error: semfm_grasp::Error) -> crate::Error {
+fn within(path: &Path, error: semfm_align::Error) -> crate::Error {
     match error {
-        semfm_grasp::Error::OutOfRange { what, expected, found } => {
+        semfm_align::Error::OutOfRange { what, expected, found } => {
             fault(path, what, expected, found)
         }
         other => other.into(),

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
+use semfm::align::{AlignSettings, Alignment, Observation, Verdict, align};
 use semfm::aligned::{aligned_json, read_pose, write_aligned};
 use semfm::geom::io::read_points;
 use semfm::geom::math::DVec3;
-use semfm::grasp::align::{AlignSettings, Alignment, Observation, Verdict, align};
 use semfm::observed::{read_depth, read_intrinsics, read_mask};
 
 use super::Outcome;

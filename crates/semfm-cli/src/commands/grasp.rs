@@ -7,13 +7,11 @@ use clap::{Args, ValueEnum};
 use semfm::Mesh;
 use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
-use semfm::grasp::gripper::GripperSettings;
-use semfm::grasp::{
-    ApproachCone, GraspObject, GraspSettings, Grasps, Gripper, Pose, Scene, find_grasps,
-};
+use semfm::grasp::{ApproachCone, GraspObject, GraspSettings, Grasps, Pose, Scene, find_grasps};
 use semfm::grasps::{GraspAnswer, write_grasps, write_isaac, write_ros2};
 use semfm::picture::write_grasp_picture;
 use semfm::region_file::read_region;
+use semfm::robot::gripper::{Gripper, GripperSettings};
 use semfm::{Task, aligned::read_aligned};
 use serde_json::{Map, Value, json};
 

@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{MeshFormat, read_mesh};
-use semfm::grasp::urdf::{Description, MeshPaths, MeshPlace};
+use semfm::robot::urdf::{Description, MeshPaths, MeshPlace};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
-use semfm_grasp::gripper::{Part, Role};
-use semfm_grasp::{Grasp, Gripper};
+use semfm_grasp::Grasp;
+use semfm_robot::gripper::{Gripper, GripperPart, Role};
 use serde_json::{Map, Value, json};
 
 use super::{GraspAnswer, position_and_rotation};
@@ -110,7 +110,7 @@ fn gripper_json(gripper: &Gripper) -> Value {
 }
 
 /// A part as the convex hulls of point sets, in its own frame.
-fn part_json(part: &Part) -> Value {
+fn part_json(part: &GripperPart) -> Value {
     let role = match part.role {
         Role::Palm => "palm",
         Role::Left => "left",

@@ -12,7 +12,8 @@ mod ros2;
 use parry3d_f64::math::Pose;
 use semfm_geom::Mesh;
 use semfm_geom::math::{DQuat, DVec3};
-use semfm_grasp::{Grasps, Gripper};
+use semfm_grasp::Grasps;
+use semfm_robot::Gripper;
 
 pub use isaac::write_isaac;
 pub use json::{FORMAT, grasps_json, write_grasps};

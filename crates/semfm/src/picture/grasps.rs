@@ -8,7 +8,8 @@ use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
-use semfm_grasp::{Grasp, Gripper};
+use semfm_grasp::Grasp;
+use semfm_robot::Gripper;
 use semfm_views::{Paint, RenderSettings, View, render};
 
 use super::sheet::{Entry, Row, Sheet};

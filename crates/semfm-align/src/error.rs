@@ -1,0 +1,41 @@
+//! What can go wrong between a mesh and the pose of it that a camera sees.
+
+/// Result of a call of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Every way in which a model, an observation or the settings can fail to be what they should.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number outside its allowed range.
+    #[error("{what}: expected {expected}, found {found}")]
+    OutOfRange {
+        /// Name of the argument.
+        what: &'static str,
+        /// The allowed range, in words.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// The mesh cannot be used, or the task was cancelled.
+    #[error(transparent)]
+    Geom(#[from] semfm_geom::Error),
+}
+
+impl Error {
+    /// A stable name for the kind of failure, for scripts.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::OutOfRange { .. } => "out-of-range",
+            Self::Geom(cause) => cause.code(),
+        }
+    }
+
+    /// Where it went wrong; `None` where the failure has no place.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::OutOfRange { what, .. } => Some((*what).into()),
+            Self::Geom(cause) => cause.place(),
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The reconstruction, made ready to be found: measured in its own radius, sampled, indexed.
+
+use rayon::prelude::*;
+use semfm_geom::math::DVec3;
+use semfm_geom::sampling::sample_uniform;
+use semfm_geom::{Mesh, SurfaceIndex, Task};
+
+use crate::Result;
+use crate::field::{NearestField, Sample};
+use crate::sim3::Sim3;
+use crate::starts::rotations;
+
+/// Samples of the surface, uniform by area: about 3 % of the diagonal apart on a round object.
+const N_SAMPLES: usize = 2000;
+
+/// How far the tables of nearest samples reach beyond the object, in its radii.
+const REACH: f64 = 0.4;
+
+/// Rays that ask which way the triangles face.
+const N_RAYS: usize = 128;
+
+/// From this share of rays on that meet a front (or a back), the winding is believed.
+const WOUND: f64 = 0.9;
+
+/// A mesh that observations are aligned to: built once, asked often.
+///
+/// Inside, lengths are radii of the object from the centre of its bounding box, so that any frame
+/// and any unit will do. Triangles may be wound outward, inward or anyhow; the last costs the
+/// distinction between the two sides of a thin wall.
+pub struct AlignModel {
+    /// Mesh frame from the inner one.
+    pub(crate) object_from_unit: Sim3,
+    pub(crate) surface: SurfaceIndex,
+    /// Unit normals of the triangles, outward; zero for a degenerate triangle.
+    pub(crate) normals: Vec<DVec3>,
+    /// Whether the sign of a normal says nothing.
+    pub(crate) both_sides: bool,
+    pub(crate) samples: Vec<Sample>,
+    pub(crate) field: NearestField,
+}
+
+impl AlignModel {
+    /// Prepares a mesh (about 15 ms for 16 000 triangles).
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::NoArea`] for a mesh without area, [`semfm_geom::Error::Cancelled`].
+    pub fn new(mesh: &Mesh, seed: u64, task: &Task) -> Result<Self> {
+        task.check()?;
+        let (centre, radius) = mesh.bounding_sphere();
+        if radius <= 0.0 || mesh.area() <= 0.0 {
+            return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
+        }
+        let points = mesh.vertices().iter().map(|&p| (p - centre) / radius).collect();
+        let unit = Mesh::new(points, mesh.faces().to_vec())?;
+        let surface = SurfaceIndex::new(&unit)?;
+        task.check()?;
+        let mut normals: Vec<DVec3> = (0..unit.n_faces())
+            .map(|face| unit.face_normal_scaled(face).normalize_or_zero())
+            .collect();
+        let front = front_share(&surface, &normals);
+        if front <= 1.0 - WOUND {
+            normals.iter_mut().for_each(|normal| *normal = -*normal);
+        }
+        let both_sides = front > 1.0 - WOUND && front < WOUND;
+        let samples: Vec<Sample> = sample_uniform(&unit, N_SAMPLES, seed)?
+            .iter()
+            .map(|s| Sample { point: s.point, normal: normals[s.face as usize] })
+            .collect();
+        let field = NearestField::new(&samples, REACH, both_sides);
+        let object_from_unit = Sim3 { scale: radius, translation: centre, ..Sim3::IDENTITY };
+        Ok(Self { object_from_unit, surface, normals, both_sides, samples, field })
+    }
+
+    /// The nearest point of the surface within a distance, among the triangles that lean as
+    /// `normal` does, and its normal. All in the inner frame.
+    pub(crate) fn closest(
+        &self,
+        query: DVec3,
+        normal: DVec3,
+        within: f64,
+    ) -> Option<(DVec3, DVec3)> {
+        /// 78°: what leans away further is another side of the object.
+        const LEAST_COSINE: f64 = 0.2;
+        let leans = |face: u32| {
+            let cosine = self.normals[face as usize].dot(normal);
+            (if self.both_sides { cosine.abs() } else { cosine }) >= LEAST_COSINE
+        };
+        let hit = self.surface.closest_among(query, within, leans)?;
+        Some((hit.point, self.normals[hit.face as usize]))
+    }
+}
+
+impl std::fmt::Debug for AlignModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AlignModel")
+            .field("n_triangles", &self.normals.len())
+            .field("radius", &self.object_from_unit.scale)
+            .field("both_sides", &self.both_sides)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Of the triangles that are seen first from outside, the share whose front is seen.
+fn front_share(surface: &SurfaceIndex, normals: &[DVec3]) -> f64 {
+    let fronts: Vec<bool> = rotations(N_RAYS)
+        .collect::<Vec<_>>()
+        .par_iter()
+        .filter_map(|turn| {
+            // Parallel to the axis, at places spread over the middle of the object.
+            let (from, aside) = (turn.mul_vec3(2.0 * DVec3::Z), turn.mul_vec3(DVec3::X) * turn.w);
+            let hit = surface.first_hit(from + 0.8 * aside, -from)?;
+            Some(normals[hit.face as usize].dot(from) > 0.0)
+        })
+        .collect();
+    let n = fronts.len().max(1);
+    // An object that no ray meets is thin all over: nothing is known.
+    if fronts.is_empty() { 0.5 } else { fronts.iter().filter(|&&f| f).count() as f64 / n as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::zoo;
+
+    #[test]
+    fn the_winding_is_found_out() {
+        let sphere = zoo::icosphere(2);
+        let turned = |every: usize| {
+            let faces = sphere.faces().iter().enumerate();
+            let faces = faces
+                .map(|(i, &[a, b, c])| if i % every == 0 { [a, c, b] } else { [a, b, c] })
+                .collect();
+            Mesh::new(sphere.vertices().to_vec(), faces).unwrap()
+        };
+        for (mesh, both_sides) in
+            [(turned(usize::MAX), false), (turned(1), false), (turned(2), true)]
+        {
+            // `turned(usize::MAX)` turns the first triangle only.
+            let model = AlignModel::new(&mesh, 0, &Task::default()).unwrap();
+            assert_eq!(model.both_sides, both_sides);
+            let outward = model.samples.iter().filter(|s| s.normal.dot(s.point) > 0.0).count();
+            assert!(both_sides || outward > N_SAMPLES * 95 / 100, "{outward}");
+        }
+    }
+
+    #[test]
+    fn flat_and_empty_surfaces_are_told_apart() {
+        let grid = AlignModel::new(&zoo::open_grid(4, 4), 0, &Task::default());
+        assert!(grid.is_ok());
+        let line = Mesh::new(vec![DVec3::ZERO, DVec3::X, 2.0 * DVec3::X], vec![[0, 1, 2]]).unwrap();
+        assert!(AlignModel::new(&line, 0, &Task::default()).is_err());
+        let task = Task::default();
+        task.cancel();
+        assert!(AlignModel::new(&zoo::icosphere(1), 0, &task).is_err());
+    }
+}

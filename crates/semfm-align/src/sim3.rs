@@ -1,0 +1,171 @@
+//! Similarity transforms: a rotation, a translation and one scale.
+
+use std::ops::Mul;
+
+use parry3d_f64::math::Pose;
+use semfm_geom::math::{DMat3, DQuat, DVec3};
+
+use crate::{Error, Result};
+
+/// How far the rotation part of a given matrix may be from a multiple of a rotation, relative to
+/// its scale: matrices printed with six digits pass.
+const SIMILARITY_TOLERANCE: f64 = 1e-4;
+
+/// `a_from_b`: takes a point `x` of frame b to `scale · rotation · x + translation` in frame a.
+///
+/// Products chain by eye: `camera_from_object * object_from_part`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sim3 {
+    /// Positive; metres per unit of the mesh, where b is an object and a a camera.
+    pub scale: f64,
+    /// Unit quaternion.
+    pub rotation: DQuat,
+    /// In the units of frame a.
+    pub translation: DVec3,
+}
+
+impl Sim3 {
+    /// Nothing moves.
+    pub const IDENTITY: Self =
+        Self { scale: 1.0, rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
+
+    /// From a 4 × 4 matrix, rows first, points as columns, the scale included.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for numbers that are not finite, a last row other than 0 0 0 1, a
+    /// mirror image, or a linear part that is no multiple of a rotation.
+    pub fn from_rows(rows: [[f64; 4]; 4]) -> Result<Self> {
+        let refuse = |expected: &str, found: String| {
+            let (what, expected) = ("4 × 4 matrix", expected.into());
+            Err(Error::OutOfRange { what, expected, found })
+        };
+        if let Some(x) = rows.iter().flatten().find(|x| !x.is_finite()) {
+            return refuse("finite numbers", x.to_string());
+        }
+        if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+            return refuse("a last row of 0 0 0 1", format!("{:?}", rows[3]));
+        }
+        let row = |k: usize| DVec3::new(rows[k][0], rows[k][1], rows[k][2]);
+        let linear = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        let volume = linear.determinant();
+        if volume <= 0.0 {
+            return refuse("a rotation times a positive scale", format!("determinant {volume}"));
+        }
+        let scale = volume.cbrt();
+        let turn = linear * (1.0 / scale);
+        let defect = (turn * turn.transpose() - DMat3::IDENTITY).to_cols_array();
+        let worst = defect.iter().fold(0.0f64, |worst, x| worst.max(x.abs()));
+        if worst > SIMILARITY_TOLERANCE {
+            let found = format!("a matrix {worst:.1e} away from one");
+            return refuse("a rotation times one scale", found);
+        }
+        let rotation = DQuat::from_mat3(&turn).normalize();
+        Ok(Self { scale, rotation, translation: DVec3::new(rows[0][3], rows[1][3], rows[2][3]) })
+    }
+
+    /// As a 4 × 4 matrix, rows first, points as columns, the scale included.
+    pub fn to_rows(&self) -> [[f64; 4]; 4] {
+        let linear = (DMat3::from_quat(self.rotation) * self.scale).transpose();
+        let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+        let t = self.translation;
+        [[x.x, x.y, x.z, t.x], [y.x, y.y, y.z, t.y], [z.x, z.y, z.z, t.z], [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    /// Where a point goes.
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.scale * (self.rotation * point) + self.translation
+    }
+
+    /// The way back.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.conjugate();
+        let scale = 1.0 / self.scale;
+        Self { scale, rotation, translation: -scale * (rotation * self.translation) }
+    }
+
+    /// The rigid motion that remains once the object is measured in metres: with an
+    /// `object_from_tcp` in metres of the scaled object,
+    /// `camera_from_tcp = camera_from_object.rigid() * object_from_tcp`.
+    pub fn rigid(&self) -> Pose {
+        Pose::from_parts(self.translation, self.rotation)
+    }
+
+    /// This transform after a small one of the right-hand frame: turned by the rotation vector
+    /// `turn`, moved by `shift`, grown by the factor exp(`growth`).
+    pub(crate) fn then_within(&self, turn: DVec3, shift: DVec3, growth: f64) -> Self {
+        let small = Self {
+            scale: growth.exp(),
+            rotation: DQuat::from_scaled_axis(turn),
+            translation: shift,
+        };
+        let moved = *self * small;
+        Self { rotation: moved.rotation.normalize(), ..moved }
+    }
+}
+
+impl Mul for Sim3 {
+    type Output = Self;
+
+    fn mul(self, right: Self) -> Self {
+        Self {
+            scale: self.scale * right.scale,
+            rotation: self.rotation * right.rotation,
+            translation: self.apply(right.translation),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn some() -> Sim3 {
+        let rotation = DQuat::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 1.9);
+        Sim3 { scale: 0.23, rotation, translation: DVec3::new(0.1, -0.4, 0.9) }
+    }
+
+    #[test]
+    fn rows_inverse_and_product_agree_on_points() {
+        let (a, p) = (some(), DVec3::new(0.3, 0.7, -1.1));
+        let back = Sim3::from_rows(a.to_rows()).unwrap();
+        assert!(back.apply(p).distance(a.apply(p)) < 1e-15);
+        assert!(a.inverse().apply(a.apply(p)).distance(p) < 1e-14);
+        let b = a.then_within(DVec3::new(0.1, 0.2, -0.3), DVec3::X, 0.4);
+        assert!((a * b).apply(p).distance(a.apply(b.apply(p))) < 1e-14);
+        assert!(Sim3::IDENTITY.then_within(DVec3::ZERO, DVec3::ZERO, 0.0).apply(p) == p);
+    }
+
+    #[test]
+    fn the_chain_to_the_gripper_is_one_multiplication() {
+        // A grasp is given in metres of the scaled object.
+        let camera_from_object = some();
+        let object_from_tcp = Pose::from_parts(
+            camera_from_object.scale * DVec3::new(0.5, 0.2, 0.1),
+            DQuat::from_rotation_x(0.3),
+        );
+        let camera_from_tcp = camera_from_object.rigid() * object_from_tcp;
+        let by_hand = camera_from_object.apply(DVec3::new(0.5, 0.2, 0.1));
+        assert!(camera_from_tcp.translation.distance(by_hand) < 1e-15);
+    }
+
+    #[test]
+    fn matrices_that_are_no_similarity_are_refused() {
+        let mut mirrored = some().to_rows();
+        mirrored[0].iter_mut().take(3).for_each(|x| *x = -*x);
+        let mut sheared = some().to_rows();
+        sheared[0][1] += 0.1;
+        let mut projective = some().to_rows();
+        projective[3][0] = 0.1;
+        let mut unknown = some().to_rows();
+        unknown[1][3] = f64::NAN;
+        for (rows, word) in [
+            (mirrored, "determinant"),
+            (sheared, "away"),
+            (projective, "last row"),
+            (unknown, "finite"),
+        ] {
+            let error = Sim3::from_rows(rows).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+}

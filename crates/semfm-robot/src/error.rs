@@ -1,0 +1,90 @@
+//! What can go wrong between a robot description and a gripper.
+
+use std::path::PathBuf;
+
+/// Result of a call of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Every way in which a robot description or a gripper can fail to be what it should.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number outside its allowed range.
+    #[error("{what}: expected {expected}, found {found}")]
+    OutOfRange {
+        /// Name of the argument.
+        what: &'static str,
+        /// The allowed range, in words.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// A robot description that is not what it should be, or that we will not follow.
+    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
+    Urdf {
+        /// The file.
+        path: PathBuf,
+        /// The kind of failure: `dtd`, `cycle`, `non-finite`, `path-outside`, …
+        code: &'static str,
+        /// Line, element, name.
+        place: String,
+        /// What should stand there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A description that is sound, but in which no parallel-jaw gripper was found.
+    #[error("{}: no gripper to be had: expected {expected}, found {found}", path.display())]
+    NoGripper {
+        /// The file.
+        path: PathBuf,
+        /// What a gripper needs.
+        expected: String,
+        /// What the description has.
+        found: String,
+    },
+    /// A name that is neither a built-in gripper nor a URDF file.
+    #[error("gripper `{name}`: expected {known} or a .urdf file")]
+    UnknownGripper {
+        /// The name.
+        name: String,
+        /// The built-in ones.
+        known: String,
+    },
+    /// A file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A mesh of a link cannot be read.
+    #[error(transparent)]
+    Geom(#[from] semfm_geom::Error),
+}
+
+impl Error {
+    /// A stable name for the kind of failure, for scripts.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::OutOfRange { .. } => "out-of-range",
+            Self::Urdf { code, .. } => code,
+            Self::NoGripper { .. } => "no-gripper",
+            Self::UnknownGripper { .. } => "unknown-gripper",
+            Self::Io { .. } => "io",
+            Self::Geom(cause) => cause.code(),
+        }
+    }
+
+    /// Where it went wrong; `None` where the failure has no place.
+    pub fn place(&self) -> Option<String> {
+        match self {
+            Self::OutOfRange { what, .. } => Some((*what).into()),
+            Self::Urdf { place, .. } => Some(place.clone()),
+            Self::Geom(cause) => cause.place(),
+            _ => None,
+        }
+    }
+}

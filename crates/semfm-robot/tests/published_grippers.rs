@@ -1,0 +1,139 @@
+//! Published hands: what is found in their descriptions, beside their makers' figures and ours.
+#![allow(clippy::print_stderr)]
+
+use std::path::{Path, PathBuf};
+
+use parry3d_f64::math::Pose;
+use parry3d_f64::query::intersection_test;
+use parry3d_f64::shape::Cuboid;
+use semfm_geom::math::DVec3;
+use semfm_robot::gripper::{Gripper, GripperSettings, Role};
+
+fn shared(what: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join(what);
+    if folder.exists() {
+        return Some(folder);
+    }
+    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
+    None
+}
+
+struct Published {
+    file: &'static str,
+    builtin: &'static str,
+    /// Maker's stroke, metres, and how far the description's may be off.
+    stroke: (f64, f64),
+    /// TCP above the flange when closed, metres, and how far the description's may be off.
+    tcp: (f64, f64),
+}
+
+const HANDS: [Published; 3] = [
+    Published {
+        file: "panda/urdf/panda_local.urdf",
+        builtin: "franka",
+        stroke: (0.08, 1e-4),
+        tcp: (0.1034, 5e-4),
+    },
+    // The model ends 1.5 mm before its pads touch and opens to 86.1 mm.
+    Published {
+        file: "robotiq_2f_85/urdf/2f85_local.urdf",
+        builtin: "robotiq-2f85",
+        stroke: (0.085, 2e-3),
+        tcp: (0.1442, 1e-3),
+    },
+    // The model's pads are boxes 5.7 mm thicker on each side than the maker's stroke leaves room
+    // for: it opens to 128.5 mm.
+    Published {
+        file: "robotiq_2f_140/urdf/2f140_local.urdf",
+        builtin: "robotiq-2f140",
+        stroke: (0.14, 12e-3),
+        tcp: (0.2006, 1e-3),
+    },
+];
+
+fn hands() -> Option<Vec<(Published, Gripper)>> {
+    let robots = shared("data/robots")?;
+    let load = |published: Published| {
+        let hand = Gripper::from_urdf(robots.join(published.file), &GripperSettings::default());
+        let hand = hand.unwrap_or_else(|error| panic!("{error}"));
+        (published, hand)
+    };
+    Some(HANDS.into_iter().map(load).collect())
+}
+
+#[test]
+fn openings_and_tcps_are_those_that_the_makers_publish() {
+    for (published, hand) in hands().unwrap_or_default() {
+        let name = published.builtin;
+        let (stroke, off) = published.stroke;
+        assert!(*hand.opening.start() <= 2e-3, "{name}: {:?}", hand.opening);
+        assert!((hand.opening.end() - stroke).abs() <= off, "{name}: {:?}", hand.opening);
+        let (height, off) = published.tcp;
+        let tcp = hand.flange_from_tcp.translation;
+        assert!((tcp - DVec3::Z * height).length() <= off, "{name}: {tcp}");
+        assert!(hand.notes.is_empty(), "{name}: {:?}", hand.notes);
+    }
+}
+
+#[test]
+fn the_built_in_hands_agree_with_the_descriptions() {
+    for (published, hand) in hands().unwrap_or_default() {
+        let name = published.builtin;
+        let ours = Gripper::builtin(name).unwrap();
+        let (a, b) = (hand.flange_from_tcp, ours.flange_from_tcp);
+        assert!(a.rotation.angle_between(b.rotation) < 1e-6, "{name}: {a:?} {b:?}");
+        for (found, ours) in hand.pad.iter().zip(ours.pad) {
+            assert!((found - ours).abs() <= 5e-3, "{name}: pad {:?}", hand.pad);
+        }
+        // The same width, the same height of the palm, within what the strokes differ by.
+        for width in [0.01, 0.04, 0.08] {
+            let drift = (hand.flange_from_tcp_at(width).translation
+                - ours.flange_from_tcp_at(width).translation)
+                .length();
+            assert!(drift < 4e-3, "{name} at {width}: {drift}");
+        }
+        // Outer size at a common width, finger by finger and palm by palm: our boxes neither miss
+        // a centimetre of the hand nor add two.
+        for role in [Role::Palm, Role::Left, Role::Right] {
+            let reach = |hand: &Gripper| {
+                let parts = hand.parts_at(0.06);
+                let of = parts.iter().filter(|(_, part)| part.role == role);
+                of.map(|(pose, part)| part.shape.compute_aabb(pose))
+                    .reduce(|a, b| parry3d_f64::bounding_volume::BoundingVolume::merged(&a, &b))
+                    .unwrap()
+            };
+            let (found, ours) = (reach(&hand), reach(&ours));
+            let low = (found.mins - ours.mins).abs().max_element();
+            let high = (found.maxs - ours.maxs).abs().max_element();
+            assert!(low < 0.012 && high < 0.012, "{name} {role:?}: {found:?} {ours:?}");
+        }
+    }
+}
+
+#[test]
+fn the_space_between_open_pads_is_free() {
+    for (published, hand) in hands().unwrap_or_default() {
+        for share in [0.3, 0.6, 1.0] {
+            let width = share * hand.opening.end();
+            let half = DVec3::new(hand.pad[0], width - 1e-4, hand.pad[1]) / 2.0;
+            let gap = Cuboid::new(half);
+            for (pose, part) in hand.parts_at(width) {
+                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
+                    .unwrap()
+                    .intersecting;
+                assert!(!hit, "{}: {} at {width}", published.builtin, part.link);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_arm_without_a_hand_says_so() {
+    let Some(robots) = shared("data/robots") else { return };
+    let settings = GripperSettings::default();
+    for arm in ["ur5/urdf/ur5_local.urdf", "ur5e/urdf/ur5e_local.urdf"] {
+        let error = Gripper::from_urdf(robots.join(arm), &settings).unwrap_err();
+        assert_eq!(error.code(), "no-gripper", "{error}");
+    }
+}
