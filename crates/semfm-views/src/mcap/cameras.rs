@@ -1,20 +1,17 @@
 //! Gathers the cameras of a file from its `/views/NNN/camera` and `/tf` messages.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::path::Path;
 
-use foxglove::Decode;
 use foxglove::messages::{CameraCalibration, FrameTransform};
 use semfm_geom::Pinhole;
 use semfm_geom::math::{DAffine3, DMat3};
 
-use super::frames::{TF, parse_frame, read_camera, read_transform, topic};
+use super::decode::{check_count, decode, insert_once, topic_error};
+use super::messages::{read_camera, read_transform};
 use super::reader::Message;
+use super::topics::{TF, parse_frame, topic};
 use crate::{Error, Result};
-
-/// The largest number of views that a file of ours may have; guards sums over hostile numbers.
-const VIEWS_AT_MOST: usize = 100_000;
 
 /// Calibrations and poses seen so far, by view.
 #[derive(Default)]
@@ -34,8 +31,8 @@ impl Cameras {
     pub fn transform(&mut self, path: &Path, message: &Message<'_>) -> Result<()> {
         let transform: FrameTransform = decode(path, message, "foxglove.FrameTransform")?;
         let Some(view) = parse_frame(&transform.child_frame_id) else { return Ok(()) };
-        let pose = read_transform(&transform)
-            .map_err(|(expected, found)| message_error(path, message, &expected, found))?;
+        let pose =
+            read_transform(&transform).map_err(|mismatch| mismatch.in_message(path, message))?;
         insert_once(&mut self.poses, view, pose, path, message)
     }
 
@@ -57,87 +54,13 @@ impl Cameras {
             topic_error(path, TF, &format!("a transform of view {view:03}"), "none")
         })?;
         let camera = read_camera(calibration, view, *pose)
-            .map_err(|(expected, found)| topic_error(path, &camera_topic, &expected, found))?;
+            .map_err(|mismatch| mismatch.on_topic(path, &camera_topic))?;
         if (camera.width(), camera.height()) != size {
             let expected = format!("{} × {} pixels, as the metadata say", size.0, size.1);
             let found = format!("{} × {}", camera.width(), camera.height());
             return Err(topic_error(path, &camera_topic, &expected, found));
         }
         Ok(camera)
-    }
-}
-
-/// Decodes a message whose channel must have the given schema.
-pub(super) fn decode<T: Decode>(path: &Path, message: &Message<'_>, schema: &str) -> Result<T> {
-    let channel = message.channel;
-    let found = channel.schema.as_ref().map_or("none", |schema| schema.name.as_str());
-    if found != schema || channel.message_encoding != "protobuf" {
-        let found = format!("`{found}` encoded as `{}`", channel.message_encoding);
-        let expected = format!("the schema `{schema}` encoded as `protobuf`");
-        return Err(message_error(path, message, &expected, found));
-    }
-    T::decode(message.data)
-        .map_err(|error| message_error(path, message, &format!("a `{schema}`"), error.to_string()))
-}
-
-/// Keeps a view's item; a second one is refused.
-pub(super) fn insert_once<T>(
-    items: &mut BTreeMap<usize, T>,
-    view: usize,
-    item: T,
-    path: &Path,
-    message: &Message<'_>,
-) -> Result<()> {
-    match items.entry(view) {
-        Entry::Vacant(entry) => {
-            entry.insert(item);
-            Ok(())
-        }
-        Entry::Occupied(_) => {
-            let expected = format!("one message for view {view:03}");
-            Err(message_error(path, message, &expected, "a second one".to_owned()))
-        }
-    }
-}
-
-/// As many items as the metadata record says.
-pub(super) fn check_count(path: &Path, topic: &str, expected: usize, found: usize) -> Result<()> {
-    if expected == 0 || expected > VIEWS_AT_MOST {
-        let allowed = format!("1 to {VIEWS_AT_MOST} views");
-        return Err(topic_error(path, "metadata", &allowed, expected.to_string()));
-    }
-    match expected == found {
-        true => Ok(()),
-        false => {
-            let expected = format!("{expected} views, as the metadata say");
-            Err(topic_error(path, topic, &expected, found.to_string()))
-        }
-    }
-}
-
-/// An error that names topic and message.
-pub(super) fn message_error(
-    path: &Path,
-    message: &Message<'_>,
-    expected: &str,
-    found: String,
-) -> Error {
-    let place = format!("topic {}, message {}", message.channel.topic, message.index);
-    Error::Format { path: path.to_path_buf(), place, expected: expected.to_owned(), found }
-}
-
-/// An error that names a topic.
-pub(super) fn topic_error(
-    path: &Path,
-    topic: &str,
-    expected: &str,
-    found: impl Into<String>,
-) -> Error {
-    Error::Format {
-        path: path.to_path_buf(),
-        place: format!("topic {topic}"),
-        expected: expected.to_owned(),
-        found: found.into(),
     }
 }
 

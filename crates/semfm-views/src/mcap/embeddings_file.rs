@@ -8,16 +8,14 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 use semfm_geom::Mesh;
 
-use super::cameras::{
-    Cameras, check_camera, check_count, decode, insert_once, message_error, topic_error,
-};
-use super::frames::{TF, calibration, frame, parse_topic, topic, transform};
-use super::inspect::METADATA_NAME;
-use super::metadata::EmbeddingsMetadata;
+use super::cameras::{Cameras, check_camera};
+use super::decode::{check_count, decode, insert_once, message_error, topic_error};
+use super::embeddings_message::{PATCH_EMBEDDINGS, PatchEmbeddingsMessage};
+use super::messages::{camera_calibration, camera_transform, timestamp};
+use super::metadata::{EmbeddingsMetadata, METADATA_NAME};
 use super::reader::{Message, read_messages};
-use super::schema::{PATCH_EMBEDDINGS, PatchEmbeddingsMessage};
-use super::views_file::time_of;
-use super::writer::{McapFile, Packing, timestamp, write_file};
+use super::topics::{OBJECT, TF, frame, parse_topic, time_of, topic};
+use super::writer::{ChunkCompression, McapWriter, write_mcap};
 use crate::{EmbeddedView, Error, PatchEmbeddings, Result};
 
 /// How vectors are stored.
@@ -104,7 +102,7 @@ impl EmbeddingsFile {
     /// [`Error::Invalid`] where [`read`](Self::read) would refuse the file, [`Error::Io`].
     pub fn write(&self, path: &Path, dtype: Dtype) -> Result<()> {
         self.check()?;
-        write_file(path, "", Packing::Plain, |file| {
+        write_mcap(path, "", ChunkCompression::None, |file| {
             file.metadata(METADATA_NAME, self.metadata.entries(self.views.len()))?;
             for (view, embedded) in self.views.iter().enumerate() {
                 write_view(file, view, embedded, dtype)?;
@@ -183,15 +181,15 @@ fn check_grid(patches: &PatchEmbeddings, dim: usize) -> std::result::Result<(), 
 }
 
 fn write_view(
-    file: &mut McapFile<'_>,
+    file: &mut McapWriter<'_>,
     view: usize,
     embedded: &EmbeddedView,
     dtype: Dtype,
 ) -> Result<()> {
     let EmbeddedView { camera, patches } = embedded;
     let time = time_of(view);
-    file.log(TF, time, &transform(view, time, camera))?;
-    file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;
+    file.log(TF, time, &camera_transform(OBJECT, frame(view), time, camera))?;
+    file.log(&topic(view, "camera"), time, &camera_calibration(frame(view), time, camera))?;
     let [x0, y0, x1, y1] = patches.rect;
     let message = PatchEmbeddingsMessage {
         timestamp: Some(timestamp(time)),

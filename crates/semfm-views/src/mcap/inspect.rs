@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::reader::{Contents, read_messages};
+use super::contents::Contents;
+use super::metadata::METADATA_NAME;
+use super::reader::read_messages;
 use crate::Result;
-
-/// Name of the metadata record in which our files describe themselves.
-pub const METADATA_NAME: &str = "semfm";
 
 /// A sound MCAP file at a glance.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

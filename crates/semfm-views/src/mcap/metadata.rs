@@ -11,8 +11,10 @@ use std::path::Path;
 
 use semfm_geom::{Mesh, MeshHash};
 
-use super::inspect::METADATA_NAME;
 use crate::{Error, Result};
+
+/// Name of the metadata record in which our files describe themselves.
+pub const METADATA_NAME: &str = "semfm";
 
 /// Which mesh a file was made of, as read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,6 +95,19 @@ const VIEWS_FORMAT: &str = "semfm.views/1";
 const EMBEDDINGS_FORMAT: &str = "semfm.embeddings/1";
 
 impl ViewsMetadata {
+    /// Metadata for views of `mesh`; the rest is for the caller to fill.
+    pub fn of(mesh: &Mesh, width: u32, height: u32) -> Self {
+        Self {
+            mesh: MeshIdentity::of(mesh),
+            width,
+            height,
+            rig: String::new(),
+            background: String::new(),
+            seed: 0,
+            more: BTreeMap::new(),
+        }
+    }
+
     /// The record's entries for a file of `n_views` views.
     pub(super) fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
         let own = [

@@ -6,32 +6,38 @@
 //! believes no length, offset, count or checksum that it has not compared with the bytes.
 
 mod cameras;
+mod contents;
+mod decode;
 mod decompress;
 mod embeddings_file;
-mod frames;
+mod embeddings_message;
 mod inspect;
+mod layout;
 mod message_index;
+pub mod messages;
 mod metadata;
+mod pose_array;
 mod reader;
 mod record;
-mod ros2;
 mod scene;
-mod scene_messages;
-mod schema;
-mod shown;
 mod summary;
+mod topics;
 mod views_file;
 mod writer;
 
+pub use contents::{Channel, Contents, Schema};
+pub use decode::{decode, message_error};
 pub use embeddings_file::{Dtype, EmbeddingsFile};
-pub use inspect::{AttachmentReport, ChannelReport, METADATA_NAME, McapReport, inspect};
-pub use metadata::{EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
-pub use reader::{Channel, Contents, Message, Schema, read_bytes, read_messages};
-pub use ros2::{POSES_TOPIC, write_pose_array};
+pub use embeddings_message::PATCH_EMBEDDINGS;
+pub use inspect::{AttachmentReport, ChannelReport, McapReport, inspect};
+pub use messages::{Colors, read_mesh};
+pub use metadata::{EmbeddingsMetadata, METADATA_NAME, MeshIdentity, ViewsMetadata};
+pub use pose_array::{POSES_TOPIC, write_pose_array};
+pub use reader::{Message, read_bytes, read_messages};
 pub use scene::{
     Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
-    ScenePoints, Severity,
+    ScenePoints, Severity, read_cloud,
 };
-pub use schema::PATCH_EMBEDDINGS;
-pub use shown::{Colors, read_cloud, read_mesh};
+pub use topics::TF;
 pub use views_file::{ViewsFile, read_view, write_views};
+pub use writer::{ChunkCompression, McapWriter, write_mcap};

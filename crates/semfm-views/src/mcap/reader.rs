@@ -7,39 +7,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
+use super::contents::{Channel, Contents};
 use super::decompress::decompress;
+use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
 use super::message_index::ChunkMessages;
-use super::record::{Fields, MAGIC, Place, Record, Records, opcode};
-use super::summary::{self, Layout, StoredAttachment, StoredChunk, StoredMetadata};
+use super::record::{MAGIC, Place, Record, Records, check_crc, opcode};
+use super::summary;
 use crate::{Error, Fault, Result};
-
-/// How the messages of some channels are laid out.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Schema {
-    /// Name of the message type, such as `foxglove.RawImage`.
-    pub name: String,
-    /// Language of the schema, such as `protobuf`.
-    pub encoding: String,
-    /// The schema itself.
-    pub data: Vec<u8>,
-}
-
-/// A stream of messages of one kind.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Channel {
-    /// The id in this file.
-    pub id: u16,
-    /// Topic, such as `/views/000/image`.
-    pub topic: String,
-    /// How a message's bytes are encoded, such as `protobuf`.
-    pub message_encoding: String,
-    /// The schema, where the channel has one.
-    pub schema: Option<Arc<Schema>>,
-    /// What else the writer said of the channel.
-    pub metadata: BTreeMap<String, String>,
-}
 
 /// A message as it is handed to the visitor of [`read_messages`].
 #[derive(Clone, Copy, Debug)]
@@ -56,36 +31,6 @@ pub struct Message<'a> {
     pub publish_time: u64,
     /// The encoded message.
     pub data: &'a [u8],
-}
-
-/// What a file holds beside its messages.
-#[derive(Clone, Debug, Default)]
-pub struct Contents {
-    /// The profile that the header names.
-    pub profile: String,
-    /// The program that wrote the file.
-    pub library: String,
-    /// Schemas by id.
-    pub schemas: BTreeMap<u16, Arc<Schema>>,
-    /// Channels by id, those without messages too.
-    pub channels: BTreeMap<u16, Arc<Channel>>,
-    /// Messages of each channel.
-    pub n_messages_of: BTreeMap<u16, u64>,
-    /// Earliest and latest time of recording, `None` without messages.
-    pub log_times: Option<(u64, u64)>,
-    /// Number of chunks.
-    pub n_chunks: usize,
-    /// Metadata records, name and entries, in file order.
-    pub metadata: Vec<(String, BTreeMap<String, String>)>,
-    /// Attachments in file order: name, media type, bytes of data.
-    pub attachments: Vec<(String, String, u64)>,
-}
-
-impl Contents {
-    /// Number of messages in the file.
-    pub fn n_messages(&self) -> u64 {
-        self.n_messages_of.values().sum()
-    }
 }
 
 /// Reads a file whole and hands every message to `visit`, in file order.
@@ -223,7 +168,7 @@ impl<'a> Walk<'a, '_> {
 
     /// Takes a Schema or Channel record; false for every other one.
     fn declaration(&mut self, record: &Record<'_>) -> Result<bool> {
-        let Some(memory) = declare(&mut self.contents, record)? else { return Ok(false) };
+        let Some(memory) = self.contents.declare(record)? else { return Ok(false) };
         if record.place.chunk.is_some() {
             self.kept = self.kept.saturating_add(memory);
             let limit = KEPT_BYTES.max(self.file_bytes.saturating_mul(KEPT_PER_FILE_BYTE));
@@ -352,85 +297,5 @@ impl<'a> Walk<'a, '_> {
         });
         self.contents.metadata.push((name, fields.text_map()?));
         Ok(())
-    }
-}
-
-/// Takes a Schema or Channel record and returns about how much memory it was given (none where it
-/// was known), or `None` for every other record. The same id may be declared many times, but only
-/// with the same content.
-pub(super) fn declare(contents: &mut Contents, record: &Record<'_>) -> Result<Option<usize>> {
-    match record.opcode {
-        opcode::SCHEMA => declare_schema(contents, record.fields()).map(Some),
-        opcode::CHANNEL => declare_channel(contents, record.fields()).map(Some),
-        _ => Ok(None),
-    }
-}
-
-/// About what a map entry costs beside its text.
-const ENTRY_BYTES: usize = 128;
-
-fn declare_schema(contents: &mut Contents, mut fields: Fields<'_>) -> Result<usize> {
-    let id = fields.u16()?;
-    if id == 0 {
-        return Err(fields.place.error(Fault::Id, "a schema id from 1", 0));
-    }
-    let (name, encoding, data) = (fields.text()?, fields.text()?, fields.short_bytes()?);
-    if let Some(known) = contents.schemas.get(&id) {
-        if known.name != name || known.encoding != encoding || known.data != data {
-            let expected = format!("schema {id} as declared before (`{}`)", known.name);
-            let found = format!("another one (`{name}`)");
-            return Err(fields.place.error(Fault::Conflict, expected, found));
-        }
-        return Ok(0);
-    }
-    let memory = ENTRY_BYTES + name.len() + encoding.len() + data.len();
-    let schema =
-        Schema { name: name.to_owned(), encoding: encoding.to_owned(), data: data.to_vec() };
-    contents.schemas.insert(id, Arc::new(schema));
-    Ok(memory)
-}
-
-fn declare_channel(contents: &mut Contents, mut fields: Fields<'_>) -> Result<usize> {
-    let (id, schema_id) = (fields.u16()?, fields.u16()?);
-    let schema = match schema_id {
-        0 => None,
-        _ => Some(contents.schemas.get(&schema_id).cloned().ok_or_else(|| {
-            let found = format!("schema {schema_id}, which was not declared");
-            fields.place.error(Fault::Id, "a schema declared before", found)
-        })?),
-    };
-    let body_bytes = fields.bytes.len();
-    let channel = Channel {
-        id,
-        topic: fields.text()?.to_owned(),
-        message_encoding: fields.text()?.to_owned(),
-        schema,
-        metadata: fields.text_map()?,
-    };
-    if let Some(known) = contents.channels.get(&id) {
-        if **known != channel {
-            let expected = format!("channel {id} as declared before (`{}`)", known.topic);
-            let found = format!("another one (`{}`)", channel.topic);
-            return Err(fields.place.error(Fault::Conflict, expected, found));
-        }
-        return Ok(0);
-    }
-    let memory = ENTRY_BYTES * (1 + channel.metadata.len()) + body_bytes;
-    contents.channels.insert(id, Arc::new(channel));
-    Ok(memory)
-}
-
-/// Compares a stored checksum with the true one; zero says that none was stored.
-pub(super) fn check_crc(stored: u32, bytes: &[u8], place: Place<'_>) -> Result<()> {
-    if stored == 0 {
-        return Ok(());
-    }
-    match crc32fast::hash(bytes) {
-        found if found == stored => Ok(()),
-        found => Err(place.error(
-            Fault::Crc,
-            format!("checksum {stored:#010x} of {} bytes", bytes.len()),
-            format!("{found:#010x}"),
-        )),
     }
 }

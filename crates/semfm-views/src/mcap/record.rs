@@ -289,6 +289,21 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// Compares a stored checksum with the true one; zero says that none was stored.
+pub(super) fn check_crc(stored: u32, bytes: &[u8], place: Place<'_>) -> Result<()> {
+    if stored == 0 {
+        return Ok(());
+    }
+    match crc32fast::hash(bytes) {
+        found if found == stored => Ok(()),
+        found => Err(place.error(
+            Fault::Crc,
+            format!("checksum {stored:#010x} of {} bytes", bytes.len()),
+            format!("{found:#010x}"),
+        )),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,50 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use super::reader::{Contents, check_crc, declare};
-use super::record::{Fields, HEAD, Place, Record, Records, opcode};
+use super::contents::Contents;
+use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
+use super::record::{Fields, HEAD, Place, Record, Records, check_crc, opcode};
 use crate::{Fault, Result};
-
-/// Where the data section's records lie.
-#[derive(Default)]
-pub(super) struct Layout {
-    pub chunks: Vec<StoredChunk>,
-    pub attachments: Vec<StoredAttachment>,
-    pub metadata: Vec<StoredMetadata>,
-}
-
-/// What a Chunk Index record says of a chunk.
-#[derive(Debug, PartialEq)]
-pub(super) struct StoredChunk {
-    pub offset: u64,
-    pub length: u64,
-    pub times: (u64, u64),
-    pub compression: String,
-    pub compressed_size: u64,
-    pub size: u64,
-    pub message_indexes: BTreeMap<u16, u64>,
-    pub message_index_length: u64,
-}
-
-/// What an Attachment Index record says of an attachment.
-#[derive(Debug, PartialEq)]
-pub(super) struct StoredAttachment {
-    pub offset: u64,
-    pub length: u64,
-    pub log_time: u64,
-    pub create_time: u64,
-    pub data_size: u64,
-    pub name: String,
-    pub media_type: String,
-}
-
-/// What a Metadata Index record says of a metadata record.
-#[derive(Debug, PartialEq)]
-pub(super) struct StoredMetadata {
-    pub offset: u64,
-    pub length: u64,
-    pub name: String,
-}
 
 /// Reads from behind the Data End record to the end of the file.
 pub(super) fn check<'a>(
@@ -126,7 +86,7 @@ impl<'a> Summary<'a> {
                 Ok(())
             }
             // Some recorders declare channels here that never had a message.
-            _ => match declare(contents, record)? {
+            _ => match contents.declare(record)? {
                 Some(_) => Ok(()),
                 None => Err(record.misplaced("a record of the summary section, or the Footer")),
             },

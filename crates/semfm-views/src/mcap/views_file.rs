@@ -1,25 +1,21 @@
 //! `NAME.views.mcap`: rendered views with cameras, depth and triangles, for encoders and for eyes.
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
 use foxglove::bytes::Bytes;
 use foxglove::messages::{CompressedImage, RawImage};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
 use semfm_geom::{Mesh, Pinhole};
 
-use super::cameras::{
-    Cameras, check_camera, check_count, decode, insert_once, message_error, topic_error,
+use super::cameras::{Cameras, check_camera};
+use super::decode::{Mismatch, check_count, decode, insert_once, message_error, topic_error};
+use super::messages::{
+    MeshEntity, camera_calibration, camera_transform, decode_png, picture, timestamp,
 };
-use super::frames::{OBJECT, TF, calibration, frame, parse_topic, topic, transform};
-use super::inspect::METADATA_NAME;
-use super::metadata::{MeshIdentity, ViewsMetadata};
+use super::metadata::{METADATA_NAME, ViewsMetadata};
 use super::reader::{Message, read_messages};
-use super::scene::SceneMesh;
-use super::scene_messages::mesh_update;
-use super::writer::{McapFile, Packing, timestamp, write_file};
+use super::topics::{MESH, OBJECT, TF, frame, parse_topic, time_of, topic};
+use super::writer::{ChunkCompression, McapWriter, write_mcap};
 use crate::{Error, Result, View};
 
 /// The rendered views of an object.
@@ -29,15 +25,6 @@ pub struct ViewsFile {
     pub metadata: ViewsMetadata,
     /// The views, as numbered.
     pub views: Vec<View>,
-}
-
-/// Topic of the object itself.
-pub(super) const MESH: &str = "/mesh";
-
-/// Time of recording of a view, in nanoseconds: one second each, so that playing the file in
-/// Foxglove walks around the object.
-pub(super) fn time_of(view: usize) -> u64 {
-    view as u64 * 1_000_000_000
 }
 
 /// Writes a views file whole or not at all; the mesh goes with it for viewers, grey or with the
@@ -56,25 +43,24 @@ pub fn write_views(
 ) -> Result<()> {
     metadata.mesh.check(mesh, path)?;
     if views.is_empty() {
-        return Err(invalid("views", "at least one", "none"));
+        return Err(Error::invalid("views", "at least one", "none"));
     }
     for (view, rendered) in views.iter().enumerate() {
         check_view(view, rendered, metadata)?;
     }
-    let shown = SceneMesh {
-        topic: MESH,
+    let shown = MeshEntity {
         frame_id: OBJECT,
         name: "object",
         vertices: mesh.vertices(),
         faces: mesh.faces(),
         colors,
     };
-    shown.check()?;
-    write_file(path, "", Packing::Lz4, |file| {
+    let shown = shown.update(MESH)?;
+    write_mcap(path, "", ChunkCompression::Lz4, |file| {
         file.metadata(METADATA_NAME, metadata.entries(views.len()))?;
-        file.log(MESH, 0, &mesh_update(&shown))?;
+        file.log(MESH, 0, &shown)?;
         for (view, rendered) in views.iter().enumerate() {
-            write_view(path, file, view, rendered)?;
+            write_view(file, view, rendered)?;
         }
         Ok(())
     })
@@ -107,7 +93,7 @@ pub fn read_view(path: &Path, view: usize) -> Result<(ViewsMetadata, View)> {
     let ((metadata, n_views), pictures, cameras) = gather(path, Some(view))?;
     if view >= n_views {
         let expected = format!("000 to {:03} in {}", n_views.saturating_sub(1), path.display());
-        return Err(invalid("view", expected, format!("{view:03}")));
+        return Err(Error::invalid("view", expected, format!("{view:03}")));
     }
     let camera = cameras.camera(path, view, (metadata.width, metadata.height))?;
     let view = pictures.view(path, view, camera, &metadata)?;
@@ -180,15 +166,14 @@ impl Pictures {
                 .images
                 .get(&view)
                 .ok_or_else(|| topic_error(path, &topic, "one message", "none"))?;
-            decode_png(&image.data, size)
-                .map_err(|(e, found)| topic_error(path, &topic, &e, found))?
+            decode_png(&image.data, size).map_err(|mismatch| mismatch.on_topic(path, &topic))?
         };
         let depth = numbers(path, &self.depths, view, "depth", size, f32::from_le_bytes)?;
         let triangles =
             numbers(path, &self.triangles, view, "triangles", size, i32::from_le_bytes)?;
         let rendered = View { camera, rgb, depth, triangles };
         check_pixels(&rendered, metadata.mesh.n_triangles)
-            .map_err(|(e, found)| topic_error(path, &topic(view, "depth"), &e, found))?;
+            .map_err(|mismatch| mismatch.on_topic(path, &topic(view, "depth")))?;
         Ok(rendered)
     }
 }
@@ -213,31 +198,8 @@ fn numbers<T>(
     Ok(image.data.as_chunks::<4>().0.iter().map(|&bytes| number(bytes)).collect())
 }
 
-/// A PNG of sRGB bytes.
-pub(super) fn encode_png(rgb: &[u8], (width, height): (u32, u32)) -> image::ImageResult<Vec<u8>> {
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(rgb, width, height, ExtendedColorType::Rgb8)?;
-    Ok(png)
-}
-
-/// sRGB bytes of a PNG that must have the given size; nothing larger is ever decoded.
-fn decode_png(bytes: &[u8], size: (u32, u32)) -> std::result::Result<Vec<u8>, (String, String)> {
-    let expected = format!("a PNG of {} × {} pixels", size.0, size.1);
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(size.0);
-    limits.max_image_height = Some(size.1);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|error| (expected.clone(), error.to_string()))?;
-    if (image.width(), image.height()) != size {
-        return Err((expected, format!("{} × {}", image.width(), image.height())));
-    }
-    Ok(image.into_rgb8().into_raw())
-}
-
 /// Depth and triangles agree on what is background, and name triangles that exist.
-fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), (String, String)> {
+fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), Mismatch> {
     let is_wrong = |(&depth, &triangle): (&f32, &i32)| match triangle {
         -1 => depth != f32::INFINITY,
         0.. => triangle as usize >= n_triangles || !(depth.is_finite() && depth > 0.0),
@@ -253,17 +215,9 @@ fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), (Str
                 "a triangle below {n_triangles} and a positive depth, or −1 and an infinite one"
             );
             let found = format!("triangle {triangle} at depth {depth}, row {row}, column {col}");
-            Err((expected, found))
+            Err(Mismatch::new(expected, found))
         }
     }
-}
-
-fn invalid(
-    what: impl Into<String>,
-    expected: impl Into<String>,
-    found: impl Into<String>,
-) -> Error {
-    Error::Invalid { what: what.into(), expected: expected.into(), found: found.into() }
 }
 
 fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<()> {
@@ -272,35 +226,24 @@ fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<
     let (width, height) = (rendered.camera.width(), rendered.camera.height());
     if (width, height) != (metadata.width, metadata.height) {
         let expected = format!("{} × {} pixels", metadata.width, metadata.height);
-        return Err(invalid(what, expected, format!("{width} × {height}")));
+        return Err(Error::invalid(what, expected, format!("{width} × {height}")));
     }
     let n_pixels = width as usize * height as usize;
     let lengths = [rendered.rgb.len() / 3, rendered.depth.len(), rendered.triangles.len()];
     if !rendered.rgb.len().is_multiple_of(3) || lengths != [n_pixels; 3] {
         let expected = format!("{n_pixels} pixels in rgb, depth and triangles");
-        return Err(invalid(what, expected, format!("{lengths:?}")));
+        return Err(Error::invalid(what, expected, format!("{lengths:?}")));
     }
-    check_pixels(rendered, metadata.mesh.n_triangles)
-        .map_err(|(expected, found)| invalid(what, expected, found))
+    check_pixels(rendered, metadata.mesh.n_triangles).map_err(|mismatch| mismatch.of_argument(what))
 }
 
-fn write_view(path: &Path, file: &mut McapFile<'_>, view: usize, rendered: &View) -> Result<()> {
-    let View { camera, rgb, depth, triangles } = rendered;
+fn write_view(file: &mut McapWriter<'_>, view: usize, rendered: &View) -> Result<()> {
+    let View { camera, depth, triangles, .. } = rendered;
     let (width, height) = (camera.width(), camera.height());
     let time = time_of(view);
-    file.log(TF, time, &transform(view, time, camera))?;
-    file.log(&topic(view, "camera"), time, &calibration(view, time, camera))?;
-    let png = encode_png(rgb, (width, height)).map_err(|error| Error::Io {
-        path: path.to_path_buf(),
-        source: std::io::Error::other(error),
-    })?;
-    let image = CompressedImage {
-        timestamp: Some(timestamp(time)),
-        frame_id: frame(view),
-        data: png.into(),
-        format: "png".to_owned(),
-    };
-    file.log(&topic(view, "image"), time, &image)?;
+    file.log(TF, time, &camera_transform(OBJECT, frame(view), time, camera))?;
+    file.log(&topic(view, "camera"), time, &camera_calibration(frame(view), time, camera))?;
+    file.log(&topic(view, "image"), time, &picture(frame(view), time, rendered)?)?;
     let raw = |encoding: &str, data: Bytes| RawImage {
         timestamp: Some(timestamp(time)),
         frame_id: frame(view),
@@ -314,19 +257,4 @@ fn write_view(path: &Path, file: &mut McapFile<'_>, view: usize, rendered: &View
     file.log(&topic(view, "depth"), time, &raw("32FC1", depth.into()))?;
     let triangles: Vec<u8> = triangles.iter().flat_map(|t| t.to_le_bytes()).collect();
     file.log(&topic(view, "triangles"), time, &raw("32SC1", triangles.into()))
-}
-
-impl ViewsMetadata {
-    /// Metadata for views of `mesh`; the rest is for the caller to fill.
-    pub fn of(mesh: &Mesh, width: u32, height: u32) -> Self {
-        Self {
-            mesh: MeshIdentity::of(mesh),
-            width,
-            height,
-            rig: String::new(),
-            background: String::new(),
-            seed: 0,
-            more: BTreeMap::new(),
-        }
-    }
 }

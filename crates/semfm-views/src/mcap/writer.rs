@@ -6,16 +6,17 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use foxglove::Encode;
-use foxglove::messages::Timestamp;
 use semfm_geom::io::replace_atomically;
 
+use super::contents::Schema;
 use crate::{Error, Result};
 
 /// How the chunks of a file are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
+#[non_exhaustive]
+pub enum ChunkCompression {
     /// As they are: embeddings are noise to a compressor (lz4 saves nothing, zstd 8 %).
-    Plain,
+    None,
     /// lz4: backgrounds of depth and triangle images shrink to nothing, at 700 MB/s.
     Lz4,
 }
@@ -24,7 +25,7 @@ pub(super) enum Packing {
 const CHUNK_BYTES: u64 = 1 << 20;
 
 /// An MCAP file being written: messages go by topic, and a topic's first message declares it.
-pub(super) struct McapFile<'a> {
+pub struct McapWriter<'a> {
     path: &'a Path,
     writer: mcap::Writer<BufWriter<&'a mut File>>,
     /// Channel and number of messages of each topic.
@@ -38,16 +39,16 @@ pub(super) struct McapFile<'a> {
 ///
 /// # Errors
 /// [`Error::Io`], or what `fill` returns; `path` is then as it was before.
-pub(super) fn write_file(
+pub fn write_mcap(
     path: &Path,
     profile: &str,
-    packing: Packing,
-    fill: impl FnOnce(&mut McapFile<'_>) -> Result<()>,
+    compression: ChunkCompression,
+    fill: impl FnOnce(&mut McapWriter<'_>) -> Result<()>,
 ) -> Result<()> {
     replace_atomically(path, |file| {
-        let compression = match packing {
-            Packing::Plain => None,
-            Packing::Lz4 => Some(mcap::Compression::Lz4),
+        let compression = match compression {
+            ChunkCompression::None => None,
+            ChunkCompression::Lz4 => Some(mcap::Compression::Lz4),
         };
         let writer = mcap::WriteOptions::new()
             .profile(profile)
@@ -56,15 +57,18 @@ pub(super) fn write_file(
             .library(concat!("semfm ", env!("CARGO_PKG_VERSION")))
             .create(BufWriter::with_capacity(1 << 20, file))
             .map_err(|error| failure(path, error))?;
-        let mut file = McapFile { path, writer, topics: HashMap::new(), buffer: Vec::new() };
+        let mut file = McapWriter { path, writer, topics: HashMap::new(), buffer: Vec::new() };
         fill(&mut file)?;
         file.writer.finish().map_err(|error| failure(path, error))?;
         file.writer.into_inner().flush().map_err(|source| io_error(path, source))
     })
 }
 
-impl McapFile<'_> {
+impl McapWriter<'_> {
     /// Writes one message; `time` in nanoseconds.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
     pub fn log<T: Encode>(&mut self, topic: &str, time: u64, message: &T) -> Result<()> {
         let (channel_id, sequence) = self.channel::<T>(topic)?;
         self.buffer.clear();
@@ -83,17 +87,20 @@ impl McapFile<'_> {
             .map_err(|error| failure(self.path, error))
     }
 
-    /// Writes a message that is encoded already, as the only one of its topic; `schema` is name,
-    /// encoding and text.
-    pub fn log_bytes(
+    /// Writes a message that is encoded already, at time 0, as the only one of its topic.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn log_encoded(
         &mut self,
         topic: &str,
-        (name, encoding, text): (&str, &str, &[u8]),
+        schema: &Schema,
         message_encoding: &str,
         message: &[u8],
     ) -> Result<()> {
+        let Schema { name, encoding, data } = schema;
         let failure = |error| failure(self.path, error);
-        let schema_id = self.writer.add_schema(name, encoding, text).map_err(failure)?;
+        let schema_id = self.writer.add_schema(name, encoding, data).map_err(failure)?;
         let channel_id = self
             .writer
             .add_channel(schema_id, topic, message_encoding, &BTreeMap::new())
@@ -104,6 +111,9 @@ impl McapFile<'_> {
     }
 
     /// Writes a metadata record.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
     pub fn metadata(&mut self, name: &str, entries: BTreeMap<String, String>) -> Result<()> {
         let record = mcap::records::Metadata { name: name.to_owned(), metadata: entries };
         self.writer.write_metadata(&record).map_err(|error| failure(self.path, error))
@@ -131,12 +141,6 @@ impl McapFile<'_> {
         self.topics.insert(topic.to_owned(), (channel, 0));
         Ok((channel, 0))
     }
-}
-
-/// A time of recording as the messages carry it.
-pub(super) fn timestamp(time: u64) -> Timestamp {
-    let (seconds, nanos) = (time / 1_000_000_000, time % 1_000_000_000);
-    Timestamp::new(seconds as u32, nanos as u32)
 }
 
 fn failure(path: &Path, error: mcap::McapError) -> Error {

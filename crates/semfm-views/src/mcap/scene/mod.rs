@@ -1,21 +1,28 @@
 //! Coloured meshes, point clouds, labels and pictures for a viewer: `transfer.mcap`.
 
+mod items;
+mod messages;
+mod point_cloud;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use foxglove::messages::{
-    CompressedImage, FrameTransform, Quaternion, SceneEntity, SceneUpdate, Vector3,
-};
+use foxglove::messages::{FrameTransform, SceneEntity, SceneUpdate};
 use semfm_geom::math::{DMat3, DQuat, DVec3, bounds};
 
-use super::frames::{TF, calibration_in, transform_in};
-use super::inspect::METADATA_NAME;
-use super::scene_messages::{
-    Segment, log_message, mesh_entity, point_cloud, segments_entity, text_entity,
+use self::items::WORLD;
+pub use self::items::{
+    SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
+    ScenePoints, Severity,
 };
-use super::views_file::encode_png;
-use super::writer::{McapFile, Packing, timestamp, write_file};
-use crate::{Error, Result, View};
+use self::messages::{Segment, log_message, segments_entity, text_entity};
+use self::point_cloud::point_cloud;
+pub use self::point_cloud::read_cloud;
+use super::messages::{camera_calibration, camera_transform, picture, transform};
+use super::metadata::METADATA_NAME;
+use super::topics::TF;
+use super::writer::{ChunkCompression, McapWriter, write_mcap};
+use crate::{Error, Result};
 
 /// What a viewer is shown. Everything is recorded at time 0.
 #[derive(Clone, Debug, Default)]
@@ -36,123 +43,6 @@ pub struct Scene<'a> {
     pub log: Option<SceneLog<'a>>,
 }
 
-/// How a frame stands in `world`.
-#[derive(Clone, Copy, Debug)]
-pub struct SceneFrame<'a> {
-    /// The frame.
-    pub frame_id: &'a str,
-    /// A rotation.
-    pub world_from_frame: DMat3,
-}
-
-/// A triangle mesh to be shown.
-#[derive(Clone, Copy, Debug)]
-pub struct SceneMesh<'a> {
-    /// Topic, such as `/source/mesh`.
-    pub topic: &'a str,
-    /// Frame of the vertices, such as `source`.
-    pub frame_id: &'a str,
-    /// What it is; unique in its topic.
-    pub name: &'a str,
-    /// Positions (n).
-    pub vertices: &'a [DVec3],
-    /// Triangles (m).
-    pub faces: &'a [[u32; 3]],
-    /// sRGB colours of the vertices (n), grey without.
-    pub colors: Option<&'a [[u8; 3]]>,
-}
-
-/// A point cloud to be shown.
-#[derive(Clone, Copy, Debug)]
-pub struct ScenePoints<'a> {
-    /// Topic, such as `/source/cloud`.
-    pub topic: &'a str,
-    /// Frame of the points.
-    pub frame_id: &'a str,
-    /// Positions (n).
-    pub points: &'a [DVec3],
-    /// sRGB colours (n).
-    pub colors: &'a [[u8; 3]],
-    /// Named numbers (n each), to colour by.
-    pub numbers: &'a [(&'a str, SceneNumbers<'a>)],
-}
-
-/// One number for each point.
-#[derive(Clone, Copy, Debug)]
-pub enum SceneNumbers<'a> {
-    /// Single precision.
-    F32(&'a [f32]),
-    /// Signed.
-    I32(&'a [i32]),
-    /// Unsigned.
-    U32(&'a [u32]),
-}
-
-/// Words in the scene.
-#[derive(Clone, Debug)]
-pub struct SceneLabel<'a> {
-    /// Topic.
-    pub topic: &'a str,
-    /// Frame of `at`, or which frame's objects to stand above.
-    pub frame_id: &'a str,
-    /// Where; above everything that the frame holds without.
-    pub at: Option<DVec3>,
-    /// The words.
-    pub text: String,
-    /// sRGB.
-    pub color: [u8; 3],
-}
-
-/// A line between points of two frames, shown in `world`.
-#[derive(Clone, Copy, Debug)]
-pub struct SceneLink<'a> {
-    /// Topic.
-    pub topic: &'a str,
-    /// Frame and point where it begins.
-    pub from: (&'a str, DVec3),
-    /// Frame and point where it ends.
-    pub to: (&'a str, DVec3),
-    /// sRGB.
-    pub color: [u8; 3],
-}
-
-/// A picture with its camera: topics `/FRAME/NAME/image` and `/FRAME/NAME/camera`, frame
-/// `FRAME_NAME`.
-#[derive(Clone, Copy, Debug)]
-pub struct ScenePicture<'a> {
-    /// Frame of what was drawn.
-    pub frame_id: &'a str,
-    /// Name of the picture, such as `view`.
-    pub name: &'a str,
-    /// The picture and its camera.
-    pub view: &'a View,
-}
-
-/// How grave a message is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// All is well.
-    Info,
-    /// Look at it.
-    Warning,
-    /// It failed.
-    Error,
-}
-
-/// A line of the log.
-#[derive(Clone, Debug)]
-pub struct SceneLog<'a> {
-    /// Topic.
-    pub topic: &'a str,
-    /// How grave it is.
-    pub severity: Severity,
-    /// The words.
-    pub text: String,
-}
-
-/// The frame in which the frames of a scene stand side by side.
-pub(super) const WORLD: &str = "world";
-
 /// Room between two neighbours, as a share of the larger one.
 const GAP: f64 = 0.25;
 /// Labels stand this share of the widest frame above what they belong to.
@@ -170,14 +60,14 @@ impl Scene<'_> {
         self.check()?;
         let stands = self.side_by_side();
         let updates = self.updates(&stands)?;
-        write_file(path, "", Packing::Lz4, |file| {
+        write_mcap(path, "", ChunkCompression::Lz4, |file| {
             let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
             file.metadata(METADATA_NAME, entries.map(|(k, v)| (k.to_owned(), v)).into())?;
             for stand in &stands {
                 file.log(TF, 0, &stand.transform())?;
             }
             for picture in &self.pictures {
-                picture.write(path, file)?;
+                picture.write(file)?;
             }
             if let Some(log) = &self.log {
                 file.log(log.topic, 0, &log_message(log))?;
@@ -190,7 +80,6 @@ impl Scene<'_> {
     }
 
     fn check(&self) -> Result<()> {
-        self.meshes.iter().try_for_each(SceneMesh::check)?;
         for cloud in &self.clouds {
             check_length(cloud.topic, "colours", cloud.points.len(), cloud.colors.len())?;
             for (name, numbers) in cloud.numbers {
@@ -226,7 +115,9 @@ impl Scene<'_> {
                 found: frame_id.to_owned(),
             })
         };
-        self.meshes.iter().for_each(|mesh| add(mesh.topic, mesh_entity(mesh)));
+        for mesh in &self.meshes {
+            add(mesh.topic, mesh.entity().message(mesh.topic)?);
+        }
         let widest = stands.iter().map(|s| s.high.x - s.low.x).fold(0.0, f64::max);
         for (i, label) in self.labels.iter().enumerate() {
             let stand = stand(label.frame_id)?;
@@ -303,63 +194,20 @@ impl Stand<'_> {
     }
 
     fn transform(&self) -> FrameTransform {
-        let q = DQuat::from_mat3(&self.turn).normalize();
-        let DVec3 { x, y, z } = self.shift;
-        FrameTransform {
-            timestamp: Some(timestamp(0)),
-            parent_frame_id: WORLD.to_owned(),
-            child_frame_id: self.frame_id.to_owned(),
-            translation: Some(Vector3 { x, y, z }),
-            rotation: Some(Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
-        }
+        let rotation = DQuat::from_mat3(&self.turn).normalize();
+        transform(WORLD, self.frame_id.to_owned(), 0, self.shift, rotation)
     }
 }
 
 impl ScenePicture<'_> {
-    fn write(&self, path: &Path, file: &mut McapFile<'_>) -> Result<()> {
+    fn write(&self, file: &mut McapWriter<'_>) -> Result<()> {
         let Self { frame_id, name, view } = *self;
         let camera = &view.camera;
         let own = format!("{frame_id}_{name}");
         let topic = |what: &str| format!("/{frame_id}/{name}/{what}");
-        file.log(TF, 0, &transform_in(frame_id, own.clone(), 0, camera))?;
-        file.log(&topic("camera"), 0, &calibration_in(own.clone(), 0, camera))?;
-        let png = encode_png(&view.rgb, (camera.width(), camera.height())).map_err(|error| {
-            Error::Io { path: path.to_path_buf(), source: std::io::Error::other(error) }
-        })?;
-        let image = CompressedImage {
-            timestamp: Some(timestamp(0)),
-            frame_id: own,
-            data: png.into(),
-            format: "png".to_owned(),
-        };
-        file.log(&topic("image"), 0, &image)
-    }
-}
-
-impl SceneMesh<'_> {
-    pub(super) fn check(&self) -> Result<()> {
-        if let Some(colors) = self.colors {
-            check_length(self.topic, "colours", self.vertices.len(), colors.len())?;
-        }
-        let n_vertices = self.vertices.len();
-        if let Some(id) = self.faces.iter().flatten().find(|&&id| id as usize >= n_vertices) {
-            return Err(Error::Invalid {
-                what: format!("vertex ids of {}", self.topic),
-                expected: format!("below {n_vertices}"),
-                found: id.to_string(),
-            });
-        }
-        check_finite(self.topic, self.vertices)
-    }
-}
-
-impl SceneNumbers<'_> {
-    fn len(&self) -> usize {
-        match self {
-            Self::F32(numbers) => numbers.len(),
-            Self::I32(numbers) => numbers.len(),
-            Self::U32(numbers) => numbers.len(),
-        }
+        file.log(TF, 0, &camera_transform(frame_id, own.clone(), 0, camera))?;
+        file.log(&topic("camera"), 0, &camera_calibration(own.clone(), 0, camera))?;
+        file.log(&topic("image"), 0, &picture(own, 0, view)?)
     }
 }
 

@@ -8,8 +8,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::inspect::METADATA_NAME;
-use super::writer::{Packing, write_file};
+use super::contents::Schema;
+use super::metadata::METADATA_NAME;
+use super::writer::{ChunkCompression, write_mcap};
 use crate::Result;
 use semfm_geom::math::{DQuat, DVec3};
 
@@ -58,11 +59,15 @@ pub fn write_pose_array(
     format: &str,
     metadata: &serde_json::Value,
 ) -> Result<()> {
-    write_file(path, "ros2", Packing::Lz4, |file| {
+    write_mcap(path, "ros2", ChunkCompression::Lz4, |file| {
         let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
         file.metadata(METADATA_NAME, BTreeMap::from(entries.map(|(k, v)| (k.to_owned(), v))))?;
-        let schema = ("geometry_msgs/msg/PoseArray", "ros2msg", POSE_ARRAY.as_bytes());
-        file.log_bytes(POSES_TOPIC, schema, "cdr", &pose_array(frame_id, poses))
+        let schema = Schema {
+            name: "geometry_msgs/msg/PoseArray".to_owned(),
+            encoding: "ros2msg".to_owned(),
+            data: POSE_ARRAY.into(),
+        };
+        file.log_encoded(POSES_TOPIC, &schema, "cdr", &pose_array(frame_id, poses))
     })
 }
 

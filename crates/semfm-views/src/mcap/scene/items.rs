@@ -1,0 +1,141 @@
+//! What a scene is made of.
+
+use semfm_geom::math::{DMat3, DVec3};
+
+use super::super::messages::MeshEntity;
+use crate::View;
+
+/// The frame in which the frames of a scene stand side by side.
+pub(super) const WORLD: &str = "world";
+
+/// How a frame stands in `world`.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneFrame<'a> {
+    /// The frame.
+    pub frame_id: &'a str,
+    /// A rotation.
+    pub world_from_frame: DMat3,
+}
+
+/// A triangle mesh to be shown.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneMesh<'a> {
+    /// Topic, such as `/source/mesh`.
+    pub topic: &'a str,
+    /// Frame of the vertices, such as `source`.
+    pub frame_id: &'a str,
+    /// What it is; unique in its topic.
+    pub name: &'a str,
+    /// Positions (n).
+    pub vertices: &'a [DVec3],
+    /// Triangles (m).
+    pub faces: &'a [[u32; 3]],
+    /// sRGB colours of the vertices (n), grey without.
+    pub colors: Option<&'a [[u8; 3]]>,
+}
+
+impl SceneMesh<'_> {
+    /// What its message says.
+    pub(super) fn entity(&self) -> MeshEntity<'_> {
+        let Self { frame_id, name, vertices, faces, colors, .. } = *self;
+        MeshEntity { frame_id, name, vertices, faces, colors }
+    }
+}
+
+/// A point cloud to be shown.
+#[derive(Clone, Copy, Debug)]
+pub struct ScenePoints<'a> {
+    /// Topic, such as `/source/cloud`.
+    pub topic: &'a str,
+    /// Frame of the points.
+    pub frame_id: &'a str,
+    /// Positions (n).
+    pub points: &'a [DVec3],
+    /// sRGB colours (n).
+    pub colors: &'a [[u8; 3]],
+    /// Named numbers (n each), to colour by.
+    pub numbers: &'a [(&'a str, SceneNumbers<'a>)],
+}
+
+/// One number for each point.
+#[derive(Clone, Copy, Debug)]
+pub enum SceneNumbers<'a> {
+    /// Single precision.
+    F32(&'a [f32]),
+    /// Signed.
+    I32(&'a [i32]),
+    /// Unsigned.
+    U32(&'a [u32]),
+}
+
+impl SceneNumbers<'_> {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::F32(numbers) => numbers.len(),
+            Self::I32(numbers) => numbers.len(),
+            Self::U32(numbers) => numbers.len(),
+        }
+    }
+}
+
+/// Words in the scene.
+#[derive(Clone, Debug)]
+pub struct SceneLabel<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// Frame of `at`, or which frame's objects to stand above.
+    pub frame_id: &'a str,
+    /// Where; above everything that the frame holds without.
+    pub at: Option<DVec3>,
+    /// The words.
+    pub text: String,
+    /// sRGB.
+    pub color: [u8; 3],
+}
+
+/// A line between points of two frames, shown in `world`.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneLink<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// Frame and point where it begins.
+    pub from: (&'a str, DVec3),
+    /// Frame and point where it ends.
+    pub to: (&'a str, DVec3),
+    /// sRGB.
+    pub color: [u8; 3],
+}
+
+/// A picture with its camera: topics `/FRAME/NAME/image` and `/FRAME/NAME/camera`, frame
+/// `FRAME_NAME`.
+#[derive(Clone, Copy, Debug)]
+pub struct ScenePicture<'a> {
+    /// Frame of what was drawn.
+    pub frame_id: &'a str,
+    /// Name of the picture, such as `view`.
+    pub name: &'a str,
+    /// The picture and its camera.
+    pub view: &'a View,
+}
+
+/// How grave a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// All is well.
+    Info,
+    /// Look at it.
+    Warning,
+    /// It failed.
+    Error,
+}
+
+/// A line of the log.
+#[derive(Clone, Debug)]
+pub struct SceneLog<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// How grave it is.
+    pub severity: Severity,
+    /// The words.
+    pub text: String,
+}
