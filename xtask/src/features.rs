@@ -1,14 +1,15 @@
-//! The facade without its default features: it compiles, and it pulls in neither MCAP nor a GPU.
+//! The facade without its default features: it compiles, and it pulls in neither MCAP nor a GPU nor
+//! pictures. `semfm-show` compiles without MCAP, too.
 
 use anyhow::{Result, ensure};
 
 use crate::process::cargo;
 use crate::workspace::Workspace;
 
-/// Crates that a robot build without files and pictures of views must not see.
-const ABSENT: [&str; 4] = ["mcap", "foxglove", "prost", "wgpu"];
+/// Crates that a robot build must not see: files of views, rendering on a GPU, pictures and pages.
+const ABSENT: [&str; 6] = ["mcap", "foxglove", "prost", "wgpu", "base64", "semfm-show"];
 
-/// Checks `semfm --no-default-features`.
+/// Checks `semfm` and `semfm-show` with `--no-default-features`.
 pub fn check(workspace: &Workspace) -> Result<()> {
     let facade = ["-p", "semfm", "--no-default-features"];
     let tree = [&["tree", "--prefix", "none", "--edges", "normal"], &facade[..]].concat();
@@ -23,5 +24,6 @@ pub fn check(workspace: &Workspace) -> Result<()> {
         "semfm without default features still depends on {}",
         found.join(", ")
     );
-    cargo(workspace, &[&["check"], &facade[..]].concat()).succeed()
+    cargo(workspace, &[&["check"], &facade[..]].concat()).succeed()?;
+    cargo(workspace, &["check", "-p", "semfm-show", "--no-default-features"]).succeed()
 }

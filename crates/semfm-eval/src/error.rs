@@ -124,6 +124,12 @@ impl From<semfm::fmap::Error> for Error {
     }
 }
 
+impl From<semfm_show::Error> for Error {
+    fn from(cause: semfm_show::Error) -> Self {
+        Self::Facade(cause.into())
+    }
+}
+
 impl From<semfm::views::Error> for Error {
     fn from(cause: semfm::views::Error) -> Self {
         Self::Facade(cause.into())

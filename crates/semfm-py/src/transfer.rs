@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use semfm::fmap;
-use semfm::output::write_transfer;
+use semfm_show::write_transfer;
 use serde_json::{Map, Value, json};
 
 use crate::held::Held;
@@ -139,7 +139,7 @@ impl Transfer {
         let (held, region) = (self.held.clone(), self.region.clone());
         let (source, target) = (self.source.held.clone(), self.target.held.clone());
         let files = run(py, progress, move |task| {
-            write_transfer(&folder, &source, &target, &region, &held, all, task)
+            Ok(write_transfer(&folder, &source, &target, &region, &held, all, task)?)
         })?;
         Ok(files.iter().map(|file| file.display().to_string()).collect())
     }

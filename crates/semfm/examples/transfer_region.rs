@@ -15,7 +15,7 @@ use std::path::Path;
 
 use semfm::geom::io::read_mesh;
 use semfm::geom::zoo::icosphere;
-use semfm::output::write_transfer;
+use semfm::output::{report_json, write_transfer};
 use semfm::region_file::read_region;
 use semfm::{Meaning, Mesh, PipelineSettings, PreparedObject, Region, Task, Verdict, transfer};
 
@@ -66,7 +66,8 @@ fn carry(
     }
     if let Some(folder) = folder {
         let about = serde_json::Map::new();
-        for path in write_transfer(folder, &source, &target, region, &carried, about, &task)? {
+        let report = report_json(&source, &target, &carried, about);
+        for path in write_transfer(folder, &source, &target, region, &carried, &report, &task)? {
             println!("{}", path.display());
         }
     }

@@ -38,13 +38,10 @@ mod error;
 pub mod grasps;
 pub mod observed;
 pub mod output;
-pub mod picture;
 pub mod pipeline;
 pub mod region_file;
 pub mod regions;
-#[cfg(feature = "mcap")]
-mod scene;
-pub mod show;
+pub mod weight_colors;
 
 pub use error::{Error, Result};
 pub use fmap::{Method, Region, Rule, Transfer, TransferSettings, Verdict};

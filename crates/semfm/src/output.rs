@@ -1,19 +1,20 @@
-//! Everything that a transfer leaves behind: files for programs, for people and for viewers.
+//! What a transfer leaves behind for programs. Pictures and scenes are made by `semfm-show`.
 
 use std::path::{Path, PathBuf};
 
+use semfm_fmap::Anchor;
+use semfm_fmap::clusters::spectral_clusters;
 use semfm_geom::io::{Paint, write_painted_mesh};
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, PointIndex, Task};
 use serde_json::{Map, Value, json};
 
-use crate::picture::{Exhibit, bytes, weight_colors};
 use crate::region_file::{region_json, write_json};
+use crate::weight_colors::{color_bytes, weight_colors};
 use crate::{PreparedObject, Region, Result, Transfer};
 
 /// Writes a transfer into `folder`, which is made if it is not there: `region.json`,
-/// `report.json`, `point_map.json`, `source.ply`, `target.ply`, `target.glb`, `transfer.png`, `meaning.png` and (feature
-/// `mcap`) `transfer.mcap`. Each file is written whole or not at all. `about` is put into the
-/// report as it is.
+/// `report.json` (see [`report_json`]), `point_map.json`, `source.ply`, `target.ply` and `target.glb`.
+/// Each file is written whole or not at all.
 ///
 /// # Errors
 /// The first file that cannot be written.
@@ -23,19 +24,18 @@ pub fn write_transfer(
     target: &PreparedObject,
     region: &Region,
     transfer: &Transfer,
-    about: Map<String, Value>,
+    report: &Value,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(folder)
         .map_err(|source| semfm_geom::Error::Io { path: folder.to_owned(), source })?;
     let at = |name: &str| folder.join(name);
     let mesh = target.shape.original();
-    let report = report_json(source, target, transfer, about);
 
     write_json(&at("region.json"), &carried_json(target, transfer))?;
-    write_json(&at("report.json"), &report)?;
-    let exhibit = Exhibit::new(source, target, region, transfer, task)?;
-    let [source_anchor, target_anchor] = &exhibit.anchors;
+    write_json(&at("report.json"), report)?;
+    let AnchorRanks { source: source_anchor, target: target_anchor } =
+        anchor_ranks(source, target, transfer, task)?;
     write_json(
         &at("point_map.json"),
         &json!({
@@ -43,30 +43,61 @@ pub fn write_transfer(
             "source": source.shape.original().hash().to_string(),
             "target": mesh.hash().to_string(),
             "source_of": transfer.point_map.source_of,
-            "source_anchor": source_anchor,
-            "target_anchor": target_anchor,
+            "source_anchor": source_anchor.of_vertex,
+            "target_anchor": target_anchor.of_vertex,
             "source_weight": rounded(region.weights()),
             "target_weight": rounded(transfer.weights()),
         }),
     )?;
     write_weighted(&[at("source.ply")], source.shape.original(), region.weights())?;
     write_weighted(&[at("target.ply"), at("target.glb")], mesh, transfer.weights())?;
-    exhibit.write_transfer_picture(&at("transfer.png"), task)?;
-    exhibit.write_meaning_picture(&at("meaning.png"), task)?;
-    #[cfg(feature = "mcap")]
-    crate::scene::write(&at("transfer.mcap"), &exhibit, &report, task)?;
-    let names = [
-        "region.json",
-        "report.json",
-        "point_map.json",
-        "source.ply",
-        "target.ply",
-        "target.glb",
-        "transfer.png",
-        "meaning.png",
-    ];
-    let scene = cfg!(feature = "mcap").then_some("transfer.mcap");
-    Ok(names.into_iter().chain(scene).map(at).collect())
+    let names =
+        ["region.json", "report.json", "point_map.json", "source.ply", "target.ply", "target.glb"];
+    Ok(names.into_iter().map(at).collect())
+}
+
+/// Where the anchors of a transfer lie on both objects.
+pub struct AnchorRanks {
+    /// On the source.
+    pub source: ObjectAnchors,
+    /// On the target.
+    pub target: ObjectAnchors,
+}
+
+/// Where the anchors of a transfer lie on one object.
+pub struct ObjectAnchors {
+    /// Cluster of each cloud point.
+    pub cluster_of_point: Vec<u32>,
+    /// Rank of the anchor that each cloud point's cluster is, best first; −1 for none.
+    pub of_point: Vec<i64>,
+    /// The same for each vertex of the mesh as read.
+    pub of_vertex: Vec<i64>,
+}
+
+/// Where the anchors of a transfer lie. The clusters are made anew, which takes some ten milliseconds.
+///
+/// # Errors
+/// Whatever clustering reports.
+pub fn anchor_ranks(
+    source: &PreparedObject,
+    target: &PreparedObject,
+    transfer: &Transfer,
+    task: &Task,
+) -> Result<AnchorRanks> {
+    let of = |object: &PreparedObject, side: fn(&Anchor) -> u32| -> Result<ObjectAnchors> {
+        let settings = &transfer.report.settings.clusters;
+        let clusters = spectral_clusters(&object.cloud, settings, task)?;
+        let anchors = &transfer.report.anchors;
+        let rank = |&label: &u32| {
+            anchors.iter().position(|a| side(&a.anchor) == label).map_or(-1, |rank| rank as i64)
+        };
+        let of_point: Vec<i64> = clusters.labels().iter().map(rank).collect();
+        let index = PointIndex::new(object.cloud.points())?;
+        let vertices = object.shape.original().vertices();
+        let of_vertex = vertices.iter().map(|&p| of_point[index.nearest(p).0]).collect();
+        Ok(ObjectAnchors { cluster_of_point: clusters.labels().to_vec(), of_point, of_vertex })
+    };
+    Ok(AnchorRanks { source: of(source, |a| a.source)?, target: of(target, |a| a.target)? })
 }
 
 /// Weights to four digits: enough for eyes, and a third of the bytes.
@@ -83,7 +114,7 @@ fn rounded(weights: &[f64]) -> Vec<f64> {
 fn write_weighted(paths: &[PathBuf], mesh: &Mesh, weights: &[f64]) -> Result<()> {
     let opaque = |[r, g, b]: [u8; 3]| [r, g, b, u8::MAX];
     let colors: Vec<[u8; 4]> =
-        weight_colors(weights).into_iter().map(|color| opaque(bytes(color))).collect();
+        weight_colors(weights).into_iter().map(|color| opaque(color_bytes(color))).collect();
     let paint = Paint { colors: Some(&colors), scalars: &[("weight", weights)] };
     Ok(paths.iter().try_for_each(|path| write_painted_mesh(path, mesh, &paint))?)
 }
@@ -109,7 +140,8 @@ fn carried_json(target: &PreparedObject, transfer: &Transfer) -> Value {
     carried
 }
 
-fn report_json(
+/// The report of a transfer; `about` is put into it as it is.
+pub fn report_json(
     source: &PreparedObject,
     target: &PreparedObject,
     transfer: &Transfer,

@@ -9,10 +9,10 @@ use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
 use semfm::grasp::{ApproachCone, GraspObject, GraspSettings, Grasps, Pose, Scene, find_grasps};
 use semfm::grasps::{GraspAnswer, write_grasps, write_isaac, write_ros2};
-use semfm::picture::write_grasp_picture;
 use semfm::region_file::read_region;
 use semfm::robot::gripper::{Gripper, GripperSettings};
 use semfm::{Task, aligned::read_aligned};
+use semfm_show::write_grasp_picture;
 use serde_json::{Map, Value, json};
 
 use super::Outcome;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use semfm::show::{groups_of_paths, write_page};
+use semfm_show::{groups_of_paths, write_page};
 use serde_json::json;
 
 use super::Outcome;

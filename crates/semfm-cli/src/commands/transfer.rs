@@ -7,13 +7,14 @@ use clap::{ArgGroup, Args};
 use semfm::geom::ShapeCache;
 use semfm::geom::io::MeshFile;
 use semfm::grasp::Grasps;
-use semfm::output::{stages_ms, write_transfer};
+use semfm::output::stages_ms;
 use semfm::region_file::read_region;
 use semfm::views::lift::LiftSettings;
 use semfm::{
     Meaning, Method, PipelineSettings, PreparedObject, Region, Rule, Task, Transfer, Verdict,
     transfer,
 };
+use semfm_show::write_transfer;
 use serde_json::{Map, Value, json};
 
 use super::Outcome;

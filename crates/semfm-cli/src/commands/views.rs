@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use semfm::geom::io::MeshFile;
-use semfm::picture::write_sheet;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
 use semfm::views::{Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View, rig};
+use semfm_show::write_sheet;
 
 use super::Outcome;
 use crate::options::Common;

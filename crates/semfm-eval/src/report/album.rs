@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use semfm::geom::Pinhole;
-use semfm::picture::{position_colors, viewpoints};
 use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Region, Task};
+use semfm_show::{position_colors, viewpoints};
 use serde::Deserialize;
 
 use super::ReportSettings;

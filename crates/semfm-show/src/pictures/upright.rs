@@ -1,8 +1,8 @@
 //! Which way is up: pictures of an object lying on its side are hard to read.
 
-use semfm_geom::math::{DVec3, bounds};
-use semfm_geom::{Mesh, principal_axes};
-use semfm_views::rig::fibonacci_directions;
+use semfm::geom::math::{DVec3, bounds};
+use semfm::geom::{Mesh, principal_axes};
+use semfm::views::rig::fibonacci_directions;
 
 use crate::Result;
 
@@ -121,8 +121,8 @@ fn width<'a>(facets: impl Iterator<Item = &'a Facet>, along: DVec3) -> f64 {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use semfm_geom::math::DMat3;
-    use semfm_geom::zoo;
+    use semfm::geom::math::DMat3;
+    use semfm::geom::zoo;
 
     use super::*;
 

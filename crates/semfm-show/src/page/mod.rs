@@ -4,22 +4,23 @@
 //! first to the second, pointing at one lights the matched place of the other. The viewer (`*.js`)
 //! is ours and draws with WebGL 2.
 
-mod folder;
+mod encoding;
 mod grasps;
-mod pack;
 mod paths;
+mod transfer_folder;
 #[cfg(feature = "mcap")]
 mod views;
 
 use std::path::Path;
 
-use semfm_geom::io::write_atomically;
-use semfm_geom::math::{DMat3, DVec3};
-use semfm_geom::{Mesh, Task};
+use semfm::geom::io::write_atomically;
+use semfm::geom::math::{DMat3, DVec3};
+use semfm::geom::{Mesh, Task};
+use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use serde_json::{Value, json};
 
-use self::pack::{base64, packed, packed_mesh, packed_numbers};
-use crate::picture::{MARKED, PLAIN, Sides, bytes, viewpoints};
+use self::encoding::{base64, packed, packed_mesh, packed_numbers};
+use crate::pictures::{Sides, viewpoints};
 use crate::{Error, Result};
 
 pub use paths::groups_of_paths;
@@ -163,7 +164,7 @@ impl Layer {
             self.legend.iter().map(|(color, text)| json!([color.map(hex), text])).collect();
         json!({
             "name": self.name, "legend": legend, "kind": self.paints[0].kind(),
-            "plain": bytes(PLAIN), "marked": bytes(MARKED),
+            "plain": color_bytes(PLAIN), "marked": color_bytes(MARKED),
         })
     }
 }
@@ -240,7 +241,7 @@ impl Group {
 /// Writes the page, whole or not at all.
 ///
 /// # Errors
-/// [`Error::Invalid`] for groups whose parts do not fit each other, [`semfm_geom::Error::Io`].
+/// [`Error::Invalid`] for groups whose parts do not fit each other, [`semfm::geom::Error::Io`].
 pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
     groups.iter().try_for_each(Group::check)?;
     let data = json!({ "groups": groups.iter().map(Group::json).collect::<Vec<_>>() });
@@ -248,12 +249,12 @@ pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
     let data = data.to_string().replace('<', "\\u003c");
     let script = [
         "\"use strict\";\n",
-        include_str!("painter.js"),
-        include_str!("panel.js"),
-        include_str!("viewer.js"),
+        include_str!("viewer/painter.js"),
+        include_str!("viewer/panel.js"),
+        include_str!("viewer/viewer.js"),
     ]
     .concat();
-    let page = include_str!("page.html")
+    let page = include_str!("viewer/page.html")
         .replace("{{title}}", &escaped(title))
         .replace("{{version}}", env!("CARGO_PKG_VERSION"))
         .replace("{{script}}", &script)

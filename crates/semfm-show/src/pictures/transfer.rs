@@ -6,14 +6,15 @@
 
 use std::path::Path;
 
-use semfm_geom::{Mesh, Task};
-use semfm_views::{Paint, RenderSettings, View, render};
+use semfm::geom::{Mesh, Task};
+use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::weight_colors::weight_colors;
 
 use super::sheet::{Entry, Row, Sheet};
-use super::{Exhibit, Sides, weight_colors};
+use super::{Sides, TransferFigure};
 use crate::Result;
 
-impl Exhibit<'_> {
+impl TransferFigure<'_> {
     /// Writes the picture of the transfer.
     ///
     /// # Errors

@@ -6,8 +6,8 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use semfm_geom::Mesh;
-use semfm_geom::math::{DVec3, bounds};
+use semfm::geom::Mesh;
+use semfm::geom::math::{DVec3, bounds};
 use serde_json::{Value, json};
 
 /// Bytes as they are, in base64.

@@ -2,18 +2,20 @@
 
 use std::path::Path;
 
-use semfm_geom::io::{MeshFile, read_mesh};
-use semfm_geom::{Mesh, Task};
+use semfm::Region;
+use semfm::geom::io::{MeshFile, read_mesh};
+use semfm::geom::{Mesh, Task};
 #[cfg(feature = "mcap")]
-use semfm_views::Fault;
+use semfm::views::Fault;
+use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::grasps::grasps_group;
 use super::paths::own_colors;
 use super::{Group, Layer, Paint, Panel};
-use crate::picture::{MARKED, PLAIN, Sides, anchor_color, bytes, paired_viewpoints};
-use crate::{Error, Region, Result};
+use crate::pictures::{Sides, anchor_color, paired_viewpoints};
+use crate::{Error, Result};
 
 /// What the files of `folder` say of one transfer, and its grasps, where there are some.
 ///
@@ -47,7 +49,7 @@ pub(super) fn transfer_groups(folder: &Path, task: &Task) -> Result<Vec<Group>> 
         legend: vec![(None, "equal colours: matched places".into())],
         paints: vec![Paint::Places, Paint::Places],
     });
-    layers.extend(meaning_layer(folder, [&source.mesh, &target.mesh])?);
+    layers.extend(features_layer(folder, [&source.mesh, &target.mesh])?);
     layers.push(anchor_layer(&map, &report));
     if places.len() > 1 {
         layers.push(places_layer(&places, &map, source.mesh.n_vertices(), n_target));
@@ -116,11 +118,11 @@ fn region_layer(map: &PointMapFile, source: &MeshFile, target: &MeshFile) -> Lay
 fn anchor_layer(map: &PointMapFile, report: &Value) -> Layer {
     let ranks = map.source_anchor.iter().chain(&map.target_anchor);
     let n_anchors = ranks.copied().max().map_or(0, |most| most.saturating_add(1).clamp(0, 200));
-    let mut legend = vec![(Some(bytes(anchor_color(-1))), "no anchor".to_owned())];
+    let mut legend = vec![(Some(color_bytes(anchor_color(-1))), "no anchor".to_owned())];
     legend.extend((0..n_anchors).map(|rank| {
         let cosine = report["anchors"][rank as usize]["cosine"].as_f64();
         let cosine = cosine.map_or(String::new(), |cosine| format!(": cosine {cosine:.2}"));
-        (Some(bytes(anchor_color(rank))), format!("anchor {}{cosine}", rank + 1))
+        (Some(color_bytes(anchor_color(rank))), format!("anchor {}{cosine}", rank + 1))
     }));
     let classes = |ranks: &[i64]| {
         Paint::Classes(
@@ -134,13 +136,13 @@ fn anchor_layer(map: &PointMapFile, report: &Value) -> Layer {
 /// The places that the region may belong to, each in its own colour.
 fn places_layer(places: &[Place], map: &PointMapFile, n_source: usize, n_target: usize) -> Layer {
     let mut legend = vec![
-        (Some(bytes(PLAIN)), "elsewhere".to_owned()),
-        (Some(bytes(MARKED)), "the demonstrated region".to_owned()),
+        (Some(color_bytes(PLAIN)), "elsewhere".to_owned()),
+        (Some(color_bytes(MARKED)), "the demonstrated region".to_owned()),
     ];
     let mut on_target = vec![0u8; n_target];
     for (i, place) in places.iter().enumerate().take(200) {
         let words = format!("place {}: {:.0} %", i + 1, 100.0 * place.probability);
-        legend.push((Some(bytes(anchor_color(i as i64))), words));
+        legend.push((Some(color_bytes(anchor_color(i as i64))), words));
         place.vertices.iter().for_each(|&v| on_target[v as usize] = i as u8 + 2);
     }
     let weights = map.source_weight.iter().flatten();
@@ -152,22 +154,22 @@ fn places_layer(places: &[Place], map: &PointMapFile, n_source: usize, n_target:
 
 /// Features as colours, from the clouds of the scene, where it is there and this build reads it.
 #[cfg(feature = "mcap")]
-fn meaning_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
+fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     let path = folder.join("transfer.mcap");
     if !path.is_file() {
         return Ok(None);
     }
     let mut paints = Vec::new();
     for (topic, mesh) in ["/source/cloud", "/target/cloud"].into_iter().zip(meshes) {
-        let (points, colors) = match semfm_views::mcap::read_cloud(&path, topic) {
+        let (points, colors) = match semfm::views::mcap::read_cloud(&path, topic) {
             Ok(Some(cloud)) => cloud,
             Ok(None) => return Ok(None),
             // A scene of millions of vertices is beyond the reader: that costs this layer, not the page.
-            Err(semfm_views::Error::Container { fault: Fault::OverLimit, .. }) => return Ok(None),
+            Err(semfm::views::Error::Container { fault: Fault::OverLimit, .. }) => return Ok(None),
             Err(error) => return Err(error.into()),
         };
-        let index = semfm_geom::PointIndex::new(&points)?;
-        let nearest = |&p: &semfm_geom::math::DVec3| colors[index.nearest(p).0];
+        let index = semfm::geom::PointIndex::new(&points)?;
+        let nearest = |&p: &semfm::geom::math::DVec3| colors[index.nearest(p).0];
         paints.push(Paint::Colors(mesh.vertices().iter().map(nearest).collect()));
     }
     let words = "three principal components of the features: equal colours mean the same";
@@ -175,7 +177,7 @@ fn meaning_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
 }
 
 #[cfg(not(feature = "mcap"))]
-fn meaning_layer(_folder: &Path, _meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
+fn features_layer(_folder: &Path, _meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     Ok(None)
 }
 
@@ -240,7 +242,7 @@ impl Place {
 
 pub(super) fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path)
-        .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
+        .map_err(|source| semfm::geom::Error::Io { path: path.to_owned(), source })?;
     serde_json::from_slice(&bytes).map_err(|error| Error::Format {
         path: path.to_owned(),
         place: format!("line {}", error.line()),

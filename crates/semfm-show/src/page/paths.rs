@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm_geom::Task;
-use semfm_geom::io::{MeshFile, MeshFormat, read_mesh};
+use semfm::Region;
+use semfm::geom::Task;
+use semfm::geom::io::{MeshFile, MeshFormat, read_mesh};
+use semfm::region_file::{self, read_region};
 use serde_json::Value;
 
-use super::folder::{read_json, transfer_groups};
 use super::grasps::grasps_group;
+use super::transfer_folder::{read_json, transfer_groups};
 use super::{Group, Layer, Paint, Panel};
-use crate::region_file::read_region;
-use crate::{Error, Region, Result};
+use crate::{Error, Result};
 
 /// What `show` takes, for its messages.
 const EXPECTED: &str = "the folder that `transfer -o` wrote, a mesh (OBJ, PLY, STL, OFF, glTF or GLB), \
@@ -67,13 +68,11 @@ fn fault(path: &Path, place: &str, found: &str) -> Error {
 fn json_alone(path: &Path) -> Error {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
-        Err(source) => return semfm_geom::Error::Io { path: path.to_owned(), source }.into(),
+        Err(source) => return semfm::geom::Error::Io { path: path.to_owned(), source }.into(),
     };
     let value: Value = serde_json::from_slice(&bytes).unwrap_or_default();
     match value["format"].as_str() {
-        Some(crate::region_file::FORMAT) => {
-            fault(path, "file", "a region without a mesh before it")
-        }
+        Some(region_file::FORMAT) => fault(path, "file", "a region without a mesh before it"),
         Some(format) => fault(path, "format", &format!("`{format}`")),
         None => fault(path, "file", "JSON without a mesh before it"),
     }
@@ -103,7 +102,7 @@ fn groups_of_folder(folder: &Path, task: &Task) -> Result<Vec<Group>> {
 
 #[cfg(feature = "mcap")]
 fn group_of_mcap(path: &Path, task: &Task) -> Result<Group> {
-    let report = semfm_views::mcap::inspect(path)?;
+    let report = semfm::views::mcap::inspect(path)?;
     let format = report.semfm.as_ref().and_then(|entries| entries.get("format"));
     match format.map(String::as_str) {
         Some("semfm.views/1") => super::views::views_group(path, task),
@@ -127,7 +126,7 @@ fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
     match read_mesh(path) {
         Ok(file) => group_of_mesh(path, file, task),
         // A file without a telling name may be a mesh, or anything.
-        Err(error @ semfm_geom::Error::Io { .. }) => Err(error.into()),
+        Err(error @ semfm::geom::Error::Io { .. }) => Err(error.into()),
         Err(error) if MeshFormat::from_path(path).is_some() => Err(error.into()),
         Err(_) => Err(fault(path, "file", "something else")),
     }
@@ -191,8 +190,8 @@ pub(super) fn own_colors(file: &MeshFile) -> Vec<[u8; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use semfm_geom::io::write_mesh;
-    use semfm_geom::zoo;
+    use semfm::geom::io::write_mesh;
+    use semfm::geom::zoo;
     use serde_json::json;
 
     use super::*;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use image::ImageEncoder;
-use semfm_geom::Task;
-use semfm_views::View;
-use semfm_views::mcap::{ViewsFile, read_mesh};
+use semfm::geom::Task;
+use semfm::views::View;
+use semfm::views::mcap::{ViewsFile, read_mesh};
 
 use super::{Group, Layer, Paint, Panel, Picture};
 use crate::{Error, Result};

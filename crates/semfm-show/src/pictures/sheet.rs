@@ -4,10 +4,12 @@ use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use semfm_geom::io::write_atomically;
-use semfm_views::View;
+use semfm::geom::io::write_atomically;
+use semfm::views::View;
 
-use super::{letters, weight_colors};
+use semfm::weight_colors::{color_bytes, weight_colors};
+
+use super::stroke_font;
 use crate::{Error, Result};
 
 const INK: [u8; 3] = [29, 36, 48];
@@ -27,7 +29,7 @@ const MARGIN: f32 = 18.0;
 /// from 000 in the corner; whole or not at all.
 ///
 /// # Errors
-/// [`Error::Invalid`] for no pictures or pictures of several sizes, [`semfm_geom::Error::Io`].
+/// [`Error::Invalid`] for no pictures or pictures of several sizes, [`semfm::geom::Error::Io`].
 pub fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()> {
     let columns = columns.clamp(1, pictures.len().max(1));
     let rows: Vec<Row<'_>> =
@@ -37,7 +39,7 @@ pub fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()>
     for i in 0..pictures.len() {
         let corner = ((i % columns) * width + 8, (i / columns) * height + 8);
         let foot = (corner.0 as f32, corner.1 as f32 + NUMBER);
-        letters::draw(&mut pixels, foot, NUMBER, QUIET, &format!("{i:03}"));
+        stroke_font::draw(&mut pixels, foot, NUMBER, QUIET, &format!("{i:03}"));
     }
     pixels.write_png(path)
 }
@@ -87,15 +89,15 @@ impl Sheet<'_> {
 
         for (column, title) in self.columns.iter().enumerate() {
             let middle = (column as f32 + 0.5) * width as f32;
-            let left = middle - letters::width(title, LABEL) / 2.0;
-            letters::draw(&mut pixels, (left, header as f32 - 12.0), LABEL, QUIET, title);
+            let left = middle - stroke_font::width(title, LABEL) / 2.0;
+            stroke_font::draw(&mut pixels, (left, header as f32 - 12.0), LABEL, QUIET, title);
         }
         let mut top = header;
         for row in self.rows {
             if strip > 0 {
                 pixels.fill((0, top), (total_width, 1), LINE);
                 let foot = (MARGIN, top as f32 + 30.0);
-                letters::draw(&mut pixels, foot, TITLE, INK, &row.title);
+                stroke_font::draw(&mut pixels, foot, TITLE, INK, &row.title);
             }
             top += strip;
             for (column, view) in row.pictures.iter().enumerate() {
@@ -145,22 +147,22 @@ impl Entry {
 
     fn width(&self) -> f32 {
         let mark = match self {
-            Self::Weights => letters::width("weight", LABEL) + BAR as f32 + 20.0,
+            Self::Weights => stroke_font::width("weight", LABEL) + BAR as f32 + 20.0,
             Self::Swatch(..) => SWATCH,
             Self::Words(_) => 0.0,
         };
-        mark + letters::width(self.words(), LABEL)
+        mark + stroke_font::width(self.words(), LABEL)
     }
 
     fn draw(&self, pixels: &mut Pixels, (mut left, foot): (f32, f32)) {
         match self {
             Self::Weights => {
-                letters::draw(pixels, (left, foot), LABEL, INK, "weight");
-                left += letters::width("weight", LABEL) + 10.0;
+                stroke_font::draw(pixels, (left, foot), LABEL, INK, "weight");
+                left += stroke_font::width("weight", LABEL) + 10.0;
                 let corner = (left as usize, (foot - LABEL) as usize);
                 let shares: Vec<f64> = (0..BAR).map(|x| x as f64 / (BAR - 1) as f64).collect();
                 for (x, color) in weight_colors(&shares).into_iter().enumerate() {
-                    pixels.fill((corner.0 + x, corner.1), (1, LABEL as usize), bytes(color));
+                    pixels.fill((corner.0 + x, corner.1), (1, LABEL as usize), color_bytes(color));
                 }
                 let middle = (corner.0 + BAR / 2, corner.1.saturating_sub(3));
                 pixels.fill(middle, (2, LABEL as usize + 6), INK);
@@ -168,18 +170,17 @@ impl Entry {
             }
             Self::Swatch(color, _) => {
                 let side = LABEL as usize;
-                pixels.fill((left as usize, (foot - LABEL) as usize), (side, side), bytes(*color));
+                pixels.fill(
+                    (left as usize, (foot - LABEL) as usize),
+                    (side, side),
+                    color_bytes(*color),
+                );
                 left += SWATCH;
             }
             Self::Words(_) => {}
         }
-        letters::draw(pixels, (left, foot), LABEL, INK, self.words());
+        stroke_font::draw(pixels, (left, foot), LABEL, INK, self.words());
     }
-}
-
-/// sRGB in 0..1 as bytes.
-pub(crate) fn bytes(color: [f32; 3]) -> [u8; 3] {
-    color.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
 /// Width and height that all pictures have.
@@ -283,8 +284,8 @@ fn distance(p: [f32; 2], a: [f32; 2], b: [f32; 2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use semfm_geom::math::DAffine3;
-    use semfm_geom::{Intrinsics, Pinhole};
+    use semfm::geom::math::DAffine3;
+    use semfm::geom::{Intrinsics, Pinhole};
 
     use super::*;
 

@@ -2,13 +2,14 @@
 //! from the same side.
 
 use faer::{Mat, Side};
-use semfm_geom::math::{DMat3, DQuat, DVec3};
-use semfm_geom::{Mesh, Pinhole, Task};
-use semfm_views::rig::{camera_towards, fibonacci_directions};
-use semfm_views::{Paint, RenderSettings, RigSettings, render};
+use semfm::Region;
+use semfm::geom::math::{DMat3, DQuat, DVec3};
+use semfm::geom::{Mesh, Pinhole, Task};
+use semfm::views::rig::{camera_towards, fibonacci_directions};
+use semfm::views::{Paint, RenderSettings, RigSettings, render};
 
 use super::upright::{Upright, upright};
-use crate::{Region, Result};
+use crate::Result;
 
 /// Side of the small pictures that the viewpoints are chosen by, and how many there are.
 const SCOUT: u32 = 96;
@@ -292,7 +293,7 @@ fn target_from_source(source: &Mesh, target: &Mesh, source_of: &[u32]) -> Option
 
 #[cfg(test)]
 mod tests {
-    use semfm_geom::zoo;
+    use semfm::geom::zoo;
 
     use super::super::upright::tests::turned;
     use super::*;

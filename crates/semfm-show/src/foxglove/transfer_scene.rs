@@ -8,17 +8,19 @@
 
 use std::path::Path;
 
-use semfm_geom::math::DVec3;
-use semfm_geom::sampling::farthest_points;
-use semfm_geom::{Mesh, Task};
-use semfm_views::mcap::{
+use semfm::geom::math::DVec3;
+use semfm::geom::sampling::farthest_points;
+use semfm::geom::{Mesh, Task};
+use semfm::views::mcap::{
     Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
     ScenePoints, Severity,
 };
-use semfm_views::{Paint, RenderSettings, View, render};
+use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::weight_colors::{color_bytes, weight_colors};
+use semfm::{Region, Verdict};
 
-use crate::picture::{Exhibit, anchor_color, bytes, weight_colors};
-use crate::{Region, Result, Verdict};
+use crate::Result;
+use crate::pictures::{TransferFigure, anchor_color};
 
 const FRAMES: [&str; 2] = ["source", "target"];
 /// Topics of each frame.
@@ -30,19 +32,23 @@ const VERTICES: [&str; 2] = ["/source/vertices", "/target/vertices"];
 const N_MATCHES: usize = 80;
 const INK: [u8; 3] = [40, 40, 40];
 
-pub(crate) fn write(
+/// Writes `transfer.mcap`; `report` goes with it.
+///
+/// # Errors
+/// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails.
+pub(crate) fn write_transfer_scene(
     path: &Path,
-    exhibit: &Exhibit<'_>,
+    figure: &TransferFigure<'_>,
     report: &serde_json::Value,
     task: &Task,
 ) -> Result<()> {
-    let sides = [Side::new(exhibit, 0, task)?, Side::new(exhibit, 1, task)?];
-    let transfer = exhibit.transfer;
+    let sides = [Side::new(figure, 0, task)?, Side::new(figure, 1, task)?];
+    let transfer = figure.transfer;
     let others: Vec<Part> = if transfer.hypotheses.len() > 1 {
         transfer
             .hypotheses
             .iter()
-            .map(|h| Part::of(exhibit.meshes()[1], h.region.weights()))
+            .map(|h| Part::of(figure.meshes()[1], h.region.weights()))
             .collect()
     } else {
         Vec::new()
@@ -51,16 +57,16 @@ pub(crate) fn write(
     let colors: Vec<Vec<[u8; 3]>> = others
         .iter()
         .enumerate()
-        .map(|(i, part)| vec![bytes(anchor_color(i as i64)); part.vertices.len()])
+        .map(|(i, part)| vec![color_bytes(anchor_color(i as i64)); part.vertices.len()])
         .collect();
     let numbers = [0, 1].map(|k| sides[k].numbers());
     let cloud_numbers = [0, 1].map(|k| sides[k].cloud_numbers());
 
     let mut scene = Scene::default();
     for (k, side) in sides.iter().enumerate() {
-        let (mesh, cloud) = (exhibit.meshes()[k], &exhibit.objects()[k].cloud);
+        let (mesh, cloud) = (figure.meshes()[k], &figure.objects()[k].cloud);
         let frame_id = FRAMES[k];
-        let world_from_frame = exhibit.sides[k].upright_from_object;
+        let world_from_frame = figure.sides[k].upright_from_object;
         scene.frames.push(SceneFrame { frame_id, world_from_frame });
         let shown = |topic, colors| SceneMesh {
             topic,
@@ -75,7 +81,7 @@ pub(crate) fn write(
             topic: CLOUD[k],
             frame_id,
             points: cloud.points(),
-            colors: &side.meaning,
+            colors: &side.features,
             numbers: &cloud_numbers[k],
         });
         scene.clouds.push(ScenePoints {
@@ -101,11 +107,11 @@ pub(crate) fn write(
             frame_id: FRAMES[1],
             at: Some(mean(part.vertices.iter().copied())),
             text: format!("{}: {:.0} %", names[i], 100.0 * transfer.hypotheses[i].probability),
-            color: bytes(anchor_color(i as i64)),
+            color: color_bytes(anchor_color(i as i64)),
         });
     }
-    scene.labels.extend(labels(exhibit));
-    scene.links = matches(exhibit, &sides[1].places);
+    scene.labels.extend(labels(figure));
+    scene.links = matches(figure, &sides[1].places);
     let method = serde_json::json!(transfer.report.settings.method);
     scene.log = Some(SceneLog {
         topic: "/answer",
@@ -114,7 +120,7 @@ pub(crate) fn write(
             Verdict::Check => Severity::Warning,
             Verdict::Refuse => Severity::Error,
         },
-        text: format!("{}, method {}", exhibit.answer(), method.as_str().unwrap_or_default()),
+        text: format!("{}, method {}", figure.answer(), method.as_str().unwrap_or_default()),
     });
     Ok(scene.write(path, "semfm.transfer/1", report)?)
 }
@@ -123,38 +129,38 @@ pub(crate) fn write(
 struct Side<'a> {
     marked: Vec<[u8; 3]>,
     places: Vec<[u8; 3]>,
-    meaning: Vec<[u8; 3]>,
+    features: Vec<[u8; 3]>,
     view: View,
     /// By vertex.
     weight: Vec<f32>,
     anchor: Vec<i32>,
     source_vertex: &'a [u32],
     /// By cloud point.
-    cluster: Vec<u32>,
+    cluster: &'a [u32],
     cloud_anchor: Vec<i32>,
     n_views: Vec<u32>,
 }
 
 impl<'a> Side<'a> {
-    fn new(exhibit: &'a Exhibit<'_>, k: usize, task: &Task) -> Result<Self> {
-        let all_bytes = |colors: &[[f32; 3]]| colors.iter().copied().map(bytes).collect();
-        let (mesh, weights) = (exhibit.meshes()[k], exhibit.weights()[k]);
+    fn new(figure: &'a TransferFigure<'_>, k: usize, task: &Task) -> Result<Self> {
+        let all_bytes = |colors: &[[f32; 3]]| colors.iter().copied().map(color_bytes).collect();
+        let (mesh, weights) = (figure.meshes()[k], figure.weights()[k]);
         let marked = weight_colors(weights);
-        let cameras = [exhibit.sides[k].best];
+        let cameras = [figure.sides[k].best];
         let light = RenderSettings::default();
         let mut views = render(mesh, &Paint::Vertices(&marked), &cameras, &light, task)?;
-        let clusters = &exhibit.clusters[k];
+        let anchors = &figure.anchors[k];
         Ok(Self {
             marked: all_bytes(&marked),
-            places: all_bytes(&exhibit.places[k]),
-            meaning: all_bytes(&exhibit.meaning[k]),
+            places: all_bytes(&figure.places[k]),
+            features: all_bytes(&figure.feature_colors[k]),
             view: views.swap_remove(0),
             weight: weights.iter().map(|&w| w as f32).collect(),
-            anchor: exhibit.anchors[k].iter().map(|&rank| rank as i32).collect(),
-            source_vertex: &exhibit.transfer.point_map.source_of,
-            cluster: clusters.iter().map(|cluster| cluster.0).collect(),
-            cloud_anchor: clusters.iter().map(|c| c.1.map_or(-1, |rank| rank as i32)).collect(),
-            n_views: exhibit.objects()[k].cloud.n_views().to_vec(),
+            anchor: anchors.of_vertex.iter().map(|&rank| rank as i32).collect(),
+            source_vertex: &figure.transfer.point_map.source_of,
+            cluster: &anchors.cluster_of_point,
+            cloud_anchor: anchors.of_point.iter().map(|&rank| rank as i32).collect(),
+            n_views: figure.objects()[k].cloud.n_views().to_vec(),
         })
     }
 
@@ -169,7 +175,7 @@ impl<'a> Side<'a> {
 
     fn cloud_numbers(&self) -> [(&str, SceneNumbers<'_>); 3] {
         [
-            ("cluster", SceneNumbers::U32(&self.cluster)),
+            ("cluster", SceneNumbers::U32(self.cluster)),
             ("anchor", SceneNumbers::I32(&self.cloud_anchor)),
             ("n_views", SceneNumbers::U32(&self.n_views)),
         ]
@@ -200,9 +206,9 @@ impl Part {
 }
 
 /// What stands above the objects, and at the anchors.
-fn labels<'a>(exhibit: &Exhibit<'_>) -> Vec<SceneLabel<'a>> {
+fn labels<'a>(figure: &TransferFigure<'_>) -> Vec<SceneLabel<'a>> {
     let titles =
-        ["source: the demonstrated region".to_owned(), format!("target: {}", exhibit.answer())];
+        ["source: the demonstrated region".to_owned(), format!("target: {}", figure.answer())];
     let title = |(k, text): (usize, String)| SceneLabel {
         topic: "/labels",
         frame_id: FRAMES[k],
@@ -211,16 +217,16 @@ fn labels<'a>(exhibit: &Exhibit<'_>) -> Vec<SceneLabel<'a>> {
         color: INK,
     };
     let mut labels: Vec<SceneLabel<'a>> = titles.into_iter().enumerate().map(title).collect();
-    for (rank, anchor) in exhibit.transfer.report.anchors.iter().enumerate() {
+    for (rank, anchor) in figure.transfer.report.anchors.iter().enumerate() {
         for (k, frame_id) in FRAMES.into_iter().enumerate() {
-            let points = exhibit.objects()[k].cloud.points().iter().zip(&exhibit.clusters[k]);
-            let own = points.filter(|(_, cluster)| cluster.1 == Some(rank)).map(|(&p, _)| p);
+            let points = figure.objects()[k].cloud.points().iter().zip(&figure.anchors[k].of_point);
+            let own = points.filter(|(_, of_point)| **of_point == rank as i64).map(|(&p, _)| p);
             labels.push(SceneLabel {
                 topic: "/anchors",
                 frame_id,
                 at: Some(mean(own)),
                 text: format!("anchor {}: cosine {:.2}", rank + 1, anchor.anchor.cosine),
-                color: bytes(anchor_color(rank as i64)),
+                color: color_bytes(anchor_color(rank as i64)),
             });
         }
     }
@@ -228,12 +234,12 @@ fn labels<'a>(exhibit: &Exhibit<'_>) -> Vec<SceneLabel<'a>> {
 }
 
 /// Lines from places spread over the target to where they are matched on the source.
-fn matches<'a>(exhibit: &Exhibit<'_>, colors: &[[u8; 3]]) -> Vec<SceneLink<'a>> {
-    let [source, target] = exhibit.meshes();
+fn matches<'a>(figure: &TransferFigure<'_>, colors: &[[u8; 3]]) -> Vec<SceneLink<'a>> {
+    let [source, target] = figure.meshes();
     farthest_points(target.vertices(), N_MATCHES)
         .into_iter()
         .map(|i| {
-            let matched = exhibit.transfer.point_map.source_of[i as usize];
+            let matched = figure.transfer.point_map.source_of[i as usize];
             SceneLink {
                 topic: "/matches",
                 from: (FRAMES[1], target.vertices()[i as usize]),

@@ -1,4 +1,4 @@
-//! `meaning.png`: what the two surfaces mean to the encoder.
+//! `meaning.png`: the features of both surfaces, their clusters and anchors.
 //!
 //! One row for each object, source above. Two pictures show the lifted features, their first three
 //! principal directions as red, green and blue, in one basis for both objects: equal colours mean
@@ -7,13 +7,14 @@
 
 use std::path::Path;
 
-use semfm_fmap::features::{CentredFeatures, JointFeatures};
-use semfm_geom::{SemanticCloud, Task};
-use semfm_views::{Paint, RenderSettings, View, render};
+use semfm::fmap::features::{CentredFeatures, JointFeatures};
+use semfm::geom::{SemanticCloud, Task};
+use semfm::output::ObjectAnchors;
+use semfm::views::{Paint, RenderSettings, View, render};
 
-use super::exhibit::{ClusterOfPoint, by_vertex};
 use super::sheet::{Entry, Row, Sheet};
-use super::{Exhibit, Sides};
+use super::transfer_figure::by_vertex;
+use super::{Sides, TransferFigure};
 use crate::Result;
 
 /// Features have unit RMS length: this much on each side of grey shows all but the outliers.
@@ -30,13 +31,13 @@ const ANCHORS: [[f32; 3]; 6] = [
 /// Clusters that are no anchors, by turns.
 const REST: [[f32; 3]; 2] = [[0.82; 3], [0.68; 3]];
 
-impl Exhibit<'_> {
-    /// Writes the picture of what the surfaces mean.
+impl TransferFigure<'_> {
+    /// Writes the picture of the features, clusters and anchors.
     ///
     /// # Errors
     /// Whatever rendering or writing reports.
-    pub fn write_meaning_picture(&self, path: &Path, task: &Task) -> Result<()> {
-        let [source, target] = [0, 1].map(|side| self.meaning_pictures(side, task));
+    pub fn write_features_picture(&self, path: &Path, task: &Task) -> Result<()> {
+        let [source, target] = [0, 1].map(|side| self.feature_pictures(side, task));
         let (source, target) = (source?, target?);
         let rows = [
             Row { title: "source".into(), pictures: &source },
@@ -60,25 +61,20 @@ impl Exhibit<'_> {
         Sheet { columns: &columns, rows: &rows, legend: &legend }.write(path)
     }
 
-    fn meaning_pictures(&self, side: usize, task: &Task) -> Result<Vec<View>> {
+    fn feature_pictures(&self, side: usize, task: &Task) -> Result<Vec<View>> {
         let (object, Sides { best, other, .. }) = (self.objects()[side], self.sides[side]);
-        let paint = |&(label, anchor): &ClusterOfPoint| match anchor {
-            Some(rank) => anchor_color(rank as i64),
-            None => REST[label as usize % REST.len()],
-        };
-        let parts: Vec<[f32; 3]> = self.clusters[side].iter().map(paint).collect();
-        let (meaning, parts) =
-            (by_vertex(object, &self.meaning[side])?, by_vertex(object, &parts)?);
+        let clusters = by_vertex(object, &cluster_colors(&self.anchors[side]))?;
+        let features = by_vertex(object, &self.feature_colors[side])?;
         let (mesh, light) = (object.shape.original(), RenderSettings::default());
-        let mut pictures = render(mesh, &Paint::Vertices(&meaning), &[best, other], &light, task)?;
-        pictures.extend(render(mesh, &Paint::Vertices(&parts), &[best], &light, task)?);
+        let mut pictures = render(mesh, &Paint::Vertices(&features), &[best, other], &light, task)?;
+        pictures.extend(render(mesh, &Paint::Vertices(&clusters), &[best], &light, task)?);
         Ok(pictures)
     }
 }
 
 /// The first three principal directions of the pair's features as colours of the clouds' points, in
 /// one basis.
-pub(crate) fn meaning_colors(
+pub(super) fn feature_colors(
     source: &SemanticCloud,
     target: &SemanticCloud,
 ) -> Result<[Vec<[f32; 3]>; 2]> {
@@ -92,6 +88,16 @@ pub(crate) fn meaning_colors(
         (0..features.nrows()).map(|i| std::array::from_fn(|c| channel(i, c))).collect()
     };
     Ok([colors(joint.source.as_ref()), colors(joint.target.as_ref())])
+}
+
+/// The colour of each cloud point: that of the anchor that its cluster is, grey without.
+fn cluster_colors(anchors: &ObjectAnchors) -> Vec<[f32; 3]> {
+    let clusters = anchors.cluster_of_point.iter();
+    let color = |(&cluster, &rank): (&u32, &i64)| match rank {
+        -1 => REST[cluster as usize % REST.len()],
+        rank => anchor_color(rank),
+    };
+    clusters.zip(&anchors.of_point).map(color).collect()
 }
 
 /// The colour of an anchor by its rank, of what is none by a negative one.

@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use parry3d_f64::transformation::try_convex_hull;
-use semfm_geom::math::{DMat3, DVec3};
-use semfm_geom::{Mesh, Task};
+use semfm::Region;
+use semfm::geom::math::{DMat3, DVec3};
+use semfm::geom::{Mesh, Task};
+use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::folder::read_json;
+use super::transfer_folder::read_json;
 use super::{Group, Layer, Paint, Panel};
-use crate::picture::{MARKED, PLAIN, SHOWN, bytes, hand_color, sides_with_hands};
-use crate::{Error, Region, Result};
+use crate::pictures::{SHOWN, hand_color, sides_with_hands};
+use crate::{Error, Result};
 
 /// The grasps of `path` at `mesh`, which must be the one they were found on; `weights` are those of
 /// the region, where it is known. Nothing where there is no grasp.
@@ -42,12 +44,12 @@ pub(super) fn grasps_group(
     let none = vec![0.0; mesh.n_vertices()];
     let weights = weights.unwrap_or(&none);
     let mut legend = vec![
-        (Some(bytes(PLAIN)), "the object".to_owned()),
-        (Some(bytes(MARKED)), "the region".to_owned()),
+        (Some(color_bytes(PLAIN)), "the object".to_owned()),
+        (Some(color_bytes(MARKED)), "the region".to_owned()),
     ];
     legend.extend(shown.iter().enumerate().map(|(rank, grasp)| {
         let words = format!("{}: {:.0} mm, score {:.2}", rank + 1, 1e3 * grasp.width, grasp.score);
-        (Some(bytes(hand_color(rank))), format!("grasp {words}"))
+        (Some(color_bytes(hand_color(rank))), format!("grasp {words}"))
     }));
     let scene = |grasps: &[Grasp]| -> Result<(Mesh, Paint)> {
         let (mut vertices, mut faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());

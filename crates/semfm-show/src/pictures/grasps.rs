@@ -6,16 +6,17 @@ use std::path::Path;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
-use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Task};
-use semfm_grasp::Grasp;
-use semfm_robot::Gripper;
-use semfm_views::{Paint, RenderSettings, View, render};
+use semfm::geom::math::DVec3;
+use semfm::geom::{Mesh, Task};
+use semfm::grasp::Grasp;
+use semfm::robot::Gripper;
+use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::weight_colors::weight_colors;
 
 use super::sheet::{Entry, Row, Sheet};
 use super::upright::upright;
 use super::viewpoints::viewpoints_around;
-use super::{SIDE, Sides, weight_colors};
+use super::{SIDE, Sides};
 use crate::Result;
 
 /// Colour of the worst and of the best hand shown, as sRGB in 0..1.
@@ -139,7 +140,7 @@ fn add_shape(shape: &dyn Shape, pose: Pose, vertices: &mut Vec<DVec3>, faces: &m
 
 #[cfg(test)]
 mod tests {
-    use semfm_views::View;
+    use semfm::views::View;
 
     use super::*;
 

@@ -1,14 +1,14 @@
 //! A finished transfer with everything that its pictures and scenes show of it.
 
-use super::meaning::meaning_colors;
+use super::features::feature_colors;
 use super::{SIDE, Sides, paired_viewpoints, position_colors};
-use crate::{PreparedObject, Region, Result, Transfer};
-use semfm_fmap::Anchor;
-use semfm_fmap::clusters::spectral_clusters;
-use semfm_geom::{Mesh, PointIndex, Task};
+use crate::Result;
+use semfm::geom::PointIndex;
+use semfm::output::{AnchorRanks, ObjectAnchors, anchor_ranks};
+use semfm::{Mesh, PreparedObject, Region, Task, Transfer};
 
 /// A transfer, ready to be shown. Pairs are source and target.
-pub struct Exhibit<'a> {
+pub struct TransferFigure<'a> {
     pub(crate) source: &'a PreparedObject,
     pub(crate) target: &'a PreparedObject,
     pub(crate) region: &'a Region,
@@ -18,17 +18,12 @@ pub struct Exhibit<'a> {
     /// Colour of each vertex: the source's by position, the target's that of its match.
     pub(crate) places: [Vec<[f32; 3]>; 2],
     /// Colour of each cloud point: three principal components of the pair's features in one basis.
-    pub(crate) meaning: [Vec<[f32; 3]>; 2],
-    /// Cluster of each cloud point, and the rank of the anchor that it is.
-    pub(crate) clusters: [Vec<ClusterOfPoint>; 2],
-    /// Rank of the anchor at each vertex, −1 outside of all.
-    pub(crate) anchors: [Vec<i64>; 2],
+    pub(crate) feature_colors: [Vec<[f32; 3]>; 2],
+    /// Where the anchors lie.
+    pub(crate) anchors: [ObjectAnchors; 2],
 }
 
-/// The cluster that a cloud point belongs to, and the rank of the anchor that it is.
-pub(crate) type ClusterOfPoint = (u32, Option<usize>);
-
-impl<'a> Exhibit<'a> {
+impl<'a> TransferFigure<'a> {
     /// Chooses viewpoints and colours. The clusters are made anew: they are a picture's matter, and
     /// cost some ten milliseconds.
     ///
@@ -52,23 +47,12 @@ impl<'a> Exhibit<'a> {
         )?;
         let on_source = position_colors(source_mesh.vertices());
         let on_target = source_of.iter().map(|&v| on_source[v as usize]).collect();
-        let meaning = meaning_colors(&source.cloud, &target.cloud)?;
-        let clusters = |object: &PreparedObject, side: fn(&Anchor) -> u32| {
-            let settings = &transfer.report.settings.clusters;
-            let clusters = spectral_clusters(&object.cloud, settings, task)?;
-            let anchors = &transfer.report.anchors;
-            let rank = |label: u32| anchors.iter().position(|a| side(&a.anchor) == label);
-            Result::Ok(clusters.labels().iter().map(|&label| (label, rank(label))).collect())
-        };
-        let clusters: [Vec<ClusterOfPoint>; 2] =
-            [clusters(source, |a| a.source)?, clusters(target, |a| a.target)?];
-        let anchors = |object, clusters: &[ClusterOfPoint]| {
-            let rank = |cluster: &ClusterOfPoint| cluster.1.map_or(-1, |rank| rank as i64);
-            by_vertex(object, &clusters.iter().map(rank).collect::<Vec<i64>>())
-        };
-        let anchors = [anchors(source, &clusters[0])?, anchors(target, &clusters[1])?];
+        let feature_colors = feature_colors(&source.cloud, &target.cloud)?;
+        let AnchorRanks { source: on_source_anchors, target: on_target_anchors } =
+            anchor_ranks(source, target, transfer, task)?;
+        let anchors = [on_source_anchors, on_target_anchors];
         let places = [on_source, on_target];
-        Ok(Self { source, target, region, transfer, sides, places, meaning, clusters, anchors })
+        Ok(Self { source, target, region, transfer, sides, places, feature_colors, anchors })
     }
 
     pub(crate) fn meshes(&self) -> [&'a Mesh; 2] {
