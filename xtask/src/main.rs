@@ -8,6 +8,7 @@
 mod docs;
 mod duplicates;
 mod features;
+mod package;
 mod pictures;
 mod process;
 mod python;
@@ -30,13 +31,14 @@ cargo xtask fmt             formatting, without changing anything
 cargo xtask lint            clippy on all targets, warnings are errors
 cargo xtask doc             the documentation, warnings are errors
 cargo xtask features        the facade without its default features
+cargo xtask package         every crate packed as for crates.io, and compiled from what was packed
 cargo xtask deny            one version of each crate whose types cross our borders
 cargo xtask corpus          the readers against the corpus of bad files, where it is at hand
 cargo xtask stubs           writes the type stubs of the Python package anew
 cargo xtask wheel           builds the wheel (release) and checks its size and how fast it imports
 cargo xtask pictures        makes the README's pictures anew, in a browser where there is one
 cargo xtask bench           builds the benchmark programs (release) and names them
-cargo xtask ci              fmt, lint, doc, features, deny, then test --full";
+cargo xtask ci              fmt, deny, lint, doc, features, package, then test --full";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -72,7 +74,7 @@ fn run(words: &[&str]) -> Result<bool> {
 
 type Job = fn(&Workspace) -> Result<()>;
 
-const JOBS: [(&str, Job); 10] = [
+const JOBS: [(&str, Job); 11] = [
     ("fmt", |workspace| cargo(workspace, &["fmt", "--all", "--check"]).succeed()),
     ("lint", |workspace| {
         let arguments = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
@@ -84,6 +86,7 @@ const JOBS: [(&str, Job); 10] = [
             .succeed()
     }),
     ("features", features::check),
+    ("package", package::check),
     ("deny", duplicates::check),
     ("corpus", |workspace| {
         let arguments = ["test", "--workspace", "--test", "corpus*", "--", "--show-output"];
@@ -96,7 +99,7 @@ const JOBS: [(&str, Job); 10] = [
 ];
 
 /// What CI runs before the tests, cheapest first.
-const BEFORE_TESTS: [&str; 5] = ["fmt", "deny", "lint", "doc", "features"];
+const BEFORE_TESTS: [&str; 6] = ["fmt", "deny", "lint", "doc", "features", "package"];
 
 /// All jobs, the tests last so that their summary is the last line; a failed job stops no other.
 fn ci(workspace: &Workspace) -> bool {

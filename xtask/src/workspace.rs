@@ -54,7 +54,8 @@ impl Workspace {
     }
 }
 
-fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+/// What a folder holds.
+pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let read = || -> std::io::Result<Vec<PathBuf>> {
         folder.read_dir()?.map(|entry| Ok(entry?.path())).collect()
     };
