@@ -76,7 +76,7 @@ def draw(binary: str, mesh: Path, options: str, views: Path) -> None:
         import semfm
 
         plain, colors = semfm.Mesh.read(mesh), semfm.read_mesh(painted).vertex_colors
-        semfm.write_views(views, semfm.render(plain, colors=colors[:, :3] / 255), plain)
+        semfm.ViewsFile(plain, semfm.render(plain, colors=colors[:, :3] / 255)).write(views)
         return
     options = "" if options == ONE_SIDE else options
     colours = [] if "--normals" in options else ["--grey"]

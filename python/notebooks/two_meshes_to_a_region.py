@@ -6,7 +6,7 @@
 # SemFM finds semantic parts that two objects share, lays a *functional map* between their surfaces
 # through those anchors, and carries the demonstrated region along it. This notebook walks that road
 # with two procedural objects and simulated embeddings, so that it runs anywhere within a minute:
-# `pip install 'semfm[notebook]'`. With your own objects only the first two cells change.
+# `pip install 'semfm[viz]' notebook`. With your own objects only the first two cells change.
 
 # %%
 import matplotlib.pyplot as plt
@@ -39,7 +39,7 @@ plt.show()
 # ## What a network sees
 #
 # An image encoder looks at views rendered from all around. For real objects,
-# `semfm.write_views("mug.views.mcap", views, source)` followed by
+# `semfm.ViewsFile(source, views).write("mug.views.mcap")` followed by
 # `semfm-embed mug.views.mcap --encoder dinov2` at the shell writes the file to pass as
 # `embeddings="mug.emb.mcap"`. Here the embeddings are made up: noisy, and they say so.
 

@@ -1,7 +1,8 @@
 """What can go wrong.
 
-Every error of SemFM is a `SemfmError` with a `code` for programs and a `place`; most are also the
-built-in exception that fits. Arguments of the wrong type raise a plain `TypeError`.
+Every error that SemFM raises is a `SemfmError` with a `code` for programs and a `place`; most are
+also the built-in exception that fits, so that ``except ValueError`` works. What Python itself
+refuses before SemFM is called (a missing argument, text for an `int`) is a plain `TypeError`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,22 @@ class SemfmError(Exception):
 
 class InvalidInput(SemfmError, ValueError):
     """An argument, mesh or setting that is not what it may be."""
+
+
+class InvalidType(SemfmError, TypeError):
+    """An argument of a type that is not accepted."""
+
+
+class UnknownAttribute(SemfmError, AttributeError):
+    """A name that is none of the settings."""
+
+
+class IndexOutOfRange(SemfmError, IndexError):
+    """A position past the end of a sequence."""
+
+
+class MissingPackage(SemfmError, ImportError):
+    """An optional package that is needed now; the message says how to install it."""
 
 
 class FormatError(SemfmError, ValueError):

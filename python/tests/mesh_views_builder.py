@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from semfm import Mesh
 from views_builder import METADATA, view_messages, write_views
 
 
@@ -132,9 +133,13 @@ def write_mesh_views(
         triangle_list.points.add(x=x, y=y, z=z)
     triangle_list.indices.extend(triangles.ravel().tolist())
     built = [("/mesh", scene)] + [item for view in messages.values() for item in view.items()]
-    counts = {"n_vertices": str(len(vertices)), "n_triangles": str(len(triangles))}
+    identity = {
+        "n_vertices": str(len(vertices)),
+        "n_triangles": str(len(triangles)),
+        "mesh_hash": Mesh(vertices, triangles).hash,
+    }
     return write_views(
-        path, pictures, masks, lambda _: change(built), metadata={**METADATA, **counts}
+        path, pictures, masks, lambda _: change(built), metadata={**METADATA, **identity}
     )
 
 

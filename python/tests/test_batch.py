@@ -243,10 +243,10 @@ def test_half_written_shards_are_discarded(small, format):
     inner = small.folder / "answers" / "records"
     first = sorted(inner.iterdir())[0]
     first.write_bytes(first.read_bytes()[:-20])
-    (inner / f"part-000099.{format}.tmp").write_bytes(b"half")
+    (inner / ".semfm-part-of-a-shard").write_bytes(b"half")
     again = carried(small, format=format)
     assert (again.n_discarded, again.n_done, again.n_skipped) == (2, 2, 4)
-    assert len(by_name(small)) == 6 and not list(inner.glob("*.tmp"))
+    assert len(by_name(small)) == 6 and not list(inner.glob(".semfm-*"))
 
 
 def test_a_folder_belongs_to_one_question_and_one_writer(small):

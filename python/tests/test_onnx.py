@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from emb_reader import per_patch, read_embeddings, tokens
-from mcap.reader import make_reader
+from semfm import Embeddings, ViewsFile
 from semfm.sidecar import EmbedSettings, SidecarError, embed_file, open_encoder
 from semfm.sidecar.cli import main
 from semfm.sidecar.onnx_encoder import read_description
@@ -52,7 +55,7 @@ def test_the_file_keeps_the_contract(tmp_path, views, capsys):
         [f"/views/{i:03}/{kind}" for i in range(3) for kind in ("camera", "embeddings")] + ["/tf"]
     )
     (message,) = topics["/views/001/embeddings"]
-    assert message.frame_id == "view_001" and message.timestamp.seconds == 5
+    assert message.frame_id == "view_001" and message.timestamp.seconds == 1
     assert message.dtype == "f16" and len(message.data) == 2 * 4 * 6 * 7
     np.testing.assert_allclose(tokens(message), foretold(PICTURES[1]), atol=1e-3)
     assert (message.x0, message.y0, message.x1, message.y1) == (0, 0, 48, 32)
@@ -66,18 +69,20 @@ def test_the_file_keeps_the_contract(tmp_path, views, capsys):
     assert json.loads(metadata["preprocessing"])["std"] == [0.5, 0.25, 0.2]
 
 
-def test_cameras_and_poses_are_copied_byte_for_byte(tmp_path, views):
+def test_cameras_and_poses_are_those_of_the_views(tmp_path, views):
     embed_file(views, tmp_path / "e.mcap", open_encoder(str(write_encoder(tmp_path))))
+    assert Embeddings.read(tmp_path / "e.mcap").cameras == ViewsFile.read(views).cameras
 
-    def copies(path):
-        with path.open("rb") as file:
-            return [
-                (schema.name, schema.data, channel.topic, m.log_time, m.publish_time, m.data)
-                for schema, channel, m in make_reader(file).iter_messages()
-                if channel.topic == "/tf" or channel.topic.endswith("/camera")
-            ]
+    def told(path):
+        """Intrinsics and poses as another reader finds them."""
+        topics, _ = read_embeddings(path)
+        cameras = [topics[f"/views/{i:03}/camera"][0] for i in range(3)]
+        poses = [
+            (m.parent_frame_id, m.child_frame_id, m.translation, m.rotation) for m in topics["/tf"]
+        ]
+        return [(m.frame_id, m.width, m.height, m.K, m.P) for m in cameras], poses
 
-    assert len(copies(views)) == 6 and copies(tmp_path / "e.mcap") == copies(views)
+    assert told(tmp_path / "e.mcap") == told(views)
 
 
 def test_the_same_bytes_at_every_thread_and_batch_count(tmp_path, views):
@@ -198,6 +203,49 @@ def test_the_module_runs_as_a_command_and_reports_progress_as_json(tmp_path, vie
     assert done.stdout == f"{tmp_path / 'e.mcap'}\n"
     lines = [json.loads(line) for line in done.stderr.splitlines()]
     assert [(line["done"], line["total"]) for line in lines] == [(0, 12), (8, 12), (12, 12)]
+
+
+def documented_encoder() -> str:
+    """The example in docs/encoders.md."""
+    text = (Path(__file__).parents[2] / "docs" / "encoders.md").read_text("utf-8")
+    (code,) = [
+        block for block in re.findall(r"```python\n(.*?)```", text, re.S) if "class " in block
+    ]
+    return code
+
+
+def test_an_encoder_may_be_a_class_of_ones_own(tmp_path, views, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mean_colors.py").write_text(documented_encoder())
+    assert main([str(views), "-o", "e.mcap", "--model", "mean_colors:MeanColors"]) == 0
+    embeddings = Embeddings.read("e.mcap")
+    assert (embeddings.encoder, embeddings.dim, embeddings.n_views) == ("mean-colors", 3, 3)
+    mean = PICTURES[2].reshape(2, 16, 3, 16, 3).mean((1, 3))
+    unit = mean / np.linalg.norm(mean, axis=-1, keepdims=True)
+    np.testing.assert_allclose(embeddings.patches[2].data, unit, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "code, reason",
+    [
+        ("", "has no attribute 'Own'"),
+        ("import nowhere_at_all", "No module named 'nowhere_at_all'"),
+        ("class Own: pass", "takes no arguments"),
+        ("def Own(device, threads): pass", "own:Own: name: expected text, found None"),
+        ("class Own:\n def __init__(self, **_): self.name = self.revision = ''", "preprocessing"),
+        (
+            "class Own:\n name = revision = preprocessing = ''\n def __init__(self, **_): pass",
+            "grid: expected a method",
+        ),
+    ],
+)
+def test_a_class_that_is_no_encoder_is_refused(tmp_path, views, monkeypatch, capsys, code, reason):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delitem(sys.modules, "own", raising=False)
+    (tmp_path / "own.py").write_text(code)
+    importlib.invalidate_caches()
+    assert main([str(views), "-o", "e.mcap", "--model", "own:Own"]) == 2
+    assert reason in capsys.readouterr().err and not (tmp_path / "e.mcap").exists()
 
 
 def test_a_missing_runtime_is_named_with_what_to_install(tmp_path, views, capsys, monkeypatch):

@@ -68,6 +68,7 @@ def test_what_is_no_mesh_is_refused_by_name(vertices, faces, error, words):
     with pytest.raises(error) as caught:
         semfm.Mesh(vertices, faces)
     assert all(word in str(caught.value) for word in words), str(caught.value)
+    assert isinstance(caught.value, semfm.SemfmError)
 
 
 def test_our_errors_have_a_code_and_a_place_and_go_through_pickle(tmp_path):
@@ -154,6 +155,7 @@ def test_other_arguments_are_refused_by_name():
         with pytest.raises(error) as caught:
             call()
         assert all(word in str(caught.value) for word in words), str(caught.value)
+        assert isinstance(caught.value, semfm.SemfmError) and caught.value.code
 
 
 def test_an_orientation_needs_two_meshes_with_two_sides():

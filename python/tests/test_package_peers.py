@@ -1,6 +1,6 @@
 """The same numbers as the libraries people come from, on the same inputs, to stated tolerances.
 
-robust_laplacian and potpourri3d (Sharp), eigsh of SciPy, pyFM (Magnet): `pip install ".[peers]"`.
+robust_laplacian and potpourri3d (Sharp), eigsh of SciPy, pyFM (Magnet): `pip install --group peers .`.
 """
 
 from __future__ import annotations

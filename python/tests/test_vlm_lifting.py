@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from mesh_views_builder import box, iou, mallet, write_mesh_views
+from semfm import FormatError, SemfmError
 from semfm.sidecar.errors import SidecarError
 from semfm.vlm import read_object, read_region
 from semfm.vlm.choose_views import choose_views
@@ -128,6 +129,13 @@ def shift_mesh(messages):
     return messages
 
 
+def shift_cameras(messages):
+    for topic, message in messages:
+        if topic == "/tf":
+            message.translation.x += 0.5
+    return messages
+
+
 def fewer_points(messages):
     del messages[0][1].entities[0].triangles[0].points[-1]
     return messages
@@ -144,15 +152,16 @@ def tilted(messages):
     "change, reason",
     [
         (drop_mesh, "/mesh: expected the object's mesh"),
-        (shift_mesh, "the triangles of /mesh behind their pixels"),
-        (fewer_points, "metadata n_vertices"),
+        (shift_mesh, "used with the mesh"),
+        (shift_cameras, "the triangles of /mesh behind their pixels"),
+        (fewer_points, "/mesh"),
         (tilted, "a rigid transform"),
     ],
 )
 def test_files_without_a_sound_mesh_are_refused(tmp_path, change, reason):
     vertices, triangles, _ = mallet(1.0, 0.25)
     path = write_mesh_views(tmp_path / "v.mcap", vertices, triangles, 2, 48, change)
-    with pytest.raises(SidecarError, match=re.escape(reason)) as error:
+    with pytest.raises(SemfmError, match=re.escape(reason)) as error:
         read_object(path)
     assert str(path) in str(error.value)
 
@@ -161,7 +170,7 @@ def test_files_without_a_sound_mesh_are_refused(tmp_path, change, reason):
     "region, reason",
     [
         ('{"vertices": [1, 99999]}', "vertices[1]"),
-        ('{"vertices": [true]}', "vertices[0]"),
+        ('{"vertices": [true]}', "`vertices`, a list of vertex ids"),
         ('{"vertices": [0], "weights": [1, 1]}', "one per vertex"),
         ('{"vertices": [0], "weights": [1.5]}', "weights[0]"),
         ('{"vertices": [0], "weights": [0.4]}', "an empty region"),
@@ -174,5 +183,5 @@ def test_files_without_a_sound_mesh_are_refused(tmp_path, change, reason):
 def test_regions_of_other_meshes_are_refused(tmp_path, mallets, region, reason):
     path = tmp_path / "r.json"
     path.write_text(region)
-    with pytest.raises(SidecarError, match=re.escape(reason)):
+    with pytest.raises(FormatError, match=re.escape(reason)):
         read_region(path, read_object(mallets["short"].views))

@@ -18,7 +18,7 @@ METADATA = {
     "format": "semfm.views/1",
     "mesh_hash": f"blake3:{0:064}",
     "n_vertices": "8",
-    "n_triangles": "12",
+    "n_triangles": "24",
     "rig": "by hand",
     "seed": "7",
 }

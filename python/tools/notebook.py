@@ -1,6 +1,6 @@
 """Makes the notebooks of `python/notebooks` from the scripts beside them, and runs them.
 
-    pip install '.[notebook]'
+    pip install --group notebook .
     python python/tools/notebook.py            # writes each notebook with its pictures
     python python/tools/notebook.py --check    # fails where a notebook is not its script's
     python python/tools/notebook.py --run      # runs each from top to bottom and writes nothing

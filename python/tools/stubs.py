@@ -58,6 +58,7 @@ PLAIN = {
     "float": "float",
     "bool": "bool",
     "str": "str",
+    "bytes": "bytes",
     "object": "Any",
     "path": "_Path",
     "mesh_like": "_MeshLike",
@@ -178,7 +179,9 @@ def function(value: object, name: str, owner: str = "", static: bool = False) ->
 def quoted(doc: str) -> list[str]:
     """A docstring, indented by one step."""
     text = doc.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
-    return textwrap.indent(f'"""{text}\n"""' if "\n" in text else f'"""{text}"""', "    ").split("\n")
+    return textwrap.indent(f'"""{text}\n"""' if "\n" in text else f'"""{text}"""', "    ").split(
+        "\n"
+    )
 
 
 def klass(value: type) -> list[str]:

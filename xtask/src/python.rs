@@ -8,12 +8,27 @@ use anyhow::{Context, Result, bail};
 use crate::process::program;
 use crate::workspace::Workspace;
 
-/// Makes `.venv` where it is not there, installs the package with `extras` where something
+/// What is installed beside the package: extras that users have, and groups for work on it.
+#[derive(Clone, Copy)]
+pub struct Needs {
+    /// Names under `[project.optional-dependencies]`.
+    pub extras: &'static [&'static str],
+    /// Names under `[dependency-groups]`.
+    pub groups: &'static [&'static str],
+}
+
+/// What the tests need that run everywhere.
+pub const TESTS: Needs = Needs { extras: &["onnx"], groups: &["test"] };
+/// What all tests need: torch, Ray, other people's libraries and viewers.
+pub const ALL_TESTS: Needs =
+    Needs { extras: &["onnx", "embed", "ray"], groups: &["test", "notebook", "peers", "viewers"] };
+
+/// Makes `.venv` where it is not there, installs the package with what it `needs` where something
 /// changed since, and returns the folder of its programs.
 ///
 /// maturin compiles it with the profile and the target folder of the other jobs, and with features
 /// that are those of the whole workspace, so that only PyO3 and the extension itself are new.
-pub fn environment(workspace: &Workspace, extras: &str) -> Result<PathBuf> {
+pub fn environment(workspace: &Workspace, needs: Needs) -> Result<PathBuf> {
     let folder = workspace.root.join(".venv");
     let programs = folder.join("bin");
     let python = programs.join("python");
@@ -29,33 +44,40 @@ pub fn environment(workspace: &Workspace, extras: &str) -> Result<PathBuf> {
         }
         program(workspace, system, &["-m", "venv", "--clear", ".venv"]).succeed()?;
     }
-    let (stamp, installed) = (folder.join("installed"), stamp_of(workspace, extras)?);
+    let (stamp, installed) = (folder.join("installed"), stamp_of(workspace, needs)?);
     if std::fs::read_to_string(&stamp).is_ok_and(|found| found == installed) {
         return Ok(programs);
     }
-    let package = format!(".[{extras}]");
-    let arguments = [
-        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check"],
-        &["--config-settings", "build-args=--profile dev", package.as_str()][..],
-    ]
-    .concat();
-    println!("pip install '{package}'");
+    // Debian 12 comes with pip 23, which knows no dependency groups.
+    program(workspace, &python, &[&PIP_INSTALL[..], &["--upgrade", PIP][..]].concat()).succeed()?;
+    let package = format!(".[{}]", needs.extras.join(","));
+    let mut arguments = PIP_INSTALL.to_vec();
+    arguments.extend(["--config-settings", "build-args=--profile dev"]);
+    for &group in needs.groups {
+        arguments.extend(["--group", group]);
+    }
+    arguments.push(&package);
+    println!("pip install --group {} '{package}'", needs.groups.join(" --group "));
     program(workspace, &python, &arguments).succeed()?;
     std::fs::write(&stamp, installed).with_context(|| stamp.display().to_string())?;
     Ok(programs)
 }
 
+const PIP_INSTALL: [&str; 5] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+/// The first pip with `--group`.
+const PIP: &str = "pip>=25.1";
+
 /// Writes the type stubs of the compiled module into the sources.
 pub fn stubs(workspace: &Workspace) -> Result<()> {
-    let python = environment(workspace, "onnx,test")?.join("python");
+    let python = environment(workspace, TESTS)?.join("python");
     program(workspace, &python, &["python/tools/stubs.py"]).succeed()
 }
 
 /// What the package is made of; `typed` is the end of `py.typed`.
 const SOURCES: [&str; 10] = ["py", "pyi", "rs", "toml", "typed", "md", "html", "css", "js", "wgsl"];
 
-/// Extras and content of the package, so that nothing is installed twice.
-fn stamp_of(workspace: &Workspace, extras: &str) -> Result<String> {
+/// Needs and content of the package, so that nothing is installed twice.
+fn stamp_of(workspace: &Workspace, needs: Needs) -> Result<String> {
     let mut files = ["pyproject.toml", "Cargo.toml", "Cargo.lock"].map(PathBuf::from).to_vec();
     files.iter_mut().for_each(|file| *file = workspace.root.join(&*file));
     let mut folders = ["python/semfm", "crates"].map(|folder| workspace.root.join(folder)).to_vec();
@@ -78,5 +100,6 @@ fn stamp_of(workspace: &Workspace, extras: &str) -> Result<String> {
         path.hash(&mut hasher);
         std::fs::read(&path).with_context(|| path.display().to_string())?.hash(&mut hasher);
     }
-    Ok(format!("{extras} {:016x}", hasher.finish()))
+    let words = [needs.extras, needs.groups].concat().join(",");
+    Ok(format!("{words} {:016x}", hasher.finish()))
 }

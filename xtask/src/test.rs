@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::process::{Process, cargo, program};
-use crate::python::environment;
+use crate::python::{ALL_TESTS, TESTS, environment};
 use crate::tally::{CargoTest, Pytest, Tally};
 use crate::workspace::Workspace;
 
@@ -22,8 +22,8 @@ pub fn run(workspace: &Workspace, full: bool) -> Tally {
             Tally::default().closed(false)
         }));
     };
-    let extras = if full { "onnx,embed,notebook,peers,ray,viewers,test" } else { "onnx,test" };
-    step("python environment", &|| environment(workspace, extras).map(|_| Tally::default()));
+    let needs = if full { ALL_TESTS } else { TESTS };
+    step("python environment", &|| environment(workspace, needs).map(|_| Tally::default()));
     let steps = Steps { workspace, full };
     step("rust", &|| steps.rust());
     step("examples", &|| steps.examples());

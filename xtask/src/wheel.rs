@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::program;
-use crate::python::environment;
+use crate::python::{TESTS, environment};
 use crate::workspace::Workspace;
 
 /// Bytes that a wheel may have.
@@ -14,7 +14,7 @@ const TRIES: usize = 5;
 
 /// Builds the wheel into `target/wheels`, and measures it in a fresh environment.
 pub fn check(workspace: &Workspace) -> Result<()> {
-    let python = environment(workspace, "onnx,test")?.join("python");
+    let python = environment(workspace, TESTS)?.join("python");
     let folder = workspace.built("wheels");
     let folder_text = folder.to_str().context("the target folder's name is not UTF-8")?;
     let arguments = ["-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder_text, "."];

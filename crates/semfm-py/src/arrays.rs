@@ -5,7 +5,6 @@
 
 use faer::{Mat, MatRef};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use semfm::geom::math::DVec3;
 
@@ -171,7 +170,7 @@ pub fn bytes(
     let dtype = array.getattr("dtype")?;
     if dtype.getattr("itemsize")?.extract::<usize>()? != 1 {
         let found = dtype.str()?.to_string();
-        return Err(PyTypeError::new_err(format!("{name}: expected uint8, found {found}")));
+        return Err(errors::invalid_type(array.py(), name, "uint8", &found));
     }
     contiguous::<u8>(&array, name)
 }
@@ -203,8 +202,7 @@ fn checked<'py>(
     let letter: String = dtype.getattr("kind")?.extract()?;
     let width: usize = dtype.getattr("itemsize")?.extract()?;
     if !kind.letters.contains(letter.as_str()) || width > 8 {
-        let message = format!("{name}: expected {}, found dtype {dtype}", wanted());
-        return Err(PyTypeError::new_err(message));
+        return Err(errors::invalid_type(py, name, &wanted(), &format!("dtype {dtype}")));
     }
     let shape = untyped.shape();
     let fits = shape.len() == axes.len()

@@ -1,18 +1,21 @@
 //! `PatchEmbeddings` of single views and `Embeddings` of a whole object.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
-use semfm::views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
+use pyo3::types::{PyBytes, PyDict};
+use semfm::geom::Pinhole;
+use semfm::views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata};
 use semfm::views::{self, EmbeddedView};
 
 use crate::arrays::{self, Axis};
 use crate::camera::Camera;
 use crate::held::Held;
 use crate::mesh::from_any;
+use crate::views_file::ViewsFile;
 use crate::work::{guard, run};
-use crate::{errors, lend};
+use crate::{errors, json, lend};
 
 /// What an encoder says about a view: one vector per image patch.
 ///
@@ -146,6 +149,31 @@ pub struct Embeddings {
     pub held: Held<EmbeddingsFile>,
 }
 
+impl Embeddings {
+    fn of(
+        metadata: EmbeddingsMetadata,
+        cameras: Vec<Pinhole>,
+        grids: Vec<views::PatchEmbeddings>,
+    ) -> Self {
+        let views = cameras.into_iter().zip(grids);
+        let views = views.map(|(camera, patches)| EmbeddedView { camera, patches }).collect();
+        Self { held: Held::new(EmbeddingsFile { path: PathBuf::new(), metadata, views }) }
+    }
+}
+
+/// The grids of a list of `PatchEmbeddings`.
+fn grids_of(patches: &Bound<'_, PyAny>) -> PyResult<Vec<views::PatchEmbeddings>> {
+    let mut grids = Vec::new();
+    for grid in patches.try_iter()? {
+        let grid = grid?;
+        let grid = grid
+            .cast::<PatchEmbeddings>()
+            .map_err(|_| errors::wrong_type("patches", "PatchEmbeddings objects", &grid))?;
+        grids.push((*grid.get().held).clone());
+    }
+    Ok(grids)
+}
+
 #[pymethods]
 impl Embeddings {
     #[new]
@@ -159,15 +187,7 @@ impl Embeddings {
         let py = mesh.py();
         let held = from_any(mesh, "mesh")?;
         let cameras = crate::camera::list(cameras)?;
-        let mut grids = Vec::new();
-        for grid in patches.try_iter()? {
-            let grid = grid?;
-            let wanted = "PatchEmbeddings objects";
-            let grid = grid
-                .cast::<PatchEmbeddings>()
-                .map_err(|_| errors::wrong_type("patches", wanted, &grid))?;
-            grids.push((*grid.get().held).clone());
-        }
+        let grids = grids_of(patches)?;
         if cameras.len() != grids.len() || grids.is_empty() {
             let expected = format!("{}, one per camera, and at least one", cameras.len());
             return Err(errors::invalid(py, "patches", &expected, &grids.len().to_string()));
@@ -184,15 +204,8 @@ impl Embeddings {
                 return Err(errors::invalid(py, "patches", &format!("dimension {dim}"), &found));
             }
         }
-        let views = ViewsMetadata {
-            mesh: MeshIdentity::of(&held),
-            width,
-            height,
-            rig: "given as cameras".into(),
-            background: "unknown".into(),
-            seed: 0,
-            more: Default::default(),
-        };
+        let mut views = ViewsMetadata::of(&held, width, height);
+        (views.rig, views.background) = ("given as cameras".into(), "unknown".into());
         let metadata = EmbeddingsMetadata {
             views,
             encoder: encoder.to_owned(),
@@ -202,9 +215,67 @@ impl Embeddings {
             outliers: "unknown".into(),
             simulated: false,
         };
-        let views = cameras.into_iter().zip(grids);
-        let views = views.map(|(camera, patches)| EmbeddedView { camera, patches }).collect();
-        Ok(Self { held: Held::new(EmbeddingsFile { path: PathBuf::new(), metadata, views }) })
+        Ok(Self::of(metadata, cameras, grids))
+    }
+
+    /// What an encoder made of the views of a file; `semfm-embed` calls this.
+    ///
+    /// Parameters
+    /// ----------
+    /// views : ViewsFile
+    ///     The views that were encoded; their metadata are kept.
+    /// patches : list of PatchEmbeddings
+    ///     One per view, all of one dimension.
+    /// encoder : str
+    ///     Name of the encoder.
+    /// revision : str, default "unknown"
+    ///     Its revision, or the hash of its file.
+    /// preprocessing : str, default "unknown"
+    ///     How a picture was made into the encoder's input.
+    /// rolls : int, default 1
+    ///     Number of turned pictures of each view that were averaged.
+    /// outliers : str, default "unknown"
+    ///     What was done with outlier tokens.
+    /// more : dict, optional
+    ///     Further entries of the metadata, text by name.
+    ///
+    /// Returns
+    /// -------
+    /// Embeddings
+    #[staticmethod]
+    #[pyo3(signature = (
+        views, patches, *, encoder, revision="unknown", preprocessing="unknown", rolls=1,
+        outliers="unknown", more=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per entry of metadata")]
+    fn of_views(
+        views: &Bound<'_, ViewsFile>,
+        patches: &Bound<'_, PyAny>,
+        encoder: String,
+        revision: &str,
+        preprocessing: &str,
+        rolls: u32,
+        outliers: &str,
+        more: Option<BTreeMap<String, String>>,
+    ) -> PyResult<Self> {
+        let py = views.py();
+        let (views, grids) = (views.get(), grids_of(patches)?);
+        let cameras = views.camera_of_each();
+        if cameras.len() != grids.len() {
+            let expected = format!("{}, one per view", cameras.len());
+            return Err(errors::invalid(py, "patches", &expected, &grids.len().to_string()));
+        }
+        let mut metadata = EmbeddingsMetadata {
+            views: views.metadata.clone(),
+            encoder,
+            revision: revision.to_owned(),
+            preprocessing: preprocessing.to_owned(),
+            rolls,
+            outliers: outliers.to_owned(),
+            simulated: false,
+        };
+        metadata.views.more.extend(more.into_iter().flatten());
+        Ok(Self::of(metadata, cameras, grids))
     }
 
     /// Reads a ``NAME.emb.mcap`` and checks everything in it.
@@ -277,6 +348,12 @@ impl Embeddings {
     #[getter]
     fn encoder(&self) -> String {
         self.held.metadata.encoder.clone()
+    }
+
+    /// dict: the file's metadata record ``semfm``, all entries as text.
+    #[getter]
+    fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        json::text_entries(py, &self.held.metadata.entries(self.held.views.len()))
     }
 
     /// bool: True where the embeddings were made up, without a network.

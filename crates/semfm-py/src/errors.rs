@@ -3,7 +3,6 @@
 //! The classes are written in Python (`semfm/errors.py`): there they can be ValueErrors and
 //! OSErrors at the same time, and go through pickle.
 
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use semfm::geom;
 
@@ -34,10 +33,37 @@ pub fn invalid(py: Python<'_>, argument: &str, expected: &str, found: &str) -> P
     exception(py, "InvalidInput", &message, "invalid", Some(argument))
 }
 
-/// An argument of the wrong type.
+/// An argument of the wrong type: `semfm.InvalidType`, a TypeError.
 pub fn wrong_type(argument: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
-    let found = found.get_type().name().map_or_else(|_| "something else".into(), |n| n.to_string());
-    PyTypeError::new_err(format!("{argument}: expected {expected}, found {found}"))
+    let name = found.get_type().name().map_or_else(|_| "something else".into(), |n| n.to_string());
+    invalid_type(found.py(), argument, expected, &name)
+}
+
+/// As [`wrong_type`], of a type that has been put into words.
+pub fn invalid_type(py: Python<'_>, argument: &str, expected: &str, found: &str) -> PyErr {
+    let message = format!("{argument}: expected {expected}, found {found}");
+    exception(py, "InvalidType", &message, "type", Some(argument))
+}
+
+/// A name that is none of the attributes: `semfm.UnknownAttribute`, an AttributeError.
+pub fn unknown_attribute(py: Python<'_>, message: &str, name: &str) -> PyErr {
+    exception(py, "UnknownAttribute", message, "attribute", Some(name))
+}
+
+/// A position past the end: `semfm.IndexOutOfRange`, an IndexError.
+pub fn index_out_of_range(py: Python<'_>, message: &str) -> PyErr {
+    exception(py, "IndexOutOfRange", message, "index", None)
+}
+
+/// An optional package that is needed: `semfm.MissingPackage`, an ImportError.
+pub fn missing_package(py: Python<'_>, package: &str, message: &str) -> PyErr {
+    exception(py, "MissingPackage", message, "missing-package", Some(package))
+}
+
+/// Threads that the system does not give: `semfm.SemfmError`.
+pub fn no_threads(py: Python<'_>, reason: &str) -> PyErr {
+    let message = format!("cannot start worker threads: {reason}");
+    exception(py, "SemfmError", &message, "threads", None)
 }
 
 /// A bug of ours.

@@ -123,13 +123,13 @@ impl Grasps {
         self.found.grasps.len()
     }
 
-    fn __getitem__(&self, index: isize) -> PyResult<Grasp> {
+    fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<Grasp> {
         let n = self.found.grasps.len();
         let at = if index < 0 { index + n as isize } else { index };
         let grasp = usize::try_from(at).ok().and_then(|at| self.found.grasps.get(at));
         grasp
             .map(|grasp| Grasp { grasp: grasp.clone() })
-            .ok_or_else(|| pyo3::exceptions::PyIndexError::new_err(format!("grasp {index} of {n}")))
+            .ok_or_else(|| errors::index_out_of_range(py, &format!("grasp {index} of {n}")))
     }
 
     /// (g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres.

@@ -1,9 +1,12 @@
 //! Reports and settings: JSON on our side, dicts and lists on Python's.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
 use semfm::geom::io::write_atomically;
 use serde_json::Value;
-use std::path::PathBuf;
 
 use crate::errors;
 use crate::work::run;
@@ -17,10 +20,22 @@ pub fn to_python<'py>(
     py.import("json")?.call_method1("loads", (text,))
 }
 
+/// A dict of text.
+pub fn text_entries<'py>(
+    py: Python<'py>,
+    entries: &BTreeMap<String, String>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for (key, value) in entries {
+        dict.set_item(key, value)?;
+    }
+    Ok(dict)
+}
+
 /// JSON from dicts, lists, strings and finite numbers.
 pub fn from_python(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
     let py = value.py();
-    let options = pyo3::types::PyDict::new(py);
+    let options = PyDict::new(py);
     options.set_item("allow_nan", false)?;
     let text = py.import("json")?.call_method("dumps", (value,), Some(&options));
     let text: String = text
@@ -30,11 +45,7 @@ pub fn from_python(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
 }
 
 /// Writes named arrays as an .npz file, whole or not at all.
-pub fn write_npz(
-    py: Python<'_>,
-    path: PathBuf,
-    arrays: &Bound<'_, pyo3::types::PyDict>,
-) -> PyResult<()> {
+pub fn write_npz(py: Python<'_>, path: PathBuf, arrays: &Bound<'_, PyDict>) -> PyResult<()> {
     let buffer = py.import("io")?.getattr("BytesIO")?.call0()?;
     py.import("numpy")?.call_method("savez", (&buffer,), Some(arrays))?;
     let bytes: Vec<u8> = buffer.call_method0("getvalue")?.extract()?;
@@ -58,4 +69,17 @@ pub fn read_npz<'py, const N: usize>(
         arrays.push(array.map_err(missing)?);
     }
     arrays.try_into().map_err(|_| errors::internal(py, "arrays of an .npz file"))
+}
+
+/// Writes bytes to a file, whole or not at all.
+///
+/// Parameters
+/// ----------
+/// path : path
+/// content : bytes
+#[pyfunction]
+pub fn write_file(py: Python<'_>, path: PathBuf, content: &Bound<'_, PyBytes>) -> PyResult<()> {
+    let content = content.as_bytes();
+    let written = py.detach(|| write_atomically(&path, |out| out.write_all(content)));
+    written.map_err(|error| errors::raise(py, &error.into()))
 }

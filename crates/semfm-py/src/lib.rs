@@ -40,6 +40,7 @@ mod surface;
 mod synth;
 mod transfer;
 mod view;
+mod views_file;
 mod work;
 
 /// The compiled half of `semfm`.
@@ -70,6 +71,8 @@ mod _semfm {
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]
+    use crate::json::write_file;
+    #[pymodule_export]
     use crate::laplacian::{
         Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,
     };
@@ -98,7 +101,9 @@ mod _semfm {
     #[pymodule_export]
     use crate::transfer::{_restore_transfer, Hypothesis, Transfer};
     #[pymodule_export]
-    use crate::view::{_restore_view, View, read_views, render, write_views};
+    use crate::view::{_restore_view, View, render};
+    #[pymodule_export]
+    use crate::views_file::ViewsFile;
     #[pymodule_export]
     use crate::work::{_work_for_tests, get_num_threads, set_num_threads};
 

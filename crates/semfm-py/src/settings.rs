@@ -1,6 +1,5 @@
 //! `TransferSettings`: everything that can be set about a transfer, by name.
 
-use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::{Method, PipelineSettings, fmap};
@@ -67,8 +66,9 @@ impl TransferSettings {
     fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let all = self.to_dict(py)?;
         let all = all.cast::<PyDict>()?;
-        let unknown = || PyAttributeError::new_err(format!("TransferSettings has no `{name}`"));
-        all.get_item(name)?.ok_or_else(unknown)
+        all.get_item(name)?.ok_or_else(|| {
+            errors::unknown_attribute(py, &format!("TransferSettings has no `{name}`"), name)
+        })
     }
 
     fn __repr__(&self) -> String {
@@ -101,7 +101,8 @@ impl TransferSettings {
 pub fn _restore_settings(settings: &Bound<'_, PyDict>) -> PyResult<TransferSettings> {
     let py = settings.py();
     let method = settings.get_item("method")?;
-    let method = method.ok_or_else(|| PyTypeError::new_err("settings: expected a method"))?;
+    let method =
+        method.ok_or_else(|| errors::invalid_type(py, "settings", "a method", "a dict without"))?;
     let method: String = method.extract()?;
     TransferSettings::new(py, &method, Some(settings))
 }
@@ -117,8 +118,8 @@ fn merge(py: Python<'_>, value: &mut Value, changes: Value, place: &str) -> PyRe
         let path = if place.is_empty() { name.clone() } else { format!("{place}.{name}") };
         let known = value.keys().cloned().collect::<Vec<_>>().join(", ");
         let Some(slot) = value.get_mut(&name) else {
-            let message = format!("{path}: expected one of {known}, found no such setting");
-            return Err(PyTypeError::new_err(message));
+            let expected = format!("one of {known}");
+            return Err(errors::invalid_type(py, &path, &expected, "no such setting"));
         };
         if change.as_u64().is_some_and(|count| count > MOST) && name != "seed" {
             let found = change.to_string();

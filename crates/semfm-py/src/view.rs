@@ -1,9 +1,8 @@
-//! `View`: rendered pictures with depth and triangles, and their files.
+//! `View`: a rendered picture with depth and triangles.
 
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
-use semfm::views::mcap::{MeshIdentity, ViewsFile, ViewsMetadata, write_views as write};
 use semfm::views::{self, Paint, RenderSettings, RigSettings};
 
 use crate::arrays::{self, Axis};
@@ -17,10 +16,10 @@ use crate::{errors, lend};
 ///
 /// See Also
 /// --------
-/// render, read_views
+/// render, ViewsFile
 #[pyclass(frozen, module = "semfm")]
 pub struct View {
-    pub held: Held<views::View>,
+    pub view: Arc<views::View>,
 }
 
 #[pymethods]
@@ -28,32 +27,32 @@ impl View {
     /// Camera: the one the picture was taken with.
     #[getter]
     fn camera(&self) -> Camera {
-        Camera { camera: self.held.camera }
+        Camera { camera: self.view.camera }
     }
 
     /// (height, width, 3) uint8 array: sRGB, a read-only view.
     #[getter]
     fn rgb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.held.rgb.as_slice())?;
-        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[3])?,))
+        let flat = lend::vector(slf, |view| view.view.rgb.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[3])?,))
     }
 
     /// (height, width) float32 array: depth along the camera's axis in mesh units, infinite on the background, a read-only view.
     #[getter]
     fn depth<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.held.depth.as_slice())?;
-        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[])?,))
+        let flat = lend::vector(slf, |view| view.view.depth.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[])?,))
     }
 
     /// (height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view.
     #[getter]
     fn triangles<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.held.triangles.as_slice())?;
-        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().held.camera, &[])?,))
+        let flat = lend::vector(slf, |view| view.view.triangles.as_slice())?;
+        flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[])?,))
     }
 
     fn __repr__(&self) -> String {
-        format!("View({} × {})", self.held.camera.width(), self.held.camera.height())
+        format!("View({} × {})", self.view.camera.width(), self.view.camera.height())
     }
 
     fn __reduce__<'py>(
@@ -94,7 +93,7 @@ pub fn _restore_view(
         depth: arrays::any32(depth, "depth", &[height, width])?.0, // infinite on the background
         triangles: triangles.into_iter().map(|id| id as i32 - 1).collect(),
     };
-    Ok(View { held: Held::new(view) })
+    Ok(View { view: Arc::new(view) })
 }
 
 /// Colours to render with, owned.
@@ -192,59 +191,5 @@ pub fn render(
             })),
         }?)
     })?;
-    Ok(rendered.into_iter().map(|view| View { held: Held::new(view) }).collect())
-}
-
-/// Writes views of a mesh as ``NAME.views.mcap``, whole or not at all: for `semfm-embed`.
-///
-/// Parameters
-/// ----------
-/// path : path
-/// views : list of View
-///     All of one size.
-/// mesh : mesh_like
-///     The mesh that was rendered.
-#[pyfunction]
-pub fn write_views(
-    path: PathBuf,
-    views: &Bound<'_, PyAny>,
-    mesh: &Bound<'_, PyAny>,
-) -> PyResult<()> {
-    let mesh_held = from_any(mesh, "mesh")?;
-    let mut rendered = Vec::new();
-    for view in views.try_iter()? {
-        let view = view?;
-        let view =
-            view.cast::<View>().map_err(|_| errors::wrong_type("views", "View objects", &view))?;
-        rendered.push((*view.get().held).clone());
-    }
-    run(mesh.py(), None, move |_| {
-        let size =
-            rendered.first().map_or((0, 0), |view| (view.camera.width(), view.camera.height()));
-        let metadata = ViewsMetadata {
-            mesh: MeshIdentity::of(&mesh_held),
-            width: size.0,
-            height: size.1,
-            rig: "given as cameras".into(),
-            background: "as rendered".into(),
-            seed: 0,
-            more: Default::default(),
-        };
-        Ok(write(&path, &rendered, &mesh_held, None, &metadata)?)
-    })
-}
-
-/// Reads the views of a ``NAME.views.mcap``.
-///
-/// Parameters
-/// ----------
-/// path : path
-///
-/// Returns
-/// -------
-/// list of View
-#[pyfunction]
-pub fn read_views(py: Python<'_>, path: PathBuf) -> PyResult<Vec<View>> {
-    let file = run(py, None, move |_| Ok(ViewsFile::read(&path)?))?;
-    Ok(file.views.into_iter().map(|view| View { held: Held::new(view) }).collect())
+    Ok(rendered.into_iter().map(|view| View { view: Arc::new(view) }).collect())
 }

@@ -12,7 +12,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use semfm::Task;
@@ -50,7 +49,7 @@ pub fn run<T: Send + 'static>(
         }
     };
     let on_worker = task.clone();
-    pool()?.spawn(move || {
+    pool(py)?.spawn(move || {
         let end = catch_unwind(AssertUnwindSafe(|| work(&on_worker)));
         let _ = tell.send(News::End(end));
     });
@@ -139,13 +138,13 @@ struct Pool {
 static POOL: Mutex<Option<Pool>> = Mutex::new(None);
 
 /// The pool of this process. A forked child has none of its parent's threads and gets its own.
-fn pool() -> PyResult<Arc<ThreadPool>> {
+fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = std::process::id();
     match &*pool {
         Some(found) if found.process == process => Ok(Arc::clone(&found.threads)),
         _ => {
-            let threads = build(0)?;
+            let threads = build(py, 0)?;
             let fresh = Pool { process, threads: Arc::clone(&threads) };
             // The parent's pool is not dropped: its locks may be held by threads that are not here.
             std::mem::forget(pool.replace(fresh));
@@ -154,14 +153,14 @@ fn pool() -> PyResult<Arc<ThreadPool>> {
     }
 }
 
-fn build(n_threads: usize) -> PyResult<Arc<ThreadPool>> {
+fn build(py: Python<'_>, n_threads: usize) -> PyResult<Arc<ThreadPool>> {
     ThreadPoolBuilder::new()
         .num_threads(n_threads)
         .thread_name(|i| format!("semfm-{i}"))
         .start_handler(|_| IS_OURS.with(|ours| ours.set(true)))
         .build()
         .map(Arc::new)
-        .map_err(|error| PyRuntimeError::new_err(format!("cannot start worker threads: {error}")))
+        .map_err(|error| errors::no_threads(py, &error.to_string()))
 }
 
 /// Sets the number of worker threads of later calls. Results do not depend on it.
@@ -183,7 +182,7 @@ pub fn set_num_threads(py: Python<'_>, n_threads: usize) -> PyResult<()> {
     if n_threads > 1024 {
         return Err(errors::invalid(py, "n_threads", "0 to 1024", &n_threads.to_string()));
     }
-    let threads = build(n_threads)?;
+    let threads = build(py, n_threads)?;
     let fresh = Pool { process: std::process::id(), threads };
     *POOL.lock().unwrap_or_else(PoisonError::into_inner) = Some(fresh);
     Ok(())
@@ -195,8 +194,8 @@ pub fn set_num_threads(py: Python<'_>, n_threads: usize) -> PyResult<()> {
 /// -------
 /// int
 #[pyfunction]
-pub fn get_num_threads() -> PyResult<usize> {
-    Ok(pool()?.current_num_threads())
+pub fn get_num_threads(py: Python<'_>) -> PyResult<usize> {
+    Ok(pool(py)?.current_num_threads())
 }
 
 /// Panics or waits, as asked: for the tests of this package.

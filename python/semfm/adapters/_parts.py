@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._paint import colors_of, position_colors, weight_colors, weights_of
 from .._semfm import Mesh, MeshFile, PreparedObject, Region, SemanticCloud, Shape, Transfer
-from ..errors import InvalidInput
+from ..errors import InvalidInput, InvalidType, MissingPackage
 
 Floats = NDArray[np.float64]
 
@@ -84,9 +84,10 @@ def mesh_of(thing: Any) -> Mesh:
         return thing.mesh
     if isinstance(thing, Shape):
         return thing.original
-    raise TypeError(
+    raise InvalidType(
         "expected a Mesh, MeshFile, Shape, PreparedObject, SemanticCloud or Transfer, "
-        f"found {type(thing).__name__}"
+        f"found {type(thing).__name__}",
+        "type",
     )
 
 
@@ -109,13 +110,12 @@ def sides(transfer: Transfer) -> list[Part]:
 
 
 def library(name: str, install: str) -> Any:
-    """A library that is needed now, or an `ImportError` that says why and how to get it."""
+    """A library that is needed now, or a `MissingPackage` that says why and how to get it."""
     try:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
-        raise ImportError(
-            f"this needs {name}, which cannot be imported ({error}): pip install {install}"
-        ) from error
+        message = f"this needs {name}, which cannot be imported ({error}): pip install {install}"
+        raise MissingPackage(message, "missing-package", name) from error
 
 
 def color_bytes(colors: Floats) -> NDArray[np.uint8]:

@@ -12,11 +12,14 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import IO, Any, Optional, Union
 
+from .._semfm import write_file
 from ..errors import FileError, FormatError, InvalidInput
 from . import shards
 from .record import Record
 
 FORMAT = "semfm.batch/1"
+#: How the names of files begin that a killed process left half written.
+TEMPORARY = ".semfm-"
 
 #: Records wait no longer than this for their shard to fill: what a crash may cost.
 PATIENCE_S = 30.0
@@ -96,11 +99,7 @@ class Journal:
         """Writes what waits."""
         if not self._waiting:
             return
-        try:
-            shards.write(self.records_folder, self._next, self._waiting, self.format)
-        except OSError as error:
-            place = self.records_folder
-            raise FileError(f"{place}: {error}", code="io", place=place) from error
+        shards.write(self.records_folder, self._next, self._waiting, self.format)
         self._next += 1
         self.written.update((r["name"], (r["key"], r["status"])) for r in self._waiting)
         self._waiting = []
@@ -124,7 +123,7 @@ class Journal:
     def _sweep(self) -> None:
         """Throws half-written shards away."""
         for name in os.listdir(self.records_folder):
-            if name.endswith(".tmp"):
+            if name.startswith(TEMPORARY):
                 os.remove(os.path.join(self.records_folder, name))
                 self.n_discarded += 1
 
@@ -181,11 +180,8 @@ def _agree(path: str, identity: dict[str, Any]) -> None:
         asked = found["identity"]
         names = sorted(set(asked) | set(identity))
     except FileNotFoundError:
-        temporary = f"{path}.tmp"
-        with open(temporary, "w", encoding="utf-8") as file:
-            json.dump({"format": FORMAT, "identity": identity}, file, indent=1, sort_keys=True)
-            file.write("\n")
-        os.replace(temporary, path)
+        text = json.dumps({"format": FORMAT, "identity": identity}, indent=1, sort_keys=True)
+        write_file(path, f"{text}\n".encode())
         return
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise FormatError(f"{path}: {error}", place=path) from error

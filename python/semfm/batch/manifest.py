@@ -23,7 +23,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Optional, Union
 
-from ..errors import FileError, FormatError, InvalidInput
+from ..errors import FileError, FormatError, InvalidInput, InvalidType
 
 #: The columns that name files.
 FILES = ("mesh", "embeddings", "features", "cloud")
@@ -113,8 +113,9 @@ def rows_of(items: Iterable[Union[Row, Mapping[str, Any]]]) -> list[Row]:
     for number, item in enumerate(items):
         entry = item.__dict__ if isinstance(item, Row) else item
         if not isinstance(entry, Mapping):
-            raise TypeError(
-                f"manifest: expected a path, or rows as dicts, found {type(item).__name__} at {number}"
+            found = f"{type(item).__name__} at {number}"
+            raise InvalidType(
+                f"manifest: expected a path, or rows as dicts, found {found}", "type", "manifest"
             )
         entries.append((f"row {number}", entry))
     return checked(entries, os.getcwd(), "manifest")

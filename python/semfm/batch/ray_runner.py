@@ -15,7 +15,7 @@ from typing import Any, Optional
 
 import numpy as np
 
-from ..errors import SemfmError
+from ..errors import MissingPackage, SemfmError
 from .manifest import Row
 from .record import Record, failure
 from .task import Demonstration
@@ -128,7 +128,8 @@ def _ray() -> Any:
         import ray
         import ray.data
     except ImportError as error:
-        raise ImportError("runner='ray' needs Ray Data: pip install 'semfm[ray]'") from error
+        message = "runner='ray' needs Ray Data: pip install 'semfm[ray]'"
+        raise MissingPackage(message, "missing-package", "ray") from error
     return ray
 
 

@@ -11,6 +11,7 @@ from typing import Any, Optional
 import numpy as np
 
 from .._semfm import Region, Transfer
+from ..errors import InvalidInput
 from .manifest import Row
 
 #: The columns of a record in their order, with the type of each as Arrow writes it.
@@ -108,11 +109,12 @@ def region_of(record: Mapping[str, Any]) -> Region:
 
     Raises
     ------
-    ValueError
+    InvalidInput
         The record is one of a failure.
     """
     if record["status"] != "done":
-        raise ValueError(f"{record['name']} has no region: {record['error']}")
+        message = f"{record['name']} has no region: {record['error']}"
+        raise InvalidInput(message, place=record["name"])
     weights = np.zeros(record["n_vertices"])
     weights[np.asarray(record["vertices"], dtype=np.int64)] = record["weights"]
     return Region(weights)

@@ -6,9 +6,11 @@ import json
 import os
 import re
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from typing import Any, Optional
 
-from ..errors import InvalidInput
+from .._semfm import write_file
+from ..errors import InvalidInput, MissingPackage
 from .record import COLUMNS, Record
 
 #: Formats and their file extensions.
@@ -22,12 +24,13 @@ class Unreadable(Exception):
 
 
 def arrow() -> Any:
-    """`pyarrow` with `pyarrow.parquet`; an ImportError that names the extra otherwise."""
+    """`pyarrow` with `pyarrow.parquet`; a `MissingPackage` that names the extra otherwise."""
     try:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        raise ImportError("Parquet needs pyarrow: pip install 'semfm[batch]'") from error
+        message = "Parquet needs pyarrow: pip install 'semfm[batch]'"
+        raise MissingPackage(message, "missing-package", "pyarrow") from error
     return pyarrow
 
 
@@ -61,19 +64,16 @@ def shards(folder: str) -> list[tuple[int, str]]:
 def write(folder: str, number: int, records: Sequence[Record], format: str) -> str:
     """Writes one shard and returns its path; what stood there is replaced at the end."""
     path = os.path.join(folder, f"part-{number:06d}.{format}")
-    temporary = f"{path}.tmp"
     if format == "parquet":
         pa = arrow()
         table = pa.Table.from_pylist(list(records), schema=schema())
-        with open(temporary, "wb") as file:
-            pa.parquet.write_table(table, file, compression="zstd")
-            _settle(file)
+        buffer = BytesIO()
+        pa.parquet.write_table(table, buffer, compression="zstd")
+        content = buffer.getvalue()
     else:
-        with open(temporary, "w", encoding="utf-8", newline="\n") as text:
-            for record in records:
-                text.write(json.dumps(record, ensure_ascii=False) + "\n")
-            _settle(text)
-    os.replace(temporary, path)
+        lines = (json.dumps(record, ensure_ascii=False) + "\n" for record in records)
+        content = "".join(lines).encode()
+    write_file(path, content)
     return path
 
 
@@ -122,9 +122,3 @@ def schema() -> Any:
         ],
         metadata={"format": "semfm.batch/1"},
     )
-
-
-def _settle(file: Any) -> None:
-    """A rename must not outrun the bytes."""
-    file.flush()
-    os.fsync(file.fileno())

@@ -12,11 +12,15 @@ Functions about one surface draw into the axes they are given and return them; f
 pair make a figure and return it. Nothing is shown on a screen until the caller says so.
 """
 
+from ..errors import MissingPackage
+
 try:
     import matplotlib as _matplotlib  # noqa: F401
 except ImportError as error:
-    raise ImportError(
-        "semfm.plot needs matplotlib, which is not installed: pip install 'semfm[viz]'"
+    raise MissingPackage(
+        "semfm.plot needs matplotlib, which is not installed: pip install 'semfm[viz]'",
+        "missing-package",
+        "matplotlib",
     ) from error
 
 from .maps import functional_map, point_map, spectra

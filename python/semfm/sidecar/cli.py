@@ -9,8 +9,8 @@ import time
 from collections.abc import Sequence
 
 from .. import __version__
-from .embed import EmbedSettings, embed_file
-from .embeddings_file import DTYPES
+from ..errors import SemfmError
+from .embed import DTYPES, EmbedSettings, embed_file
 from .errors import SidecarError, expected
 from .models import DEVICES, open_encoder
 from .patches import ROLLS
@@ -37,9 +37,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    p.add_argument(
-        "views", nargs="+", metavar="V.views.mcap", help="views, from `semfm-cli views`"
-    )
+    p.add_argument("views", nargs="+", metavar="V.views.mcap", help="views, from `semfm-cli views`")
     to = p.add_mutually_exclusive_group(required=True)
     to.add_argument("-o", "--output", metavar="V.emb.mcap", help="file to write, for one V")
     to.add_argument(
@@ -50,9 +48,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--model",
         required=True,
-        metavar="NAME|DIR|ENCODER.json",
+        metavar="NAME|DIR|ENCODER.json|package.module:Class",
         help="SigLIP, SigLIP 2 or DINOv2 by its name on the Hugging Face hub or by folder, "
-        "or an ONNX encoder by its JSON",
+        "an ONNX encoder by its JSON, or a class of your own",
     )
     p.add_argument(
         "--rolls",
@@ -74,9 +72,11 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--dtype", choices=list(DTYPES), default=settings.dtype, help="in the file (%(default)s)"
     )
-    talk = p.add_argument_group("talk")
-    talk.add_argument("--progress", choices=MODES, default="auto", help="on stderr (%(default)s)")
-    talk.add_argument("--quiet", action="store_true", help="no talk but errors")
+    messages = p.add_argument_group("messages")
+    messages.add_argument(
+        "--progress", choices=MODES, default="auto", help="on stderr (%(default)s)"
+    )
+    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
     p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     return p
 
@@ -86,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser().parse_args(argv)
     try:
         _run(args)
-    except SidecarError as error:
+    except SemfmError as error:
         print(f"semfm-embed: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

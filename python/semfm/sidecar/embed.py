@@ -9,15 +9,20 @@ from typing import Callable
 
 import numpy as np
 
+from .. import Embeddings, PatchEmbeddings, ViewsFile
 from .coverage import patch_coverage
-from .embeddings_file import DTYPES, EMBEDDINGS_FORMAT, EmbeddedView, write_embeddings
 from .encoder import Encoder
 from .errors import SidecarError, expected
 from .patches import OUTLIER_RATIO, ROLLS, embed_pictures
-from .views_file import ViewsFile, read_views
 
 #: Called with (pictures encoded, pictures in all).
 OnProgress = Callable[[int, int], None]
+
+#: How numbers may be stored in the file.
+DTYPES = ("f16", "f32")
+
+_OUTLIERS = f"dropped per roll where raw norm > {OUTLIER_RATIO:g} x the grid's median"
+_NORMALISATION = "L2 per output and roll, concatenated, mean of the valid rolls"
 
 
 @dataclass(frozen=True)
@@ -71,40 +76,39 @@ def embed_file(
 
     Raises
     ------
+    FormatError
+        If the views file is damaged or foreign.
+    FileError
+        If a file cannot be read or written.
     SidecarError
-        If the views file is damaged or foreign, or the encoder cannot take its pictures.
+        If the encoder cannot take the pictures, or the output would replace the views.
     """
     if os.path.exists(output) and os.path.samefile(views_path, output):
         raise SidecarError(f"{os.fspath(output)}: the output would replace the views file")
-    views = read_views(views_path)
-    embedded = _embed(views, encoder, settings, on_progress or (lambda done, total: None))
-    write_embeddings(output, embedded, _metadata(views, encoder, settings), settings.dtype)
+    views = ViewsFile.read(views_path)
+    patches = list(_embed(views, encoder, settings, on_progress or (lambda done, total: None)))
+    embeddings = Embeddings.of_views(
+        views,
+        patches,
+        encoder=encoder.name,
+        revision=encoder.revision,
+        preprocessing=encoder.preprocessing,
+        rolls=settings.rolls,
+        outliers=_OUTLIERS,
+        more={"normalisation": _NORMALISATION, "dtype": settings.dtype},
+    )
+    embeddings.write(output, dtype=settings.dtype)
 
 
 def _embed(
     file: ViewsFile, encoder: Encoder, settings: EmbedSettings, on_progress: OnProgress
-) -> Iterator[EmbeddedView]:
+) -> Iterator[PatchEmbeddings]:
     views, rolls = file.views, ROLLS[settings.rolls]
     on_progress(0, len(views) * len(rolls))
     for start in range(0, len(views), settings.batch):
         batch = views[start : start + settings.batch]
         patches = embed_pictures(encoder, np.stack([view.rgb for view in batch]), rolls)
         for view, data, valid in zip(batch, patches.data, patches.valid):
-            coverage = patch_coverage(view.on_object, patches.grid)
-            yield EmbeddedView(view, patches.grid, data, coverage, valid)
+            coverage = patch_coverage(view.triangles >= 0, patches.grid)
+            yield PatchEmbeddings(data, patches.grid.rect, coverage=coverage, valid=valid)
         on_progress((start + len(batch)) * len(rolls), len(views) * len(rolls))
-
-
-def _metadata(file: ViewsFile, encoder: Encoder, settings: EmbedSettings) -> dict[str, str]:
-    """The views' own metadata and how the embeddings were made."""
-    return {
-        **file.metadata,
-        "format": EMBEDDINGS_FORMAT,
-        "encoder": encoder.name,
-        "revision": encoder.revision,
-        "preprocessing": encoder.preprocessing,
-        "rolls": str(settings.rolls),
-        "outliers": f"dropped per roll where raw norm > {OUTLIER_RATIO:g} x the grid's median",
-        "normalisation": "L2 per output and roll, concatenated, mean of the valid rolls",
-        "dtype": settings.dtype,
-    }

@@ -1,6 +1,8 @@
 """What every encoder promises; each one lives in a file of its own.
 
-To add an encoder, write a class with these members and a line in :func:`.models.open_encoder`.
+``semfm-embed --model package.module:Class`` imports a class with these members, from the installed
+packages or the working folder, and calls it with the keywords ``device`` (``auto``, ``cpu`` or
+``cuda``) and ``threads``. An encoder that comes with the package has one row in :mod:`.models`.
 """
 
 from __future__ import annotations
@@ -55,6 +57,7 @@ class Encoder(Protocol):
         -------
         list of numpy.ndarray
             One array (n × rows × cols × d) float32 per output of the encoder, top-left token
-            first, class, register and padding tokens already dropped.
+            first, class, register and padding tokens already dropped. Every call with pictures of
+            one size returns the same rows × cols, those of :meth:`grid`.
         """
         ...

@@ -1,18 +1,38 @@
-"""From ``--model`` to an encoder."""
+"""From ``--model`` to an encoder: the table of encoders.
+
+A new kind of checkpoint is one file with a class and one row of :data:`FAMILIES`. An encoder of
+your own needs no row: it is named as ``package.module:Class`` (``docs/encoders.md``).
+"""
 
 from __future__ import annotations
 
+import importlib
 import os
-from typing import TYPE_CHECKING, Callable
+import re
+import sys
 
+from ..errors import SemfmError
 from .encoder import Encoder
-from .errors import expected
-
-if TYPE_CHECKING:
-    from .checkpoint import Checkpoint
+from .errors import SidecarError, expected
 
 #: ``auto`` takes CUDA for torch encoders when there is one.
 DEVICES = ("auto", "cpu", "cuda")
+
+#: Class by the ``model_type`` that a checkpoint's ``config.json`` names; it is called with a
+#: :class:`.checkpoint.Checkpoint`.
+FAMILIES = {
+    "siglip": "semfm.sidecar.siglip:SiglipEncoder",
+    "siglip_vision_model": "semfm.sidecar.siglip:SiglipEncoder",
+    "siglip2": "semfm.sidecar.siglip:Siglip2NaflexEncoder",
+    "siglip2_vision_model": "semfm.sidecar.siglip:Siglip2NaflexEncoder",
+    "dinov2": "semfm.sidecar.dinov2:Dinov2Encoder",
+    "dinov2_with_registers": "semfm.sidecar.dinov2:Dinov2Encoder",
+}
+
+#: Class of an ``ENCODER.json``; called with the path, the device and the number of threads.
+ONNX = "semfm.sidecar.onnx_encoder:OnnxEncoder"
+
+_CLASS_NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
 def open_encoder(model: str, device: str = "auto", threads: int | None = None) -> Encoder:
@@ -22,7 +42,9 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     ----------
     model
         ``ENCODER.json`` (``semfm.encoder/1``: any ONNX network), a folder as written by
-        transformers' ``save_pretrained``, or a name on the Hugging Face hub.
+        transformers' ``save_pretrained``, a name on the Hugging Face hub, or
+        ``package.module:Class``: your own :class:`.encoder.Encoder`, called with the keywords
+        ``device`` and ``threads``.
     device
         One of :data:`DEVICES`.
     threads
@@ -31,19 +53,19 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     Raises
     ------
     SidecarError
-        If the model cannot be found or loaded, is of an unknown family, or its runtime is not
-        installed (the message says what to install).
+        If the model cannot be found or loaded, is of an unknown family, does not keep the
+        protocol, or its runtime is not installed (the message says what to install).
     """
     if device not in DEVICES:
         raise expected("settings", "device", ", ".join(DEVICES), repr(device))
     if threads is not None and threads < 1:
         raise expected("settings", "threads", "at least 1", threads)
     threads = threads or _usable_cores()
+    if _CLASS_NAME.fullmatch(model):
+        return _open_class(model, device, threads)
     if model.endswith(".json"):
-        from .onnx_encoder import OnnxEncoder
-
-        return OnnxEncoder(model, device, threads)
-    return _open_transformer(model, device, threads)
+        return _class(ONNX)(model, device, threads)
+    return _open_checkpoint(model, device, threads)
 
 
 def _usable_cores() -> int:
@@ -52,22 +74,39 @@ def _usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-def _open_transformer(model: str, device: str, threads: int) -> Encoder:
-    from .checkpoint import open_checkpoint
-    from .dinov2 import Dinov2Encoder
-    from .siglip import Siglip2NaflexEncoder, SiglipEncoder
+def _class(name: str) -> type:
+    """The class that ``package.module:Class`` names."""
+    module, _, member = name.partition(":")
+    return getattr(importlib.import_module(module), member)
 
-    families: dict[str, Callable[[Checkpoint], Encoder]] = {
-        "siglip": SiglipEncoder,
-        "siglip_vision_model": SiglipEncoder,
-        "siglip2": Siglip2NaflexEncoder,
-        "siglip2_vision_model": Siglip2NaflexEncoder,
-        "dinov2": Dinov2Encoder,
-        "dinov2_with_registers": Dinov2Encoder,
-    }
+
+def _open_checkpoint(model: str, device: str, threads: int) -> Encoder:
+    from .checkpoint import open_checkpoint
+
     checkpoint = open_checkpoint(model, device, threads)
-    family = families.get(checkpoint.model_type)
+    family = FAMILIES.get(checkpoint.model_type)
     if family is None:
-        wanted = f"a model_type of {', '.join(families)}"
+        wanted = f"a model_type of {', '.join(FAMILIES)}"
         raise expected(model, "config.json", wanted, repr(checkpoint.model_type))
-    return family(checkpoint)
+    return _class(family)(checkpoint)
+
+
+def _open_class(model: str, device: str, threads: int) -> Encoder:
+    """Import a class by name, from the working folder too, and check what it made."""
+    folder = os.getcwd()
+    sys.path.append(folder)
+    try:
+        made = _class(model)(device=device, threads=threads)
+    except SemfmError:
+        raise
+    except Exception as error:  # code of others raises what it likes
+        raise SidecarError(f"{model}: {type(error).__name__}: {error}") from error
+    finally:
+        sys.path.remove(folder)
+    for name in ("name", "revision", "preprocessing"):
+        if not isinstance(getattr(made, name, None), str):
+            raise expected(model, name, "text", repr(getattr(made, name, None)))
+    for name in ("grid", "encode"):
+        if not callable(getattr(made, name, None)):
+            raise expected(model, name, "a method", repr(getattr(made, name, None)))
+    return made

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import SemfmError
 from .endpoint import Reply
 from .marking import UNITS
 from .polygon import MAX_CORNERS, crosses_itself, fill
@@ -24,7 +25,7 @@ KINDS = ("refusal", "truncated", "prose", "json", "schema", "polygon", "marks", 
 _FENCE = re.compile(r"```(?:json)?\s*\n(.*)\n\s*```", re.DOTALL)
 
 
-class UnusableAnswer(Exception):
+class UnusableAnswer(SemfmError):
     """A reply without a usable region.
 
     Attributes
@@ -36,8 +37,11 @@ class UnusableAnswer(Exception):
     """
 
     def __init__(self, kind: str, reason: str) -> None:
-        super().__init__(f"{kind}: {reason}")
+        super().__init__(f"{kind}: {reason}", f"answer-{kind}")
         self.kind, self.reason = kind, reason
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (type(self), (self.kind, self.reason))
 
 
 def read_answer(reply: Reply, question: Question) -> list[np.ndarray]:

@@ -9,8 +9,8 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
+from .._semfm import write_file
 from ..sidecar.errors import SidecarError
-from ..sidecar.replacing import replacing
 from .endpoint import Endpoint, Reply
 from .question import Question
 
@@ -43,8 +43,7 @@ class CachedEndpoint:
             return kept
         reply = self._endpoint.ask(question)
         entry = {"format": _FORMAT, **asdict(reply)}
-        with replacing(path) as file:
-            file.write((json.dumps(entry, indent=1) + "\n").encode())
+        write_file(path, (json.dumps(entry, indent=1) + "\n").encode())
         return reply
 
     def _name(self, question: Question) -> str:

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from .. import __version__
-from ..sidecar.errors import SidecarError, expected
+from .._semfm import write_file
+from ..errors import SemfmError
+from ..sidecar.errors import expected
 from ..sidecar.progress import MODES as PROGRESS_MODES
 from ..sidecar.progress import open_progress
-from ..sidecar.replacing import replacing
 from .baseline import BaselineSettings, outcome_row, total_tokens, transfer
 from .cache import CachedEndpoint
 from .endpoint import RESPONSE_FORMATS, ChatEndpoint, Endpoint, EndpointSettings, from_environment
@@ -71,12 +72,14 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_question(p)
     _add_endpoint(p)
-    talk = p.add_argument_group("talk")
-    talk.add_argument("--json", action="store_true", help="the row, or totals, as JSON on stdout")
-    talk.add_argument(
+    messages = p.add_argument_group("messages")
+    messages.add_argument(
+        "--json", action="store_true", help="the row, or totals, as JSON on stdout"
+    )
+    messages.add_argument(
         "--progress", choices=PROGRESS_MODES, default="auto", help="on stderr (%(default)s)"
     )
-    talk.add_argument("--quiet", action="store_true", help="no talk but errors")
+    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
     p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     return p
 
@@ -164,7 +167,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     stop = threading.Event()
     try:
         return _run_pairs(args, stop) if args.pairs else _run_one(args, stop)
-    except SidecarError as error:
+    except SemfmError as error:
         print(f"semfm-vlm: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -234,8 +237,7 @@ def _run_one(args: argparse.Namespace, stop: threading.Event) -> int:
         return 2 if failure.of_endpoint else 1
     extra = {key: row[key] for key in ("model", "real_model", "mode", "n_views", "inconsistency")}
     head = {"format": REGION_FORMAT, "mesh": row["mesh"], **row["region"], "method": "vlm"}
-    with replacing(args.output) as file:
-        file.write((json.dumps({**head, **extra}) + "\n").encode())
+    write_file(args.output, (json.dumps({**head, **extra}) + "\n").encode())
     tokens = row["tokens"] or {"prompt": "?", "completion": "?"}
     took = sum(outcome.stages_ms.values()) / 1000
     _say(args, f"{took:.1f} s, {tokens['prompt']} + {tokens['completion']} tokens")

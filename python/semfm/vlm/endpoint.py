@@ -15,6 +15,7 @@ from urllib.parse import urlsplit, urlunsplit
 
 from PIL import Image
 
+from ..errors import SemfmError
 from ..sidecar.errors import SidecarError, expected
 from .key import ApiKey
 from .question import Question
@@ -66,7 +67,7 @@ class Reply:
     cached: bool = False
 
 
-class EndpointError(Exception):
+class EndpointError(SemfmError):
     """No reply: the endpoint failed, or refused the request.
 
     Attributes
@@ -79,8 +80,11 @@ class EndpointError(Exception):
     """
 
     def __init__(self, kind: str, text: str) -> None:
-        super().__init__(f"{kind}: {text}")
+        super().__init__(f"{kind}: {text}", f"endpoint-{kind}")
         self.kind, self.text = kind, text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (type(self), (self.kind, self.text))
 
 
 class Endpoint(Protocol):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
+from ..errors import InvalidType
+
 
 class ApiKey:
     """An endpoint's key. Printing, formatting or pickling it gives nothing away."""
@@ -17,7 +19,7 @@ class ApiKey:
         return "[key]"
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("a key is not written anywhere")
+        raise InvalidType("a key is not written anywhere", "type", "key")
 
     def reveal(self) -> str:
         """The key itself, for the one request header that needs it."""

@@ -97,11 +97,11 @@ def seen_in(of: ObjectViews, view: ObjectView) -> np.ndarray:
     surface, n = view.surface, len(of.vertices)
     height, width = view.on_object.shape
     pixel_at = view.image(np.arange(len(surface.rows)), -1)
-    in_camera = view.camera.from_object(of.vertices)
-    ahead = np.flatnonzero(in_camera[:, 2] > 0)
-    at = np.floor(view.camera.project(in_camera[ahead])).clip(-9, 1 << 20).astype(int)
+    projected = view.camera.project(of.vertices)
+    ahead = np.flatnonzero(projected[:, 2] > 0)
+    at = np.floor(projected[ahead, :2]).clip(-9, 1 << 20).astype(int)
     reach = np.full(n, np.inf)
-    reach[ahead] = REACH_PIXELS * in_camera[ahead, 2] / view.camera.focal.min()
+    reach[ahead] = REACH_PIXELS * projected[ahead, 2] / min(view.camera.fx, view.camera.fy)
     best, nearest = np.full(n, -1), np.full(n, np.inf)
     for dv in (-1, 0, 1):
         for du in (-1, 0, 1):

@@ -12,45 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from .. import Camera, Mesh, View, ViewsFile
 from ..sidecar.errors import expected
-from ..sidecar.views_file import ViewRecord, ViewsFile, decode, read_views
 
 #: Pixels whose triangle does not lie behind them, at most this share of the object's: rounding of
 #: thin triangles. More, and pictures and mesh are not of the same object.
 MISPLACED_AT_MOST = 0.01
 #: How far outside a triangle, as a barycentric coordinate, a pixel may lie.
 _OUTSIDE = 0.05
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A pinhole camera; axes x right, y down, z forward; pixel (c, r) has its centre at +½.
-
-    Attributes
-    ----------
-    focal, centre
-        (2) float, in pixels.
-    rotation, translation
-        (3 × 3) and (3): ``camera_from_object``, in units of the mesh.
-    """
-
-    focal: np.ndarray
-    centre: np.ndarray
-    rotation: np.ndarray
-    translation: np.ndarray
-
-    @property
-    def eye(self) -> np.ndarray:
-        """Where the camera stands, (3), in the object's frame."""
-        return -self.rotation.T @ self.translation
-
-    def from_object(self, points: np.ndarray) -> np.ndarray:
-        """Points (n × 3) of the object in the camera's frame."""
-        return points @ self.rotation.T + self.translation
-
-    def project(self, points: np.ndarray) -> np.ndarray:
-        """Pixel positions (n × 2), as (u, v), of points (n × 3) in the camera's frame."""
-        return self.focal * points[:, :2] / points[:, 2:] + self.centre
 
 
 @dataclass(frozen=True)
@@ -101,27 +70,28 @@ class ObjectViews:
     ----------
     path
         The views file, for messages.
-    vertices, triangles
-        (n × 3) float and (m × 3) int, as in the mesh file.
-    mesh_hash
-        ``blake3:…``, the mesh's name.
+    mesh
+        As rendered.
     views
         In the file's order.
     """
 
     path: str
-    vertices: np.ndarray
-    triangles: np.ndarray
-    mesh_hash: str
+    mesh: Mesh
     views: list[ObjectView]
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Positions (n × 3) of the mesh."""
+        return self.mesh.vertices
 
     @property
     def identity(self) -> dict[str, Any]:
         """The mesh as regions name it."""
         return {
-            "n_vertices": len(self.vertices),
-            "n_triangles": len(self.triangles),
-            "hash": self.mesh_hash,
+            "n_vertices": self.mesh.n_vertices,
+            "n_triangles": self.mesh.n_faces,
+            "hash": self.mesh.hash,
         }
 
 
@@ -130,81 +100,33 @@ def read_object(path: str | os.PathLike[str]) -> ObjectViews:
 
     Raises
     ------
+    FormatError
+        If the file is damaged or foreign, or its mesh is not the one that its metadata name.
+    FileError
+        If it cannot be read.
     SidecarError
-        If the file is damaged or foreign, has no mesh, or its pictures do not show its mesh.
+        If it has no mesh, or its pictures do not show its mesh.
     """
-    file = read_views(path)
-    vertices, triangles = _mesh(file)
-    views = [_view(file, view, vertices, triangles) for view in file.views]
-    return ObjectViews(file.path, vertices, triangles, file.metadata.get("mesh_hash", ""), views)
-
-
-def _mesh(file: ViewsFile) -> tuple[np.ndarray, np.ndarray]:
+    name, file = os.fspath(path), ViewsFile.read(path)
     if file.mesh is None:
-        raise expected(file.path, "/mesh", "the object's mesh", "none")
-    scene = decode(file.path, "mesh", file.mesh)
-    lists = [triangles for entity in scene.entities for triangles in entity.triangles]
-    if len(lists) != 1:
-        raise expected(file.path, "/mesh", "one list of triangles", len(lists))
-    vertices = np.array([(p.x, p.y, p.z) for p in lists[0].points], float).reshape(-1, 3)
-    indices = np.array(lists[0].indices, np.int64)
-    if len(indices) % 3:
-        raise expected(file.path, "/mesh", "three indices a triangle", len(indices))
-    triangles = indices.reshape(-1, 3)
-    for key, count in (("n_vertices", len(vertices)), ("n_triangles", len(triangles))):
-        if file.metadata.get(key) != str(count):
-            found = f"{count} in /mesh"
-            raise expected(file.path, f"metadata {key}", repr(file.metadata.get(key)), found)
-    if len(indices) and indices.max() >= len(vertices):
-        raise expected(file.path, "/mesh", f"vertex ids below {len(vertices)}", indices.max())
-    if not np.isfinite(vertices).all():
-        raise expected(file.path, "/mesh", "finite coordinates", "others")
-    return vertices, triangles
+        raise expected(name, "/mesh", "the object's mesh", "none")
+    vertices, triangles = file.mesh.vertices, file.mesh.faces.astype(np.int64)
+    views = [
+        _view(name, f"{number:03}", view, vertices, triangles)
+        for number, view in enumerate(file.views)
+    ]
+    return ObjectViews(name, file.mesh, views)
 
 
 def _view(
-    file: ViewsFile, record: ViewRecord, vertices: np.ndarray, triangles: np.ndarray
+    path: str, name: str, view: View, vertices: np.ndarray, triangles: np.ndarray
 ) -> ObjectView:
-    place = f"/views/{record.name}/triangles"
-    if record.triangles.max() >= len(triangles):
-        found = record.triangles.max()
-        raise expected(file.path, place, f"triangles below {len(triangles)}", found)
-    camera = _camera(file, record)
-    surface = _surface(camera, record.triangles, vertices, triangles)
+    surface = _surface(view.camera, view.triangles, vertices, triangles)
     misplaced = np.mean(surface.barycentric.min(1) < -_OUTSIDE) if len(surface.rows) else 0.0
     if not misplaced <= MISPLACED_AT_MOST:
-        found = f"{misplaced:.0%} of the pixels elsewhere"
-        raise expected(file.path, place, "the triangles of /mesh behind their pixels", found)
-    return ObjectView(record.name, record.rgb, record.on_object, camera, surface)
-
-
-def _camera(file: ViewsFile, record: ViewRecord) -> Camera:
-    k = np.array(decode(file.path, "camera", record.camera).K).reshape(3, 3)
-    pose = decode(file.path, "tf", record.tf)
-    q, t = pose.rotation, pose.translation
-    quaternion = np.array([q.x, q.y, q.z, q.w])
-    translation = np.array([t.x, t.y, t.z])
-    focal, centre = k[[0, 1], [0, 1]], k[:2, 2]
-    place = f"/views/{record.name}/camera"
-    if not (np.isfinite(k).all() and (focal > 0).all() and k[0, 1] == 0):
-        raise expected(file.path, place, "K of a pinhole camera without skew", k.tolist())
-    if abs(np.linalg.norm(quaternion) - 1) > 1e-5 or not np.isfinite(translation).all():
-        found = f"{quaternion.tolist()}, {translation.tolist()}"
-        raise expected(file.path, "/tf", "a rigid transform (finite, unit quaternion)", found)
-    rotation = _rotation(quaternion / np.linalg.norm(quaternion)).T
-    return Camera(focal, centre, rotation, -rotation @ translation)
-
-
-def _rotation(xyzw: np.ndarray) -> np.ndarray:
-    """The rotation matrix (3 × 3) of a unit quaternion."""
-    x, y, z, w = xyzw
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+        place, found = f"/views/{name}/triangles", f"{misplaced:.0%} of the pixels elsewhere"
+        raise expected(path, place, "the triangles of /mesh behind their pixels", found)
+    return ObjectView(name, view.rgb, view.triangles >= 0, view.camera, surface)
 
 
 def _surface(
@@ -217,9 +139,10 @@ def _surface(
     """
     rows, cols = np.nonzero(ids >= 0)
     corners = triangles[ids[rows, cols]]
-    a, b, c = (camera.from_object(vertices[corners[:, i]]) for i in range(3))
-    centres = np.stack([cols, rows], 1) + 0.5
-    rays = np.concatenate([(centres - camera.centre) / camera.focal, np.ones((len(rows), 1))], 1)
+    rotation, translation = camera.camera_from_object[:3, :3], camera.camera_from_object[:3, 3]
+    a, b, c = (vertices[corners[:, i]] @ rotation.T + translation for i in range(3))
+    x, y = (cols + 0.5 - camera.cx) / camera.fx, (rows + 0.5 - camera.cy) / camera.fy
+    rays = np.stack([x, y, np.ones(len(rows))], 1)
     w = np.stack([(rays * np.cross(*edge)).sum(1) for edge in ((b, c), (c, a), (a, b))], 1)
     total = w.sum(1, keepdims=True)
     # A triangle seen exactly edge-on has no such point; its middle is as good as any.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
-from typing import IO
 
 from PIL import Image
 
+from .._semfm import write_file
 from ..sidecar.errors import SidecarError
-from ..sidecar.replacing import replacing
 from .baseline import Outcome
 from .marking import answer_picture
 from .question import Drawing
@@ -34,23 +33,20 @@ def write_pictures(folder: str | os.PathLike[str], outcome: Outcome, drawing: Dr
             name = part.rstrip(":")
         else:
             lines.append(f"![{name}]({name}.png)")
-            _write(folder / f"{name}.png", _png(part))
-    _write(folder / "question.md", _text("\n\n".join(lines) + "\n"))
+            write_file(folder / f"{name}.png", _png(part))
+    write_file(folder / "question.md", _text("\n\n".join(lines) + "\n"))
     if outcome.reply:
-        _write(folder / "reply.txt", _text(outcome.reply.refusal or outcome.reply.text))
+        write_file(folder / "reply.txt", _text(outcome.reply.refusal or outcome.reply.text))
     for name, view, mask in zip(question.names, question.views, outcome.masks or []):
         answered = answer_picture(view, mask & view.on_object, drawing.side)
-        _write(folder / f"answer-{name}.png", _png(answered))
+        write_file(folder / f"answer-{name}.png", _png(answered))
 
 
-def _write(path: Path, into: Callable[[IO[bytes]], object]) -> None:
-    with replacing(path) as file:
-        into(file)
+def _png(picture: Image.Image) -> bytes:
+    buffer = BytesIO()
+    picture.save(buffer, "PNG")
+    return buffer.getvalue()
 
 
-def _png(picture: Image.Image) -> Callable[[IO[bytes]], object]:
-    return lambda file: picture.save(file, "PNG")
-
-
-def _text(text: str) -> Callable[[IO[bytes]], object]:
-    return lambda file: file.write(text.encode("utf-8", "replace"))
+def _text(text: str) -> bytes:
+    return text.encode("utf-8", "replace")

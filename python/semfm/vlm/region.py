@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import Region
 from ..sidecar.errors import SidecarError, expected
 from .object_views import ObjectViews
 
@@ -36,35 +37,12 @@ def read_region(path: str | os.PathLike[str], of: ObjectViews) -> np.ndarray:
 
     Raises
     ------
-    SidecarError
+    FormatError
         If the file is broken, of another mesh, or the region is empty.
+    FileError
+        If it cannot be read.
     """
-    name = os.fspath(path)
-    value = read_json(path)
-    if isinstance(value, dict) and "region" in value:
-        value = value["region"]
-    if not isinstance(value, dict) or not isinstance(value.get("vertices"), list):
-        raise expected(name, "region", "an object with `vertices`, a list of ids", type(value))
-    if (form := value.get("format", REGION_FORMAT)) != REGION_FORMAT:
-        raise expected(name, "format", REGION_FORMAT, repr(form))
-    mesh = value.get("mesh") or {}
-    for key, wanted in of.identity.items():
-        if isinstance(mesh, dict) and mesh.get(key, wanted) != wanted:
-            raise expected(name, f"mesh {key}", f"{wanted}, as in {of.path}", mesh[key])
-    n, ids = len(of.vertices), value["vertices"]
-    given = value.get("weights", [1.0] * len(ids))
-    if not isinstance(given, list) or len(given) != len(ids):
-        raise expected(name, "weights", f"{len(ids)}, one per vertex", given)
-    weights = np.zeros(n)
-    for at, (id, weight) in enumerate(zip(ids, given)):
-        if type(id) is not int or not 0 <= id < n:
-            raise expected(name, f"vertices[{at}]", f"an id below {n}, the vertex count", id)
-        if type(weight) not in (int, float) or not 0 <= weight <= 1:
-            raise expected(name, f"weights[{at}]", "a number from 0 to 1", weight)
-        weights[id] = weight
-    if not (weights >= COUNTS).any():
-        raise expected(name, "region", f"a weight of {COUNTS} or more", "an empty region")
-    return weights
+    return Region.read(path, of.mesh).weights
 
 
 def region_entries(weights: np.ndarray) -> dict[str, list]:

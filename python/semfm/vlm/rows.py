@@ -30,8 +30,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from .._semfm import write_file
 from ..sidecar.errors import SidecarError, expected
-from ..sidecar.replacing import replacing
 from .region import read_json
 
 ROWS_FORMAT = "semfm.vlm/1"
@@ -80,8 +80,7 @@ class RowsFile:
         head = {"format": ROWS_FORMAT, "settings": self.settings}
         lines = ",\n".join(json.dumps(row, allow_nan=False) for row in self.rows)
         text = json.dumps(head)[:-1] + f', "rows": [\n{lines}\n]}}\n'
-        with replacing(self.path) as file:
-            file.write(text.encode())
+        write_file(self.path, text.encode())
 
     def _read(self) -> dict[RowName, dict[str, Any]]:
         if not self.path.exists():

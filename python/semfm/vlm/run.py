@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Callable
 
+from ..errors import SemfmError
 from ..sidecar.errors import SidecarError
 from .baseline import BaselineSettings, Outcome, outcome_row, transfer
 from .endpoint import Endpoint
@@ -64,7 +65,7 @@ def run_pairs(
 
     Raises
     ------
-    SidecarError
+    SemfmError
         For input that is not as it must be, or an endpoint that denies access: what is done is in
         the file.
     """
@@ -86,7 +87,7 @@ def run_pairs(
     file.write()
     report(total - len(missing), total)
     waiting, names = iter(missing), {}
-    error: SidecarError | None = None
+    error: SemfmError | None = None
     under_way: set[Future] = set()
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         try:
@@ -100,7 +101,7 @@ def run_pairs(
                 for future in done:
                     try:
                         file.add(names.pop(future), future.result())
-                    except SidecarError as failed:
+                    except SemfmError as failed:
                         error = error or failed  # what is under way is still worth keeping
                     report(len(file.rows), total)
         finally:

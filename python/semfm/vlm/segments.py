@@ -82,7 +82,8 @@ def _area_seen(of: ObjectViews, views: Sequence[ObjectView]) -> float:
 def _pixel(views: Sequence[ObjectView]) -> float:
     """Width of a pixel on the object, in its units."""
     widths = [
-        np.linalg.norm(view.surface.points - view.camera.eye, axis=1) / view.camera.focal.min()
+        np.linalg.norm(view.surface.points - view.camera.eye, axis=1)
+        / min(view.camera.fx, view.camera.fy)
         for view in views
     ]
     return float(np.median(np.concatenate(widths)))

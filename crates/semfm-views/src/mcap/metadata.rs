@@ -109,7 +109,7 @@ impl ViewsMetadata {
     }
 
     /// The record's entries for a file of `n_views` views.
-    pub(super) fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
+    pub fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
         let own = [
             ("format", VIEWS_FORMAT.to_owned()),
             ("mesh_hash", self.mesh.hash.to_string()),
@@ -167,7 +167,7 @@ impl ViewsMetadata {
 
 impl EmbeddingsMetadata {
     /// The record's entries for a file of `n_views` views.
-    pub(super) fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
+    pub fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
         let mut entries = self.views.entries(n_views);
         let own = [
             ("format", EMBEDDINGS_FORMAT.to_owned()),

@@ -30,7 +30,7 @@ pub use decode::{decode, message_error};
 pub use embeddings_file::{Dtype, EmbeddingsFile};
 pub use embeddings_message::PATCH_EMBEDDINGS;
 pub use inspect::{AttachmentReport, ChannelReport, McapReport, inspect};
-pub use messages::{Colors, read_mesh};
+pub use messages::{Colors, find_mesh, read_mesh};
 pub use metadata::{EmbeddingsMetadata, METADATA_NAME, MeshIdentity, ViewsMetadata};
 pub use pose_array::{POSES_TOPIC, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};

@@ -1,5 +1,6 @@
 //! `NAME.views.mcap`: rendered views with cameras, depth and triangles, for encoders and for eyes.
 
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -34,9 +35,9 @@ pub struct ViewsFile {
 /// [`Error::OtherMesh`] where the metadata name another mesh, [`Error::Invalid`] for a view whose
 /// arrays do not have the size of its camera or that names a triangle the mesh has not,
 /// [`Error::Io`].
-pub fn write_views(
+pub fn write_views<V: Borrow<View>>(
     path: &Path,
-    views: &[View],
+    views: &[V],
     mesh: &Mesh,
     colors: Option<&[[u8; 3]]>,
     metadata: &ViewsMetadata,
@@ -46,7 +47,7 @@ pub fn write_views(
         return Err(Error::invalid("views", "at least one", "none"));
     }
     for (view, rendered) in views.iter().enumerate() {
-        check_view(view, rendered, metadata)?;
+        check_view(view, rendered.borrow(), metadata)?;
     }
     let shown = MeshEntity {
         frame_id: OBJECT,
@@ -60,7 +61,7 @@ pub fn write_views(
         file.metadata(METADATA_NAME, metadata.entries(views.len()))?;
         file.log(MESH, 0, &shown)?;
         for (view, rendered) in views.iter().enumerate() {
-            write_view(file, view, rendered)?;
+            write_view(file, view, rendered.borrow())?;
         }
         Ok(())
     })

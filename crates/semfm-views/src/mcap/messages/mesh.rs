@@ -85,9 +85,18 @@ pub type Colors = Vec<[u8; 3]>;
 /// The mesh in a views file and the colours of its vertices, if it has any.
 ///
 /// # Errors
-/// [`Error::Container`] for a damaged file;
-/// [`Error::Format`] where there is not one mesh, or one that is none.
+/// As [`find_mesh`]; also [`Error::Format`] where there is no mesh.
 pub fn read_mesh(path: &Path) -> Result<(Mesh, Option<Colors>)> {
+    find_mesh(path)?.ok_or_else(|| topic_error(path, MESH, "one message", "none"))
+}
+
+/// The mesh in a file and the colours of its vertices, if it has any; `None` where the file has no
+/// mesh.
+///
+/// # Errors
+/// [`Error::Container`] for a damaged file;
+/// [`Error::Format`] where there are several meshes, or one that is none.
+pub fn find_mesh(path: &Path) -> Result<Option<(Mesh, Option<Colors>)>> {
     let mut found = None;
     read_messages(path, |message| {
         if message.channel.topic == MESH && found.replace(mesh_of(path, &message)?).is_some() {
@@ -95,7 +104,7 @@ pub fn read_mesh(path: &Path) -> Result<(Mesh, Option<Colors>)> {
         }
         Ok(())
     })?;
-    found.ok_or_else(|| topic_error(path, MESH, "one message", "none"))
+    Ok(found)
 }
 
 fn mesh_of(path: &Path, message: &Message<'_>) -> Result<(Mesh, Option<Colors>)> {

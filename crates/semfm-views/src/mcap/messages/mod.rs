@@ -10,7 +10,7 @@ mod values;
 
 pub use camera::{camera_calibration, camera_transform};
 pub(super) use camera::{read_camera, read_transform};
-pub use mesh::{Colors, MeshEntity, read_mesh};
+pub use mesh::{Colors, MeshEntity, find_mesh, read_mesh};
 pub(super) use picture::decode_png;
 pub use picture::picture;
 pub use values::{color, point, pose_at, scene_entity, timestamp, transform};

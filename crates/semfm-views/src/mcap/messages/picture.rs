@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use foxglove::messages::CompressedImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
+use image::{ColorType, ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
 
 use super::super::decode::Mismatch;
 use super::values::timestamp;
@@ -47,6 +47,9 @@ pub(in super::super) fn decode_png(
     if (image.width(), image.height()) != size {
         let found = format!("{} × {}", image.width(), image.height());
         return Err(Mismatch::new(expected, found));
+    }
+    if image.color() != ColorType::Rgb8 {
+        return Err(Mismatch::new("a PNG of 8-bit RGB", format!("{:?}", image.color())));
     }
     Ok(image.into_rgb8().into_raw())
 }
