@@ -13,7 +13,7 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    Outcome, align, completions, demo, eval, grasp, info, region, show, transfer, views,
+    Outcome, align, completions, demo, eval, eval_maps, grasp, info, region, show, transfer, views,
 };
 use options::Common;
 
@@ -40,6 +40,7 @@ enum Command {
     Show(show::Show),
     Align(Box<align::FindPose>),
     Eval(Box<eval::Evaluate>),
+    EvalMaps(eval_maps::EvaluateMaps),
     Info(info::Info),
     Completions(completions::Completions),
 }
@@ -64,6 +65,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Command::Show(command) => command.run(&common),
         Command::Align(command) => command.run(&common),
         Command::Eval(command) => command.run(&common),
+        Command::EvalMaps(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     };

@@ -29,6 +29,17 @@ impl Default for BootstrapSettings {
     }
 }
 
+/// A pair by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PairKey<'a> {
+    /// Group of the pair; objects are drawn within it.
+    pub group: &'a str,
+    /// Name of the source.
+    pub source: &'a str,
+    /// Name of the target.
+    pub target: &'a str,
+}
+
 /// A weight for every pair in every resampling.
 pub struct PairDraws {
     /// Whether there are objects enough to say anything.
@@ -38,12 +49,12 @@ pub struct PairDraws {
 }
 
 impl PairDraws {
-    /// Draws for pairs named by group, source and target.
-    pub fn new(pairs: &[[&str; 3]], settings: &BootstrapSettings) -> Self {
+    /// Draws for these pairs.
+    pub fn new(pairs: &[PairKey<'_>], settings: &BootstrapSettings) -> Self {
         let mut groups = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
-        for [group, source, target] in pairs {
-            let objects = groups.entry(group).or_default();
-            for object in [source, target] {
+        for pair in pairs {
+            let objects = groups.entry(pair.group).or_default();
+            for object in [pair.source, pair.target] {
                 let next = objects.len();
                 objects.entry(object).or_insert(next);
             }
@@ -56,11 +67,14 @@ impl PairDraws {
                     .iter()
                     .map(|(&name, objects)| (name, draw(objects.len(), &mut rng)))
                     .collect();
-                let weigh = |[group, source, target]: &[&str; 3]| {
-                    let (places, counts) = (&groups[group], &counts[group]);
-                    f64::from(counts[places[source]] * counts[places[target]])
-                };
-                pairs.iter().map(weigh).collect()
+                // w_p = c(source of p) · c(target of p), c counting how often an object was drawn.
+                pairs
+                    .iter()
+                    .map(|pair| {
+                        let (places, counts) = (&groups[pair.group], &counts[pair.group]);
+                        f64::from(counts[places[pair.source]] * counts[places[pair.target]])
+                    })
+                    .collect()
             })
             .collect();
         Self { enough, level: settings.level, weights }
@@ -74,10 +88,15 @@ impl PairDraws {
             return None;
         }
         values.sort_by(f64::total_cmp);
+        // Percentile interval: the quantiles at (1 − level) / 2 and 1 − (1 − level) / 2.
         let tail = (1.0 - self.level) / 2.0;
-        let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
-        Some([at(tail), at(1.0 - tail)])
+        Some([quantile(&values, tail), quantile(&values, 1.0 - tail)])
     }
+}
+
+/// The value at this share of an ascending list, which is not empty.
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
 /// How often each of `n` things was drawn in `n` draws.
@@ -87,7 +106,7 @@ fn draw(n: usize, rng: &mut ChaCha8Rng) -> Vec<u32> {
     counts
 }
 
-/// Weighted mean of the values that are there.
+/// Σ wᵢ xᵢ / Σ wᵢ over the values xᵢ that are there.
 pub(crate) fn weighted_mean(values: &[Option<f64>], weights: &[f64]) -> Option<f64> {
     let (mut sum, mut total) = (0.0, 0.0);
     for (value, weight) in values.iter().zip(weights) {
@@ -103,28 +122,29 @@ pub(crate) fn weighted_mean(values: &[Option<f64>], weights: &[f64]) -> Option<f
 mod tests {
     use super::*;
 
-    fn all_pairs(objects: &[String]) -> Vec<[&str; 3]> {
-        let pairs =
-            objects.iter().flat_map(|a| objects.iter().map(move |b| ["g", a.as_str(), b.as_str()]));
-        pairs.filter(|[_, a, b]| a != b).collect()
+    fn all_pairs(objects: &[String]) -> Vec<PairKey<'_>> {
+        let pairs = objects.iter().flat_map(|source| {
+            objects.iter().map(move |target| PairKey { group: "g", source, target })
+        });
+        pairs.filter(|pair| pair.source != pair.target).collect()
     }
 
     #[test]
     fn an_interval_holds_the_mean_and_shrinks_with_more_objects() {
-        let width = |n: usize| {
+        fn width(n: usize) -> f64 {
             let objects: Vec<String> = (0..n).map(|i| i.to_string()).collect();
             let pairs = all_pairs(&objects);
             // The target decides the score: only objects, not pairs, are independent.
             let values: Vec<Option<f64>> = pairs
                 .iter()
-                .map(|[_, _, b]| Some(f64::from(b.parse::<u8>().unwrap() % 2)))
+                .map(|pair| Some(f64::from(pair.target.parse::<u8>().unwrap() % 2)))
                 .collect();
             let draws = PairDraws::new(&pairs, &BootstrapSettings::default());
             let [low, high] = draws.interval(|w| weighted_mean(&values, w)).unwrap();
             let mean = weighted_mean(&values, &vec![1.0; pairs.len()]).unwrap();
             assert!(low < mean && mean < high, "{low} {mean} {high}");
             high - low
-        };
+        }
         let (few, many) = (width(6), width(40));
         assert!(many < 0.6 * few, "{many} {few}");
         // Forty fair coins: the mean's 95 % interval is 2 · 1.96 · √(.25/40) = .31 wide.

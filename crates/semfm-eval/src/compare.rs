@@ -8,15 +8,14 @@ use semfm::geom::io::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::bootstrap::{PairDraws, weighted_mean};
+use crate::bootstrap::{PairDraws, PairKey, weighted_mean};
 use crate::results::Results;
-use crate::row::Row;
-use crate::table::{header, line, number};
+use crate::row::ObjectRow;
+use crate::summary::NOTICED;
+use crate::table::{header, interval, line, number};
 
 /// The files in the output folder.
 pub const FILES: [&str; 2] = ["compare.json", "compare.md"];
-/// Smaller changes count as none.
-const NOTICED: f64 = 0.01;
 /// Pairs shown in the text, from either end.
 const SHOWN: usize = 20;
 
@@ -76,39 +75,36 @@ impl PairChange {
     pub fn gain(&self) -> f64 {
         self.now - self.before
     }
+
+    fn pair_key(&self) -> PairKey<'_> {
+        PairKey { group: &self.group, source: &self.source, target: &self.target }
+    }
 }
 
 impl Comparison {
-    /// Holds `now` against `before`.
+    /// Compares `now` with `before`.
     pub fn new(before: &Results, now: &Results) -> Self {
-        let index = |results: &'_ Results| -> BTreeMap<[String; 4], (f64, Option<f64>)> {
-            let scored =
-                |row: &Row| Some((row.key().map(str::to_owned), (row.iou?, row.confidence)));
-            results.rows.iter().filter_map(scored).collect()
-        };
-        let (old, new) = (index(before), index(now));
-        let only = |a: &BTreeMap<[String; 4], _>, b: &BTreeMap<[String; 4], _>| {
-            a.keys().filter(|key| !b.contains_key(*key)).cloned().collect()
-        };
+        let (old, new) = (scores(before), scores(now));
         let mut pairs: Vec<PairChange> = old
             .iter()
-            .filter_map(|(key, &(before, then))| {
-                let &(now, today) = new.get(key)?;
+            .filter_map(|(key, before)| {
+                let now = new.get(key)?;
                 let [group, source, target, method] = key.clone();
-                let confidence = [then, today];
+                let confidence = [before.confidence, now.confidence];
+                let (before, now) = (before.iou, now.iou);
                 Some(PairChange { group, source, target, method, before, now, confidence })
             })
             .collect();
-        let methods = now.methods().into_iter().filter_map(|m| method_change(m, &pairs, now));
-        let methods = methods.collect();
+        let methods = now.methods();
+        let methods = methods.into_iter().filter_map(|m| method_change(m, &pairs, now)).collect();
         // Stable: equal losses stay in the order of their names.
         pairs.sort_by(|a, b| a.gain().total_cmp(&b.gain()));
         Self {
             mismatches: mismatches(before, now),
             methods,
             pairs,
-            only_before: only(&old, &new),
-            only_now: only(&new, &old),
+            only_before: only_in_first(&old, &new),
+            only_now: only_in_first(&new, &old),
         }
     }
 
@@ -135,14 +131,13 @@ impl Comparison {
         let names = ["method", "pairs", "before", "now", "change", "95 %", "better", "worse"];
         text += &header(names.map(str::to_owned));
         for change in &self.methods {
-            let ends = |[low, high]: [f64; 2]| format!("{low:+.3} … {high:+.3}");
             text += &line([
                 change.method.clone(),
                 change.n.to_string(),
                 number(Some(change.before), 3),
                 number(Some(change.now), 3),
                 format!("{:+.3}", change.now - change.before),
-                change.interval.map_or_else(|| "–".into(), ends),
+                interval(change.interval, true),
                 change.better_worse[0].to_string(),
                 change.better_worse[1].to_string(),
             ]);
@@ -175,20 +170,45 @@ impl Comparison {
     }
 }
 
+/// Group, source, target and method.
+type RowKey = [String; 4];
+
+/// What a method scored on a pair.
+struct Score {
+    iou: f64,
+    confidence: Option<f64>,
+}
+
+fn scores(results: &Results) -> BTreeMap<RowKey, Score> {
+    let mut scores = BTreeMap::new();
+    for row in &results.rows {
+        if let Some(iou) = row.iou {
+            let score = Score { iou, confidence: row.confidence };
+            scores.insert(row.key().map(str::to_owned), score);
+        }
+    }
+    scores
+}
+
+fn only_in_first(a: &BTreeMap<RowKey, Score>, b: &BTreeMap<RowKey, Score>) -> Vec<RowKey> {
+    a.keys().filter(|key| !b.contains_key(*key)).cloned().collect()
+}
+
 fn method_change(method: &str, pairs: &[PairChange], now: &Results) -> Option<MethodChange> {
     let own: Vec<&PairChange> = pairs.iter().filter(|pair| pair.method == method).collect();
     let n = own.len() as f64;
-    let named: Vec<[&str; 3]> = own.iter().map(|p| [&*p.group, &*p.source, &*p.target]).collect();
+    let keys: Vec<PairKey<'_>> = own.iter().map(|pair| pair.pair_key()).collect();
     let gains: Vec<Option<f64>> = own.iter().map(|pair| Some(pair.gain())).collect();
-    let draws = PairDraws::new(&named, &now.bootstrap);
-    let count = |test: fn(f64) -> bool| own.iter().filter(|pair| test(pair.gain())).count();
+    let draws = PairDraws::new(&keys, &now.bootstrap);
+    let n_better = own.iter().filter(|pair| pair.gain() > NOTICED).count();
+    let n_worse = own.iter().filter(|pair| pair.gain() < -NOTICED).count();
     (!own.is_empty()).then(|| MethodChange {
         method: method.into(),
         n: own.len(),
         before: own.iter().map(|pair| pair.before).sum::<f64>() / n,
         now: own.iter().map(|pair| pair.now).sum::<f64>() / n,
         interval: draws.interval(|weights| weighted_mean(&gains, weights)),
-        better_worse: [count(|gain| gain > NOTICED), count(|gain| gain < -NOTICED)],
+        better_worse: [n_better, n_worse],
     })
 }
 
@@ -198,15 +218,9 @@ fn mismatches(before: &Results, now: &Results) -> Vec<String> {
     let mut found = Vec::new();
     if a.identity.dataset != b.identity.dataset {
         found.push(format!(
-            "the dataset (then {:?}, {}; now {:?}, {})",
+            "the dataset (then {}, {}; now {}, {})",
             a.origin, a.identity.dataset, b.origin, b.identity.dataset
         ));
-        let meshes = |results: &Results| -> BTreeMap<String, String> {
-            let named = |o: &crate::actor::ObjectRow| {
-                (format!("{}/{}", o.category, o.name), format!("{} {}", o.mesh, o.n_region))
-            };
-            results.objects.iter().map(named).collect()
-        };
         let (old, new) = (meshes(before), meshes(now));
         let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
         let changed: Vec<&str> =
@@ -223,6 +237,16 @@ fn mismatches(before: &Results, now: &Results) -> Vec<String> {
         found.push(format!("the seed (then {}, now {})", a.seed, b.seed));
     }
     found
+}
+
+/// What identifies each object, by category and name.
+fn meshes(results: &Results) -> BTreeMap<String, String> {
+    let mut meshes = BTreeMap::new();
+    for object in &results.objects {
+        let ObjectRow { category, name, mesh, n_region, .. } = object;
+        meshes.insert(format!("{category}/{name}"), format!("{mesh} {n_region}"));
+    }
+    meshes
 }
 
 #[cfg(test)]
@@ -255,7 +279,7 @@ mod tests {
         let mut now = before.clone();
         now.about.identity.dataset = "blake3:2".into();
         now.about.seed = 7;
-        now.objects.push(crate::actor::ObjectRow { name: "c".into(), ..Default::default() });
+        now.objects.push(ObjectRow { name: "c".into(), ..Default::default() });
         let text = Comparison::new(&before, &now).render();
         for word in ["blake3:1", "blake3:2", "/c", "now 7"] {
             assert!(text.contains(word), "{word}: {text}");

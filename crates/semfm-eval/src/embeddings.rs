@@ -115,8 +115,8 @@ fn read(
     };
     let own = (rolls == PAPER_ROLLS).then(|| format!("{name}.r1.emb.mcap"));
     let names: Vec<String> = own.into_iter().chain([format!("{name}.emb.mcap")]).collect();
-    let candidates = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
-    let Some(path) = candidates.into_iter().find(|path| path.is_file()) else {
+    let variants = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
+    let Some(path) = variants.into_iter().find(|path| path.is_file()) else {
         let path = folders[folders.len() - 1].join(format!("{name}.emb.mcap"));
         let source = std::io::Error::new(
             std::io::ErrorKind::NotFound,

@@ -9,7 +9,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A floor below refused.
+    /// An error of the facade or of a crate below it.
     #[error(transparent)]
     Facade(#[from] semfm::Error),
     /// A procedural object could not be made.

@@ -10,8 +10,7 @@ use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
-use crate::actor::ObjectRow;
-use crate::row::Row;
+use crate::row::{ObjectRow, Row};
 use crate::{Error, Result};
 
 /// The file in the output folder.

@@ -1,15 +1,14 @@
 //! What each method answered on each pair, one JSON file a pair: for pictures and for other scores.
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use semfm::Region;
 use semfm::geom::io::write_atomically;
-use serde_json::{Map, Value, json};
+use semfm::{Region, Transfer, Verdict};
+use serde::{Deserialize, Serialize};
 
-use crate::Result;
-use crate::candidate::Candidate;
 use crate::row::{AnchorRow, Row};
-use crate::run::Answer;
+use crate::{Error, Result};
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.prediction/1";
@@ -18,108 +17,136 @@ const FOLDER: &str = "predictions";
 /// Weights are written to four decimals: they colour pictures, and the vertices are listed anyway.
 const STEPS: f64 = 1e4;
 
-/// Where predictions are put.
-pub(crate) struct Predictions {
-    folder: PathBuf,
+/// The content of a file: the answers on one pair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PairPredictions {
+    /// Name and version of this format.
+    pub format: String,
+    /// Group of the pair.
+    pub group: String,
+    /// The answers by method.
+    pub methods: BTreeMap<String, Prediction>,
+    /// Name of the source.
+    pub source: String,
+    /// Name of the target.
+    pub target: String,
 }
 
-/// The answers on one pair.
-pub(crate) struct Page {
-    folder: PathBuf,
-    /// Relative to the results.
-    name: String,
-    about: [String; 3],
-    methods: Map<String, Value>,
+/// What one method answered. Only the region is always there.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Prediction {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anchors: Option<Vec<AnchorRow>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hypotheses: Option<Vec<PredictedHypothesis>>,
+    /// Source vertex for each target vertex.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_map: Option<Vec<u32>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// Vertices of the region.
+    pub vertices: Vec<u32>,
+    /// The weight of each of them.
+    pub weights: Vec<f64>,
 }
 
-impl Predictions {
-    pub fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned() }
+/// Another place where the region may be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PredictedHypothesis {
+    pub probability: f64,
+    pub vertices: Vec<u32>,
+    pub weights: Vec<f64>,
+}
+
+impl Prediction {
+    /// Nothing but a region.
+    pub fn of_region(region: &Region) -> Self {
+        let (vertices, weights) = (region.vertices(), rounded_weights(region));
+        Self { vertices, weights, ..Self::default() }
     }
 
-    pub fn page(&self, group: &str, source: &str, target: &str) -> Page {
-        let name = format!("{FOLDER}/{}/{}--{}.json", plain(group), plain(source), plain(target));
-        let about = [group, source, target].map(str::to_owned);
-        Page { folder: self.folder.clone(), name, about, methods: Map::new() }
+    /// All that a transfer says.
+    pub fn of_transfer(transfer: &Transfer) -> Self {
+        let hypotheses = transfer.hypotheses.iter().map(|hypothesis| PredictedHypothesis {
+            probability: hypothesis.probability,
+            vertices: hypothesis.region.vertices(),
+            weights: rounded_weights(&hypothesis.region),
+        });
+        Self {
+            anchors: Some(transfer.report.anchors.iter().map(AnchorRow::from).collect()),
+            confidence: Some(transfer.confidence),
+            hypotheses: Some(hypotheses.collect()),
+            point_map: Some(transfer.point_map.source_of.clone()),
+            verdict: Some(transfer.verdict),
+            ..Self::of_region(&transfer.region)
+        }
+    }
+
+    /// As a region of a mesh with so many vertices; none where it does not fit.
+    pub fn region(&self, n_vertices: usize) -> Option<Region> {
+        let mut weights = vec![0.0; n_vertices];
+        for (&vertex, &weight) in self.vertices.iter().zip(&self.weights) {
+            *weights.get_mut(vertex as usize)? = weight;
+        }
+        Region::from_weights(weights).ok()
     }
 }
 
-impl Page {
-    /// Adds an answer; gives the file that it will stand in, relative to the results.
-    pub fn put(&mut self, candidate: Candidate, answer: &Answer) -> String {
-        let value = match answer {
-            Answer::Everything(region) => region_json(region),
-            Answer::Carried(carried) => {
-                let mut value = region_json(&carried.region);
-                let hypotheses = carried.hypotheses.iter().map(|hypothesis| {
-                    let mut place = region_json(&hypothesis.region);
-                    place["probability"] = json!(hypothesis.probability);
-                    place
-                });
-                value["hypotheses"] = hypotheses.collect();
-                value["confidence"] = json!(carried.confidence);
-                value["verdict"] = json!(carried.verdict);
-                let anchors: Vec<AnchorRow> =
-                    carried.report.anchors.iter().map(AnchorRow::from).collect();
-                value["anchors"] = json!(anchors);
-                value["point_map"] = json!(carried.point_map.source_of);
-                value
-            }
-        };
-        self.methods.insert(candidate.name().into(), value);
-        self.name.clone()
+/// The weights of the region's vertices.
+fn rounded_weights(region: &Region) -> Vec<f64> {
+    let vertices = region.vertices().into_iter();
+    vertices.map(|v| (region.weights()[v as usize] * STEPS).round() / STEPS).collect()
+}
+
+impl PairPredictions {
+    /// No answers yet.
+    pub fn new(group: &str, source: &str, target: &str) -> Self {
+        let (group, source, target) = (group.into(), source.into(), target.into());
+        Self { format: FORMAT.into(), group, methods: BTreeMap::new(), source, target }
     }
 
-    /// Writes the file, if anybody answered.
-    pub fn write(self) -> Result<()> {
+    /// The file that the answers of all methods stand in, relative to the results.
+    pub fn file(&self) -> String {
+        let [group, source, target] = [&self.group, &self.source, &self.target].map(|x| plain(x));
+        format!("{FOLDER}/{group}/{source}--{target}.json")
+    }
+
+    /// Writes them into `folder` under this name, if any method answered.
+    pub fn write(&self, folder: &Path, file: &str) -> Result<()> {
         if self.methods.is_empty() {
             return Ok(());
         }
-        let path = self.folder.join(&self.name);
+        let path = folder.join(file);
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(crate::Error::io(folder))?;
+            std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
         }
-        let [group, source, target] = self.about;
-        let page = json!({
-            "format": FORMAT,
-            "group": group,
-            "source": source,
-            "target": target,
-            "methods": self.methods,
-        });
-        write_atomically(&path, |out| Ok(serde_json::to_writer(out, &page)?))?;
+        write_atomically(&path, |out| Ok(serde_json::to_writer(out, self)?))?;
         Ok(())
+    }
+
+    /// Reads a file; none where there is none of this format.
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
     }
 }
 
 /// Writes the answer of one row that no run of ours made; gives the file, relative to the results.
-pub(crate) fn write_one(folder: &Path, row: &Row, answer: Value) -> Result<String> {
-    let [group, source, target, method] = row.key();
-    let stem = [source, target, method].map(plain).join("--");
-    let name = format!("{FOLDER}/{}/{stem}.json", plain(group));
-    let mut page = Page {
-        folder: folder.to_owned(),
-        name: name.clone(),
-        about: [group, source, target].map(str::to_owned),
-        methods: Map::new(),
-    };
-    page.methods.insert(method.into(), answer);
-    page.write()?;
-    Ok(name)
-}
-
-fn region_json(region: &Region) -> Value {
-    let vertices = region.vertices();
-    let round = |w: f64| (w * STEPS).round() / STEPS;
-    let weights: Vec<f64> = vertices.iter().map(|&v| round(region.weights()[v as usize])).collect();
-    json!({ "vertices": vertices, "weights": weights })
+pub(crate) fn write_one(folder: &Path, row: &Row, answer: Prediction) -> Result<String> {
+    let mut predictions = PairPredictions::new(&row.group, &row.source, &row.target);
+    predictions.methods.insert(row.method.clone(), answer);
+    let stem = [&row.source, &row.target, &row.method].map(|name| plain(name)).join("--");
+    let file = format!("{FOLDER}/{}/{stem}.json", plain(&row.group));
+    predictions.write(folder, &file)?;
+    Ok(file)
 }
 
 /// A name that is a file name everywhere. Names that differ only in odd characters stay apart by a
 /// few digits of their hash.
 pub(crate) fn plain(name: &str) -> String {
-    let keep = |c: char| c.is_ascii_alphanumeric() || "-_+".contains(c);
-    let plain: String = name.chars().map(|c| if keep(c) { c } else { '_' }).collect();
+    let plain: String = name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect();
     if plain == name {
         return plain;
     }
@@ -127,9 +154,14 @@ pub(crate) fn plain(name: &str) -> String {
     format!("{plain}-{}", &hash[..6])
 }
 
+fn is_plain(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "-_+".contains(c)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::{Value, json};
 
     #[test]
     fn names_become_file_names_and_stay_apart() {
@@ -142,17 +174,18 @@ mod tests {
     }
 
     #[test]
-    fn a_page_holds_what_was_put_and_nothing_is_written_for_nothing() {
+    fn a_file_holds_what_was_put_and_nothing_is_written_for_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let predictions = Predictions::new(folder.path());
-        predictions.page("g", "a", "b").write().unwrap();
+        let mut predictions = PairPredictions::new("g", "a", "b");
+        let file = predictions.file();
+        predictions.write(folder.path(), &file).unwrap();
         assert!(!folder.path().join(FOLDER).exists());
-        let mut page = predictions.page("g", "a", "b");
         let region = Region::from_weights(vec![0.123456, 0.987654]).unwrap();
-        let name = page.put(Candidate::Whole, &Answer::Everything(region));
-        page.write().unwrap();
-        let text = std::fs::read(folder.path().join(name)).unwrap();
-        let page: Value = serde_json::from_slice(&text).unwrap();
+        predictions.methods.insert("whole".into(), Prediction::of_region(&region));
+        predictions.write(folder.path(), &file).unwrap();
+        let path = folder.path().join(file);
+        let page: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(page["methods"]["whole"], json!({ "vertices": [1], "weights": [0.9877] }));
+        assert_eq!(PairPredictions::read(&path).unwrap(), predictions);
     }
 }

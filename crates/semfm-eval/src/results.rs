@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::write_atomically;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::actor::ObjectRow;
 use crate::bootstrap::BootstrapSettings;
+use crate::calibration::Calibration;
 use crate::dataset::DatasetOrigin;
 use crate::journal::RunIdentity;
-use crate::row::Row;
+use crate::row::{ObjectRow, Row};
 use crate::summary::{Difference, Scope, ScoreTable, Summary};
-use crate::trust::Trust;
 use crate::{Error, Result};
 
 /// The format that is written.
@@ -37,7 +37,7 @@ pub struct Results {
     /// Methods against methods.
     pub differences: Vec<Difference>,
     /// What each method's confidence is worth.
-    pub trust: Vec<Trust>,
+    pub calibration: Vec<Calibration>,
 }
 
 /// What was run, on what.
@@ -61,10 +61,11 @@ impl Results {
     ) -> Self {
         let table = ScoreTable::new(&rows);
         let (summaries, differences) = (table.summaries(bootstrap), table.differences(bootstrap));
-        let of = |method: &str| Trust::of(method, rows.iter().filter(|row| row.method == method));
-        let trust = table.methods.iter().filter_map(|method| of(method)).collect();
+        let of =
+            |method: &str| Calibration::of(method, rows.iter().filter(|row| row.method == method));
+        let calibration = table.methods.iter().filter_map(|method| of(method)).collect();
         let (format, bootstrap) = (FORMAT.into(), *bootstrap);
-        Self { format, about, bootstrap, objects, summaries, differences, trust, rows }
+        Self { format, about, bootstrap, objects, summaries, differences, calibration, rows }
     }
 
     /// The same with the rows of another source beside ours.
@@ -88,16 +89,7 @@ impl Results {
     /// # Errors
     /// [`Error::Io`], [`Error::Format`].
     pub fn read(path: &Path) -> Result<Self> {
-        let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
-        let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
-        let results: Self = serde_json::from_slice(&bytes).map_err(|error| {
-            let place = format!("line {}, column {}", error.line(), error.column());
-            Error::format(&path, place, "results of an evaluation", error.to_string())
-        })?;
-        if results.format != FORMAT {
-            return Err(Error::format(&path, "format", FORMAT, results.format));
-        }
-        Ok(results)
+        read_results(path, FORMAT, |results: &Self| &results.format)
     }
 
     /// Writes `results.json` into `folder`, whole or not at all.
@@ -124,6 +116,22 @@ impl Results {
         }
         same
     }
+}
+
+/// Reads `results.json` of this format, or the one in a folder.
+pub(crate) fn read_results<T: DeserializeOwned>(
+    path: &Path,
+    format: &str,
+    format_of: fn(&T) -> &str,
+) -> Result<T> {
+    let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
+    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+    let results: T = serde_json::from_slice(&bytes).map_err(|error| {
+        let place = format!("line {}, column {}", error.line(), error.column());
+        Error::format(&path, place, "results of an evaluation", error.to_string())
+    })?;
+    let found = format_of(&results);
+    if found == format { Ok(results) } else { Err(Error::format(&path, "format", format, found)) }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! One pair and one method: what was found, how good it was, how long it took.
+//! Rows of the results: one pair and one method (what was found, how good it was, how long it took),
+//! and one object.
 
 use std::collections::BTreeMap;
 
@@ -9,6 +10,7 @@ use semfm::{Region, Transfer};
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
+use crate::bootstrap::PairKey;
 
 /// The score of one method on one pair. Fields that hold times, and nothing else, end in `_ms` or are
 /// named `paper_runtime`; all others are the same at every thread count.
@@ -62,6 +64,33 @@ pub struct Row {
     /// reconstruction. Only this stands beside the paper's runtimes. None where nobody measured what
     /// the encoder took.
     pub paper_runtime: Option<f64>,
+}
+
+/// What the results say of an object.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObjectRow {
+    /// Its name.
+    pub name: String,
+    /// Its category.
+    pub category: String,
+    /// Hash of the mesh as read.
+    pub mesh: String,
+    /// Vertices as read.
+    pub n_vertices: usize,
+    /// Triangles as read.
+    pub n_triangles: usize,
+    /// Vertices of the true region.
+    pub n_region: usize,
+    /// Names of its parts.
+    pub parts: Vec<String>,
+    /// Name of the encoder that made the features of our views.
+    pub encoder: Option<String>,
+    /// Rotations that were averaged in them.
+    pub rolls: Option<u32>,
+    /// Share of the samples that some view saw.
+    pub seen: Option<f64>,
+    /// Why it cannot take part.
+    pub failure: Option<Failure>,
 }
 
 /// One anchor and how the map treats it.
@@ -160,6 +189,16 @@ impl Row {
         row.stages_ms.clear();
         (row.matching_ms, row.cold_ms, row.paper_runtime) = (None, None, None);
         row
+    }
+
+    /// The pair.
+    pub fn pair_key(&self) -> PairKey<'_> {
+        PairKey { group: &self.group, source: &self.source, target: &self.target }
+    }
+
+    /// The IoU; 0 where the pair could not be tried.
+    pub(crate) fn iou_or_zero(&self) -> f64 {
+        self.iou.unwrap_or(0.0)
     }
 
     /// Group, source, target and method: what no two rows share.

@@ -9,15 +9,15 @@ use semfm::fmap::Matching;
 use semfm::geom::{ShapeCache, ShapeSettings};
 use semfm::{Region, Task, TransferSettings};
 
-use crate::actor::{Actor, ObjectRow, Ready, Tried, Workshop, tried};
 use crate::bootstrap::BootstrapSettings;
-use crate::candidate::{Candidate, Features, Override};
 use crate::dataset::{Dataset, DatasetOrigin, Group};
 use crate::embeddings::EmbeddingSource;
 use crate::journal::{DonePair, FORMAT, Journal, Line, RunIdentity};
-use crate::prediction::Predictions;
+use crate::object::{EvalObject, Preparation, Ready, Tried, tried};
+use crate::prediction::{PairPredictions, Prediction};
 use crate::results::{About, Results};
-use crate::row::{Failure, Row};
+use crate::row::{Failure, ObjectRow, Row};
+use crate::variant::{Features, Override, Variant};
 use crate::workers::Workers;
 use crate::{Error, Result};
 
@@ -25,7 +25,7 @@ use crate::{Error, Result};
 #[derive(Clone, Debug)]
 pub struct EvalSettings {
     /// The methods, in the order of the tables.
-    pub candidates: Vec<Candidate>,
+    pub variants: Vec<Variant>,
     /// Settings of theirs that are changed.
     pub overrides: Vec<Override>,
     /// Seed of everything drawn by chance.
@@ -49,7 +49,7 @@ pub struct EvalSettings {
 impl Default for EvalSettings {
     fn default() -> Self {
         Self {
-            candidates: Candidate::ALL.to_vec(),
+            variants: Variant::ALL.to_vec(),
             overrides: Vec::new(),
             seed: 0,
             workers: Workers::new(0, 0),
@@ -96,7 +96,7 @@ pub fn run(
         dataset,
         settings,
         methods: &methods,
-        shop: Workshop {
+        preparation: Preparation {
             embeddings,
             shape: &settings.shape,
             cache: &settings.cache,
@@ -104,7 +104,7 @@ pub fn run(
             wanted: &methods.iter().filter_map(|method| method.0.features()).collect(),
         },
         journal: &journal,
-        predictions: settings.keep_predictions.then(|| Predictions::new(folder)),
+        predictions: settings.keep_predictions.then_some(folder),
         progress: Progress::new(dataset, &done, task),
         objects: Mutex::new(objects),
     };
@@ -140,26 +140,26 @@ impl Finished {
     }
 }
 
-type Method = (Candidate, Option<TransferSettings>);
+type Method = (Variant, Option<TransferSettings>);
 
 fn methods(settings: &EvalSettings) -> Result<Vec<Method>> {
     let mut seen = BTreeSet::new();
-    if settings.candidates.is_empty() || !settings.candidates.iter().all(|c| seen.insert(c)) {
-        let names: Vec<_> = settings.candidates.iter().map(|c| c.name()).collect();
+    if settings.variants.is_empty() || !settings.variants.iter().all(|c| seen.insert(c)) {
+        let names: Vec<_> = settings.variants.iter().map(|c| c.name()).collect();
         return Err(Error::invalid("methods", "at least one, each once", names.join(",")));
     }
     for change in &settings.overrides {
-        if !settings.candidates.iter().any(|candidate| candidate.name() == change.method) {
+        if !settings.variants.iter().any(|variant| variant.name() == change.method) {
             let what = format!("setting of {}", change.method);
             return Err(Error::invalid(what, "a method that is evaluated", &change.key));
         }
     }
-    let with_overrides = |&candidate: &Candidate| -> Result<Method> {
-        let Some(own) = candidate.settings(settings.seed) else { return Ok((candidate, None)) };
-        let changed = settings.overrides.iter().try_fold(own, |own, o| o.apply(candidate, own))?;
-        Ok((candidate, Some(changed)))
+    let with_overrides = |&variant: &Variant| -> Result<Method> {
+        let Some(own) = variant.settings(settings.seed) else { return Ok((variant, None)) };
+        let changed = settings.overrides.iter().try_fold(own, |own, o| o.apply(variant, own))?;
+        Ok((variant, Some(changed)))
     };
-    settings.candidates.iter().map(with_overrides).collect()
+    settings.variants.iter().map(with_overrides).collect()
 }
 
 fn identity(
@@ -176,7 +176,7 @@ fn identity(
             DatasetOrigin::Synthetic { level, .. } => format!("the simulated encoder ({level})"),
             DatasetOrigin::Folder { .. } => embeddings.identity(),
         },
-        methods: settings.candidates.iter().map(|c| c.name().to_owned()).collect(),
+        methods: settings.variants.iter().map(|c| c.name().to_owned()).collect(),
         settings: format!("seed {seed}, {shape:?}, changes {overrides:?}"),
     }
 }
@@ -189,9 +189,10 @@ struct Evaluation<'a> {
     dataset: &'a Dataset,
     settings: &'a EvalSettings,
     methods: &'a [Method],
-    shop: Workshop<'a>,
+    preparation: Preparation<'a>,
     journal: &'a Journal,
-    predictions: Option<Predictions>,
+    /// Where predictions are put.
+    predictions: Option<&'a Path>,
     progress: Progress,
     objects: Mutex<BTreeMap<(String, String), ObjectRow>>,
 }
@@ -210,10 +211,10 @@ impl Evaluation<'_> {
             return Ok(Vec::new());
         }
         let workers = &self.settings.workers;
-        let actors = self.actors(group, &open)?;
-        let places: Vec<usize> = actors.keys().copied().collect();
-        let ready = workers.each(places.len(), |i| match &actors[&places[i]] {
-            Ok(actor) => Ok(Some(actor.ready(self.progress.quiet())?)),
+        let objects = self.objects(group, &open)?;
+        let places: Vec<usize> = objects.keys().copied().collect();
+        let ready = workers.each(places.len(), |i| match &objects[&places[i]] {
+            Ok(object) => Ok(Some(object.ready(self.progress.quiet())?)),
             Err(_) => Ok(None),
         })?;
         let ready: BTreeMap<usize, Option<Ready<'_>>> = places.into_iter().zip(ready).collect();
@@ -222,7 +223,7 @@ impl Evaluation<'_> {
             let side = |place: usize| Side {
                 name: &self.dataset.objects[place].name,
                 category: &self.dataset.objects[place].category,
-                actor: actors.get(&place),
+                object: objects.get(&place),
                 ready: ready.get(&place).and_then(Option::as_ref),
             };
             let rows = self.pair(&group.name, &side(source), &side(target))?;
@@ -235,7 +236,7 @@ impl Evaluation<'_> {
     }
 
     /// The objects of the open pairs, prepared.
-    fn actors(&self, group: &Group, open: &[usize]) -> Result<BTreeMap<usize, Tried<Actor>>> {
+    fn objects(&self, group: &Group, open: &[usize]) -> Result<BTreeMap<usize, Tried<EvalObject>>> {
         let members: Vec<usize> = group
             .pairs
             .iter()
@@ -254,14 +255,20 @@ impl Evaluation<'_> {
             loaded.into_iter().map(|o| Mutex::new(Some(o))).collect();
         let chosen: Vec<usize> =
             (0..members.len()).filter(|&i| needed.contains(&members[i])).collect();
-        let actors = workers.each(chosen.len(), |i| {
+        let objects = workers.each(chosen.len(), |i| {
             let place = members[chosen[i]];
             let entry = &self.dataset.objects[place];
             let object = loaded[chosen[i]].lock().ok().and_then(|mut slot| slot.take());
             let object = object.unwrap_or_else(|| Err(Failure::new("object", "taken twice")));
-            let actor = Actor::new(entry, object, &part_names, &self.shop, self.progress.quiet())?;
-            let about = match &actor {
-                Ok(actor) => actor.about.clone(),
+            let object = EvalObject::new(
+                entry,
+                object,
+                &part_names,
+                &self.preparation,
+                self.progress.quiet(),
+            )?;
+            let about = match &object {
+                Ok(object) => object.about.clone(),
                 Err(failure) => ObjectRow {
                     name: entry.name.clone(),
                     category: entry.category.clone(),
@@ -274,29 +281,30 @@ impl Evaluation<'_> {
                 objects.insert(key(&about), about);
             }
             self.progress.step()?;
-            Ok((place, actor))
+            Ok((place, object))
         })?;
-        Ok(actors.into_iter().collect())
+        Ok(objects.into_iter().collect())
     }
 
     /// Every method on one pair.
     fn pair(&self, group: &str, source: &Side<'_>, target: &Side<'_>) -> Result<Vec<Row>> {
-        let mut page = self.predictions.as_ref().map(|p| p.page(group, source.name, target.name));
+        let mut predictions = PairPredictions::new(group, source.name, target.name);
+        let file = predictions.file();
         let mut rows = Vec::new();
-        for (candidate, settings) in self.methods {
+        for (variant, settings) in self.methods {
             let mut row = Row {
                 group: group.into(),
                 category: source.category.into(),
                 source: source.name.into(),
                 target: target.name.into(),
-                method: candidate.name().into(),
+                method: variant.name().into(),
                 ..Row::default()
             };
-            let answer = match (source.actor, target.actor) {
+            let answer = match (source.object, target.object) {
                 (Some(Ok(a)), Some(Ok(b))) => {
                     let job = Job { source: (a, source.ready), target: (b, target.ready) };
                     let carried =
-                        job.carry(*candidate, settings.as_ref(), &mut row, self.progress.quiet());
+                        job.carry(*variant, settings.as_ref(), &mut row, self.progress.quiet());
                     tried("transfer", carried)?.and_then(|carried| carried)
                 }
                 (Some(Err(failure)), _) | (_, Some(Err(failure))) => Err(failure.clone()),
@@ -304,14 +312,17 @@ impl Evaluation<'_> {
             };
             match answer {
                 Ok(answer) => {
-                    row.prediction = page.as_mut().map(|page| page.put(*candidate, &answer));
+                    if self.predictions.is_some() {
+                        predictions.methods.insert(variant.name().into(), answer);
+                        row.prediction = Some(file.clone());
+                    }
                 }
                 Err(failure) => row.failure = Some(failure),
             }
             rows.push(row);
         }
-        if let Some(page) = page {
-            page.write()?;
+        if let Some(folder) = self.predictions {
+            predictions.write(folder, &file)?;
         }
         Ok(rows)
     }
@@ -321,36 +332,30 @@ impl Evaluation<'_> {
 struct Side<'a> {
     name: &'a str,
     category: &'a str,
-    actor: Option<&'a Tried<Actor>>,
+    object: Option<&'a Tried<EvalObject>>,
     ready: Option<&'a Ready<'a>>,
 }
 
 /// A pair whose objects are sound.
 struct Job<'a> {
-    source: (&'a Actor, Option<&'a Ready<'a>>),
-    target: (&'a Actor, Option<&'a Ready<'a>>),
-}
-
-/// What a candidate says: a transfer, or the floor's bare region.
-pub(crate) enum Answer {
-    Carried(Box<semfm::Transfer>),
-    Everything(Region),
+    source: (&'a EvalObject, Option<&'a Ready<'a>>),
+    target: (&'a EvalObject, Option<&'a Ready<'a>>),
 }
 
 impl<'a> Job<'a> {
     fn carry(
         &self,
-        candidate: Candidate,
+        variant: Variant,
         settings: Option<&TransferSettings>,
         row: &mut Row,
         task: &Task,
-    ) -> Result<Tried<Answer>> {
+    ) -> Result<Tried<Prediction>> {
         let (source, target) = (self.source.0, self.target.0);
         let (truth, areas) = (&target.truth, &target.areas);
-        let (Some(features), Some(settings)) = (candidate.features(), settings) else {
+        let (Some(features), Some(settings)) = (variant.features(), settings) else {
             let everything = Region::from_mask(&vec![true; areas.len()]);
             row.score(&everything, truth, areas)?;
-            return Ok(Ok(Answer::Everything(everything)));
+            return Ok(Ok(Prediction::of_region(&everything)));
         };
         let by = |ready: Option<&'a Ready<'a>>| ready.and_then(|ready| ready.get(&features));
         let (Some(a), Some(b)) = (by(self.source.1), by(self.target.1)) else {
@@ -366,14 +371,14 @@ impl<'a> Job<'a> {
             row.stages_ms.insert(stage.into(), ms);
         }
         row.matching_ms = Some(carried.report.stages_ms.total_ms());
-        for (side, actor, ready_ms) in [("source", source, a_ms), ("target", target, b_ms)] {
+        for (side, object, ready_ms) in [("source", source, a_ms), ("target", target, b_ms)] {
             row.stages_ms.insert(format!("prepare_{side}"), *ready_ms);
-            for (stage, ms) in actor.times(features) {
+            for (stage, ms) in object.times(features) {
                 row.stages_ms.insert(format!("{stage}_{side}"), ms);
             }
         }
         sum_up_times(row, features);
-        Ok(Ok(Answer::Carried(Box::new(carried))))
+        Ok(Ok(Prediction::of_transfer(&carried)))
     }
 }
 

@@ -4,12 +4,14 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::bootstrap::{BootstrapSettings, PairDraws, weighted_mean};
-use crate::candidate::Candidate;
+use crate::bootstrap::{BootstrapSettings, PairDraws, PairKey, weighted_mean};
 use crate::row::Row;
+use crate::variant::Variant;
 
 /// Below this IoU an answer is useless.
 pub const POOR: f64 = 0.3;
+/// Smaller differences of IoU count as none.
+pub(crate) const NOTICED: f64 = 0.01;
 
 /// Which pairs are summed up.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +25,16 @@ pub enum Scope {
     All,
     /// The mean of the categories' means: each counts the same, however many pairs it has.
     MeanOfCategories,
+}
+
+impl Scope {
+    fn holds(&self, pair: &CategorisedPair<'_>) -> bool {
+        match self {
+            Self::Group(name) => pair.key.group == name,
+            Self::Category(name) => pair.category == name,
+            Self::All | Self::MeanOfCategories => true,
+        }
+    }
 }
 
 /// One method on the pairs of one scope.
@@ -47,12 +59,12 @@ pub struct Summary {
     pub below_poor: Option<f64>,
     /// Mean IoU by area.
     pub area_mean: Option<f64>,
-    /// Mean of the floor (`whole`) on the same pairs.
-    pub floor: Option<f64>,
-    /// Mean of the ceiling (`oracle`) on the same pairs.
-    pub ceiling: Option<f64>,
-    /// Where the mean stands between floor (0) and ceiling (1).
-    pub way: Option<f64>,
+    /// Mean of the lower bound (`whole`) on the same pairs.
+    pub lower_bound: Option<f64>,
+    /// Mean of the upper bound (`oracle`) on the same pairs.
+    pub upper_bound: Option<f64>,
+    /// Where the mean m is between the bounds: (m − lower) / (upper − lower).
+    pub between_bounds: Option<f64>,
     /// Mean share of a source anchor that lands in its partner.
     pub anchor_landed: Option<f64>,
     /// Mean distance of carried anchors from their partners, in √area.
@@ -100,10 +112,16 @@ impl Difference {
 pub struct ScoreTable<'a> {
     /// Methods in the order in which rows name them first.
     pub methods: Vec<&'a str>,
-    /// Group, category, source and target of each pair.
-    pairs: Vec<[&'a str; 4]>,
+    pairs: Vec<CategorisedPair<'a>>,
     /// Rows of each pair, by method.
     rows: Vec<Vec<Option<&'a Row>>>,
+}
+
+/// A pair and the category of its objects.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct CategorisedPair<'a> {
+    category: &'a str,
+    key: PairKey<'a>,
 }
 
 impl<'a> ScoreTable<'a> {
@@ -116,9 +134,9 @@ impl<'a> ScoreTable<'a> {
                 table.methods.push(&row.method);
                 table.methods.len() - 1
             });
-            let key = [&*row.group, &*row.category, &*row.source, &*row.target];
-            let pair = *place_of.entry(key).or_insert_with(|| {
-                table.pairs.push(key);
+            let named = CategorisedPair { category: &row.category, key: row.pair_key() };
+            let pair = *place_of.entry(named).or_insert_with(|| {
+                table.pairs.push(named);
                 table.rows.push(Vec::new());
                 table.pairs.len() - 1
             });
@@ -133,12 +151,12 @@ impl<'a> ScoreTable<'a> {
 
     /// Groups in the order of the rows.
     pub fn groups(&self) -> Vec<&'a str> {
-        in_order(self.pairs.iter().map(|pair| pair[0]))
+        in_order(self.pairs.iter().map(|pair| pair.key.group))
     }
 
     /// Categories in the order of the rows.
     pub fn categories(&self) -> Vec<&'a str> {
-        in_order(self.pairs.iter().map(|pair| pair[1]))
+        in_order(self.pairs.iter().map(|pair| pair.category))
     }
 
     fn scopes(&self) -> Vec<Scope> {
@@ -148,12 +166,7 @@ impl<'a> ScoreTable<'a> {
     }
 
     fn places(&self, scope: &Scope) -> Vec<usize> {
-        let inside = |pair: &[&str; 4]| match scope {
-            Scope::Group(name) => pair[0] == name,
-            Scope::Category(name) => pair[1] == name,
-            Scope::All | Scope::MeanOfCategories => true,
-        };
-        (0..self.pairs.len()).filter(|&i| inside(&self.pairs[i])).collect()
+        (0..self.pairs.len()).filter(|&i| scope.holds(&self.pairs[i])).collect()
     }
 
     fn row(&self, pair: usize, method: usize) -> Option<&'a Row> {
@@ -164,9 +177,9 @@ impl<'a> ScoreTable<'a> {
         &self,
         places: &[usize],
         method: usize,
-        of: impl Fn(&Row) -> Option<f64>,
+        of: fn(&Row) -> Option<f64>,
     ) -> Vec<Option<f64>> {
-        places.iter().map(|&pair| self.row(pair, method).and_then(&of)).collect()
+        places.iter().map(|&pair| self.row(pair, method).and_then(of)).collect()
     }
 
     /// Every scope and method.
@@ -182,16 +195,22 @@ impl<'a> ScoreTable<'a> {
     /// Every scope and every two methods, the later listed against the earlier.
     pub fn differences(&self, settings: &BootstrapSettings) -> Vec<Difference> {
         let mut all = Vec::new();
-        let is_bound = |m: usize| ["whole", "oracle"].contains(&self.methods[m]);
+        let compared: Vec<usize> =
+            (0..self.methods.len()).filter(|&m| !is_bound(self.methods[m])).collect();
         for scope in self.scopes() {
             let view = View::new(self, scope, settings);
-            for against in (0..self.methods.len()).filter(|&m| !is_bound(m)) {
-                let others = (against + 1..self.methods.len()).filter(|&m| !is_bound(m));
-                all.extend(others.filter_map(|method| view.difference(method, against)));
+            for (place, &against) in compared.iter().enumerate() {
+                let others = compared[place + 1..].iter();
+                all.extend(others.filter_map(|&method| view.difference(method, against)));
             }
         }
         all
     }
+}
+
+/// Whether a method is one of the bounds, which compete with no method.
+pub(crate) fn is_bound(method: &str) -> bool {
+    [Variant::Whole.name(), Variant::Oracle.name()].contains(&method)
 }
 
 fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -210,14 +229,8 @@ struct View<'t, 'a> {
 impl<'t, 'a> View<'t, 'a> {
     fn new(table: &'t ScoreTable<'a>, scope: Scope, settings: &BootstrapSettings) -> Self {
         let places = table.places(&scope);
-        let named: Vec<[&str; 3]> = places
-            .iter()
-            .map(|&i| {
-                let [group, _, source, target] = table.pairs[i];
-                [group, source, target]
-            })
-            .collect();
-        let draws = PairDraws::new(&named, settings);
+        let pairs: Vec<PairKey<'_>> = places.iter().map(|&i| table.pairs[i].key).collect();
+        let draws = PairDraws::new(&pairs, settings);
         Self { table, scope, places, draws }
     }
 
@@ -231,8 +244,9 @@ impl<'t, 'a> View<'t, 'a> {
             .categories()
             .into_iter()
             .map(|category| {
-                let own = |i: usize| self.table.pairs[self.places[i]][1] == category;
-                let inside: Vec<usize> = (0..values.len()).filter(|&i| own(i)).collect();
+                let inside: Vec<usize> = (0..values.len())
+                    .filter(|&i| self.table.pairs[self.places[i]].category == category)
+                    .collect();
                 let values: Vec<_> = inside.iter().map(|&i| values[i]).collect();
                 let weights: Vec<_> = inside.iter().map(|&i| weights[i]).collect();
                 weighted_mean(&values, &weights)
@@ -245,8 +259,8 @@ impl<'t, 'a> View<'t, 'a> {
         self.mean(values, &vec![1.0; values.len()])
     }
 
-    /// Mean of another candidate on those pairs that have a score in `values`.
-    fn bound(&self, bound: Candidate, values: &[Option<f64>]) -> Option<f64> {
+    /// Mean of a bound on those pairs that have a score in `values`.
+    fn bound(&self, bound: Variant, values: &[Option<f64>]) -> Option<f64> {
         let method = self.table.methods.iter().position(|&name| name == bound.name())?;
         let bounds = self.table.values(&self.places, method, |row| row.iou);
         let both: Vec<Option<f64>> =
@@ -254,69 +268,87 @@ impl<'t, 'a> View<'t, 'a> {
         self.plain_mean(&both)
     }
 
+    fn values(&self, method: usize, of: fn(&Row) -> Option<f64>) -> Vec<Option<f64>> {
+        self.table.values(&self.places, method, of)
+    }
+
+    /// The method's rows.
+    fn rows(&self, method: usize) -> impl Iterator<Item = &'a Row> {
+        self.places.iter().filter_map(move |&pair| self.table.row(pair, method))
+    }
+
     fn summary(&self, method: usize) -> Summary {
-        let of = |value: fn(&Row) -> Option<f64>| self.table.values(&self.places, method, value);
-        let ious = of(|row| row.iou);
+        let ious = self.values(method, |row| row.iou);
         let scored: Vec<f64> = ious.iter().flatten().copied().collect();
-        let failed =
-            |&&pair: &&usize| self.table.row(pair, method).is_some_and(|r| r.failure.is_some());
         let mean = self.plain_mean(&ious);
-        let (floor, ceiling) =
-            (self.bound(Candidate::Whole, &ious), self.bound(Candidate::Oracle, &ious));
-        let way = || Some((mean? - floor?) / (ceiling? - floor?)).filter(|way| way.is_finite());
-        let poor: Vec<_> = ious.iter().map(|x| x.map(|x| f64::from(u8::from(x < POOR)))).collect();
-        let mean_of = |values: Vec<f64>| {
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
+        let lower_bound = self.bound(Variant::Whole, &ious);
+        let upper_bound = self.bound(Variant::Oracle, &ious);
+        let anchors = self.rows(method).flat_map(|row| &row.anchors);
+        let distances: Vec<f64> = anchors.filter_map(|anchor| anchor.mean_distance).collect();
         Summary {
             scope: self.scope.clone(),
             method: self.table.methods[method].into(),
             n: scored.len(),
-            n_failed: self.places.iter().filter(failed).count(),
+            n_failed: self.rows(method).filter(|row| row.failure.is_some()).count(),
             mean,
             std: deviation(&scored),
             interval: self.draws.interval(|weights| self.mean(&ious, weights)),
-            below_poor: self.plain_mean(&poor),
-            area_mean: self.plain_mean(&of(|row| row.area_iou)),
-            floor,
-            ceiling,
-            way: way(),
-            anchor_landed: self.plain_mean(&of(|row| {
-                let n = row.anchors.len() as f64;
-                (n > 0.0).then(|| row.anchors.iter().map(|a| a.landed).sum::<f64>() / n)
-            })),
-            anchor_distance: mean_of(
-                self.places
-                    .iter()
-                    .filter_map(|&pair| self.table.row(pair, method))
-                    .flat_map(|row| row.anchors.iter().filter_map(|anchor| anchor.mean_distance))
-                    .collect(),
-            ),
-            median_matching_ms: median(of(|row| row.matching_ms)),
-            median_cold_ms: median(of(|row| row.cold_ms)),
-            median_paper_runtime: median(of(|row| row.paper_runtime)),
+            below_poor: self.plain_mean(&self.values(method, is_poor)),
+            area_mean: self.plain_mean(&self.values(method, |row| row.area_iou)),
+            lower_bound,
+            upper_bound,
+            between_bounds: between(mean, lower_bound, upper_bound),
+            anchor_landed: self.plain_mean(&self.values(method, mean_landed)),
+            anchor_distance: mean_of(&distances),
+            median_matching_ms: median(self.values(method, |row| row.matching_ms)),
+            median_cold_ms: median(self.values(method, |row| row.cold_ms)),
+            median_paper_runtime: median(self.values(method, |row| row.paper_runtime)),
         }
     }
 
     fn difference(&self, method: usize, against: usize) -> Option<Difference> {
-        let [ours, theirs] =
-            [method, against].map(|m| self.table.values(&self.places, m, |row| row.iou));
+        let ours = self.values(method, |row| row.iou);
+        let theirs = self.values(against, |row| row.iou);
         let gaps: Vec<Option<f64>> =
             ours.iter().zip(&theirs).map(|(a, b)| Some((*a)? - (*b)?)).collect();
-        let count = |test: fn(f64) -> bool| gaps.iter().flatten().filter(|&&g| test(g)).count();
+        let known = gaps.iter().flatten();
         Some(Difference {
             scope: self.scope.clone(),
             method: self.table.methods[method].into(),
             against: self.table.methods[against].into(),
-            n: gaps.iter().flatten().count(),
+            n: known.clone().count(),
             mean: self.plain_mean(&gaps)?,
             interval: self.draws.interval(|weights| self.mean(&gaps, weights)),
-            better_worse: [count(|g| g > 0.01), count(|g| g < -0.01)],
+            better_worse: [
+                known.clone().filter(|&&gap| gap > NOTICED).count(),
+                known.filter(|&&gap| gap < -NOTICED).count(),
+            ],
         })
     }
 }
 
-/// Standard deviation with n − 1; none below two values.
+/// 1 where the answer is useless, else 0.
+fn is_poor(row: &Row) -> Option<f64> {
+    row.iou.map(|iou| f64::from(u8::from(iou < POOR)))
+}
+
+/// Mean share of the row's anchors that lands in their partners.
+fn mean_landed(row: &Row) -> Option<f64> {
+    let n = row.anchors.len() as f64;
+    (n > 0.0).then(|| row.anchors.iter().map(|anchor| anchor.landed).sum::<f64>() / n)
+}
+
+/// (m − lower) / (upper − lower); none where the bounds are the same.
+fn between(mean: Option<f64>, lower: Option<f64>, upper: Option<f64>) -> Option<f64> {
+    Some((mean? - lower?) / (upper? - lower?)).filter(|share| share.is_finite())
+}
+
+/// None for nothing.
+fn mean_of(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// √(Σ (xᵢ − mean)² / (n − 1)); none below two values.
 fn deviation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -380,16 +412,16 @@ mod tests {
             summaries.iter().find(|s| s.scope == scope && s.method == method).unwrap().clone()
         };
         let cups = find(Scope::Group("cups things".into()), "fused");
-        assert_eq!((cups.n, cups.ceiling), (6, Some(1.0)));
-        assert!((cups.floor.unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!((cups.n, cups.upper_bound), (6, Some(1.0)));
+        assert!((cups.lower_bound.unwrap() - 0.1).abs() < 1e-12);
         assert!((cups.mean.unwrap() - 0.75).abs() < 1e-12);
-        assert!((cups.way.unwrap() - 0.65 / 0.9).abs() < 1e-12);
+        assert!((cups.between_bounds.unwrap() - 0.65 / 0.9).abs() < 1e-12);
         let all = find(Scope::All, "nearest");
         assert_eq!((all.n, all.n_failed), (6, 1));
         let both = find(Scope::MeanOfCategories, "fused");
         assert!((both.mean.unwrap() - (0.75 + 0.2) / 2.0).abs() < 1e-12);
         let shoes = find(Scope::Category("shoes".into()), "fused");
-        assert_eq!((shoes.below_poor, shoes.std, shoes.floor), (Some(1.0), None, None));
+        assert_eq!((shoes.below_poor, shoes.std, shoes.lower_bound), (Some(1.0), None, None));
     }
 
     #[test]

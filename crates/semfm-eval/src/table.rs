@@ -9,7 +9,7 @@ use crate::Result;
 use crate::dataset::DatasetOrigin;
 use crate::published::{self, PublishedRow};
 use crate::results::Results;
-use crate::summary::{Scope, ScoreTable, Summary};
+use crate::summary::{Difference, Scope, ScoreTable, Summary};
 
 /// The file in the output folder.
 pub const FILE: &str = "table.md";
@@ -30,7 +30,7 @@ pub fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
 /// The whole page as Markdown.
 pub fn render(results: &Results) -> String {
     let table = ScoreTable::new(&results.rows);
-    let page = Page {
+    let page = Markdown {
         results,
         groups: table.groups(),
         categories: table.categories(),
@@ -41,7 +41,7 @@ pub fn render(results: &Results) -> String {
         page.accuracy(),
         page.intervals(),
         page.differences(),
-        page.trust(),
+        page.calibration(),
         page.times(),
         page.paper(),
         page.failures(),
@@ -50,14 +50,25 @@ pub fn render(results: &Results) -> String {
     sections.join("\n")
 }
 
-struct Page<'a> {
+struct Markdown<'a> {
     results: &'a Results,
     methods: Vec<&'a str>,
     groups: Vec<&'a str>,
     categories: Vec<&'a str>,
 }
 
-impl Page<'_> {
+/// One of our categories that is the paper's number `place`.
+struct PaperCategory<'a> {
+    place: usize,
+    name: &'a str,
+}
+
+struct Column {
+    name: String,
+    scope: Scope,
+}
+
+impl Markdown<'_> {
     fn summary(&self, scope: &Scope, method: &str) -> Option<&Summary> {
         self.results.summary(scope, method)
     }
@@ -83,14 +94,18 @@ impl Page<'_> {
         )
     }
 
-    fn columns(&self) -> Vec<(String, Scope)> {
-        let groups = self.groups.iter().map(|&name| (name.to_owned(), Scope::Group(name.into())));
-        groups.chain([("all".to_owned(), Scope::All)]).collect()
+    /// A column for each group, and one for all pairs.
+    fn columns(&self) -> Vec<Column> {
+        let groups = self
+            .groups
+            .iter()
+            .map(|&name| Column { name: name.to_owned(), scope: Scope::Group(name.into()) });
+        groups.chain([Column { name: "all".into(), scope: Scope::All }]).collect()
     }
 
     fn accuracy(&self) -> String {
         let columns = self.columns();
-        let names = columns.iter().map(|(name, scope)| {
+        let names = columns.iter().map(|Column { name, scope }| {
             let n = self.methods.iter().filter_map(|m| Some(self.summary(scope, m)?.n)).max();
             format!("{name} ({})", n.unwrap_or(0))
         });
@@ -99,7 +114,7 @@ impl Page<'_> {
         text += &header(["method".to_owned()].into_iter().chain(names).chain(last));
         for &method in &self.methods {
             let mut cells = vec![method.to_owned()];
-            for (_, scope) in &columns {
+            for Column { scope, .. } in &columns {
                 cells.push(number(self.summary(scope, method).and_then(|s| s.mean), 2));
             }
             let all = self.summary(&Scope::All, method);
@@ -111,11 +126,13 @@ impl Page<'_> {
             text += &line(cells);
         }
         if let Some(first) = self.methods.first().filter(|_| self.methods.contains(&"oracle")) {
-            let mut cells = vec![format!("way of {first} from floor to ceiling")];
-            for (_, scope) in &columns {
-                cells.push(percent(self.summary(scope, first).and_then(|s| s.way)));
+            let mut cells = vec![format!("{first} between the bounds")];
+            for Column { scope, .. } in &columns {
+                cells.push(percent(self.summary(scope, first).and_then(|s| s.between_bounds)));
             }
-            cells.push(percent(self.summary(&Scope::MeanOfCategories, first).and_then(|s| s.way)));
+            cells.push(percent(
+                self.summary(&Scope::MeanOfCategories, first).and_then(|s| s.between_bounds),
+            ));
             cells.extend([const { String::new() }; 3]);
             text += &line(cells);
         }
@@ -144,7 +161,8 @@ impl Page<'_> {
     /// The other methods against the first.
     fn differences(&self) -> String {
         let Some(&first) = self.methods.first() else { return String::new() };
-        let ours: Vec<_> = self.results.differences.iter().filter(|d| d.against == first).collect();
+        let ours: Vec<&Difference> =
+            self.results.differences.iter().filter(|d| d.against == first).collect();
         if ours.is_empty() {
             return String::new();
         }
@@ -153,29 +171,28 @@ impl Page<'_> {
             "## Against {first}\n\nMean difference in IoU, pair by pair; **bold** where the 95 % interval \
              excludes 0.\n\n"
         );
-        let names = columns.iter().map(|(name, _)| name.clone());
+        let names = columns.iter().map(|column| column.name.clone());
         text += &header(["method".to_owned()].into_iter().chain(names).chain(["95 %, all".into()]));
         for &method in &self.methods[1..] {
-            let find =
-                |scope: &Scope| ours.iter().find(|d| d.scope == *scope && d.method == method);
-            if find(&Scope::All).is_none() {
-                continue;
-            }
+            let own: Vec<&Difference> =
+                ours.iter().copied().filter(|d| d.method == method).collect();
+            let Some(over_all) = own.iter().find(|d| d.scope == Scope::All) else { continue };
             let mut cells = vec![method.to_owned()];
-            for (_, scope) in &columns {
-                cells.push(find(scope).map_or_else(dash, |d| {
+            for Column { scope, .. } in &columns {
+                let found = own.iter().find(|d| d.scope == *scope);
+                cells.push(found.map_or_else(dash, |d| {
                     let text = format!("{:+.2}", d.mean);
                     if d.sign() == 0 { text } else { format!("**{text}**") }
                 }));
             }
-            cells.push(find(&Scope::All).map_or_else(dash, |d| interval(d.interval, true)));
+            cells.push(interval(over_all.interval, true));
             text += &line(cells);
         }
         text
     }
 
-    fn trust(&self) -> String {
-        if self.results.trust.is_empty() {
+    fn calibration(&self) -> String {
+        if self.results.calibration.is_empty() {
             return String::new();
         }
         let mut text = String::from(
@@ -184,16 +201,16 @@ impl Page<'_> {
         );
         let names = ["method", "right", "AUC", "calibration error", "accept", "check", "refuse"];
         text += &header(names.map(str::to_owned));
-        for trust in &self.results.trust {
+        for calibration in &self.results.calibration {
             let mut cells = vec![
-                trust.method.clone(),
-                number(Some(trust.right), 2),
-                number(trust.auc, 2),
-                number(Some(trust.calibration_error), 2),
+                calibration.method.clone(),
+                number(Some(calibration.right), 2),
+                number(calibration.auc, 2),
+                number(Some(calibration.calibration_error), 2),
             ];
             use semfm::Verdict::{Accept, Check, Refuse};
             for verdict in [Accept, Check, Refuse] {
-                let found = trust.verdicts.iter().find(|v| v.verdict == verdict);
+                let found = calibration.verdicts.iter().find(|v| v.verdict == verdict);
                 cells.push(found.map_or_else(dash, |v| format!("{} ({:.2})", v.n, v.mean_iou)));
             }
             text += &line(cells);
@@ -209,19 +226,24 @@ impl Page<'_> {
         text += &header(["method", "matching, ms", "cold, ms", "whole, s"].map(str::to_owned));
         for &method in &self.methods {
             let Some(s) = self.summary(&Scope::All, method) else { continue };
-            let ms = |x: Option<f64>| x.map_or_else(dash, |x| format!("{x:.0}"));
-            let whole = s.median_paper_runtime.map_or_else(dash, |x| format!("{x:.2}"));
-            text += &line([method.into(), ms(s.median_matching_ms), ms(s.median_cold_ms), whole]);
+            text += &line([
+                method.into(),
+                whole_number(s.median_matching_ms),
+                whole_number(s.median_cold_ms),
+                s.median_paper_runtime.map_or_else(dash, |x| format!("{x:.2}")),
+            ]);
         }
         text
     }
 
     /// The paper's table beside ours, where the categories are the paper's.
     fn paper(&self) -> String {
-        let places: Vec<(usize, &str)> = self
+        let places: Vec<PaperCategory<'_>> = self
             .categories
             .iter()
-            .filter_map(|name| Some((published::paper_category(name)?, *name)))
+            .filter_map(|&name| {
+                Some(PaperCategory { place: published::paper_category(name)?, name })
+            })
             .collect();
         if places.len() < published::CATEGORIES.len() {
             return String::new();
@@ -230,36 +252,44 @@ impl Page<'_> {
             "## Beside the paper\n\n*Quoted* rows are the paper's own numbers: other meshes and another \
              encoder, so no contest.\n",
         );
-        let column = |place: usize| places.iter().find(|(p, _)| *p == place).map(|(_, name)| *name);
-        let mut part = |title: &str, quoted: &[PublishedRow], of: fn(&Summary) -> Option<f64>| {
-            let names = published::CATEGORIES.map(str::to_owned);
-            let _ = writeln!(text, "\n{title}\n");
-            text += &header(["method".to_owned()].into_iter().chain(names).chain(["mean".into()]));
-            for row in quoted {
-                let values = row.values.iter().map(|x| format!("{x:.2}"));
-                let name = format!("*{} (quoted)*", row.method);
-                text +=
-                    &line([name].into_iter().chain(values).chain([format!("{:.3}", row.mean())]));
+        text += &self.paper_table(&places, "Mean IoU.", &published::IOU, |s| s.mean);
+        let title = "Seconds a transfer, from meshes.";
+        text += &self.paper_table(&places, title, &published::SECONDS, |s| s.median_paper_runtime);
+        text
+    }
+
+    /// Quoted rows, then ours; `categories` holds the place of each of ours among the paper's.
+    fn paper_table(
+        &self,
+        categories: &[PaperCategory<'_>],
+        title: &str,
+        quoted: &[PublishedRow],
+        of: fn(&Summary) -> Option<f64>,
+    ) -> String {
+        let mut text = format!("\n{title}\n\n");
+        let names = published::CATEGORIES.map(str::to_owned);
+        text += &header(["method".to_owned()].into_iter().chain(names).chain(["mean".into()]));
+        for row in quoted {
+            let values = row.values.iter().map(|x| format!("{x:.2}"));
+            let name = format!("*{} (quoted)*", row.method);
+            text += &line([name].into_iter().chain(values).chain([format!("{:.3}", row.mean())]));
+        }
+        for &method in &self.methods {
+            let values: Vec<Option<f64>> = (0..published::CATEGORIES.len())
+                .map(|place| {
+                    let own = categories.iter().find(|category| category.place == place)?;
+                    of(self.summary(&Scope::Category(own.name.into()), method)?)
+                })
+                .collect();
+            if values.iter().all(Option::is_none) {
+                continue;
             }
-            for &method in &self.methods {
-                let value = |place: usize| {
-                    of(self.summary(&Scope::Category(column(place)?.into()), method)?)
-                };
-                let values: Vec<Option<f64>> =
-                    (0..published::CATEGORIES.len()).map(value).collect();
-                if values.iter().all(Option::is_none) {
-                    continue;
-                }
-                let known: Vec<f64> = values.iter().flatten().copied().collect();
-                let mean = known.iter().sum::<f64>() / known.len() as f64;
-                let cells = values.iter().map(|x| number(*x, 2));
-                text += &line(
-                    [method.to_owned()].into_iter().chain(cells).chain([number(Some(mean), 3)]),
-                );
-            }
-        };
-        part("Mean IoU.", &published::IOU, |s| s.mean);
-        part("Seconds a transfer, from meshes.", &published::SECONDS, |s| s.median_paper_runtime);
+            let known: Vec<f64> = values.iter().flatten().copied().collect();
+            let mean = known.iter().sum::<f64>() / known.len() as f64;
+            let cells = values.iter().map(|x| number(*x, 2));
+            text +=
+                &line([method.to_owned()].into_iter().chain(cells).chain([number(Some(mean), 3)]));
+        }
         text
     }
 
@@ -297,7 +327,7 @@ pub(crate) fn line(cells: impl IntoIterator<Item = String>) -> String {
     format!("| {} |\n", escaped.join(" | "))
 }
 
-fn dash() -> String {
+pub(crate) fn dash() -> String {
     "–".into()
 }
 
@@ -311,13 +341,20 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     }
 }
 
-fn percent(value: Option<f64>) -> String {
+pub(crate) fn percent(value: Option<f64>) -> String {
     value.map_or_else(dash, |x| format!("{:.0} %", 100.0 * x))
 }
 
-fn interval(ends: Option<[f64; 2]>, signed: bool) -> String {
-    let one = |x: f64| if signed { format!("{x:+.3}") } else { number(Some(x), 3) };
-    ends.map_or_else(dash, |[low, high]| format!("{} … {}", one(low), one(high)))
+pub(crate) fn interval(ends: Option<[f64; 2]>, signed: bool) -> String {
+    match ends {
+        None => dash(),
+        Some([low, high]) if signed => format!("{low:+.3} … {high:+.3}"),
+        Some([low, high]) => format!("{} … {}", number(Some(low), 3), number(Some(high), 3)),
+    }
+}
+
+fn whole_number(value: Option<f64>) -> String {
+    value.map_or_else(dash, |x| format!("{x:.0}"))
 }
 
 #[cfg(test)]
@@ -331,7 +368,7 @@ mod tests {
         for word in ["| fused |", "| whole |", "cups (2)", "Against fused", "*SemFM (quoted)*"] {
             assert_eq!(text.contains(word), word != "*SemFM (quoted)*", "{word} in\n{text}");
         }
-        assert!(text.contains("way of fused"), "{text}");
+        assert!(text.contains("fused between the bounds"), "{text}");
         assert!(text.contains("## Failures (1)") && text.contains("a → b"), "{text}");
         // Every line of a table has as many cells as its header.
         for table in text.split("\n\n").filter(|block| block.starts_with('|')) {

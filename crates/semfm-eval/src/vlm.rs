@@ -5,10 +5,10 @@ use std::path::Path;
 
 use semfm::Region;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::dataset::Dataset;
-use crate::prediction;
+use crate::prediction::{Prediction, write_one};
 use crate::row::{Failure, Row, VlmDetails};
 use crate::{Error, Result};
 
@@ -142,8 +142,9 @@ pub fn keep(path: &Path, rows: &mut [Row], folder: &Path) -> Result<()> {
     for (row, answered) in rows.iter_mut().zip(&file.rows) {
         if let Some(found) = &answered.region {
             let weights = found.weights.clone().unwrap_or_else(|| vec![1.0; found.vertices.len()]);
-            let answer = json!({ "vertices": found.vertices, "weights": weights });
-            row.prediction = Some(prediction::write_one(folder, row, answer)?);
+            let vertices = found.vertices.clone();
+            let answer = Prediction { vertices, weights, ..Prediction::default() };
+            row.prediction = Some(write_one(folder, row, answer)?);
         }
     }
     Ok(())

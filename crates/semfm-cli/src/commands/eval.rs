@@ -10,9 +10,8 @@ use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
 use semfm_eval::embeddings::Embedded;
-use semfm_eval::matching::{self, MatchingDataset, MatchingSettings};
 use semfm_eval::workers::Workers;
-use semfm_eval::{Candidate, EmbeddingSource, EvalSettings, Override, Results, report, table, vlm};
+use semfm_eval::{EmbeddingSource, EvalSettings, Override, Results, Variant, report, table, vlm};
 use semfm_synth::Level;
 use serde_json::json;
 
@@ -24,9 +23,9 @@ use crate::talk;
 
 /// Measure how well regions are carried: every method, every ordered pair
 ///
-/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region; or a folder of
-/// sets with true correspondences (`SET/pairs.txt`, `SET/NAME.npz`), which point maps are measured
-/// on; or none with `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
+/// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region, or none with
+/// `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
+/// Point maps are measured on true correspondences by `eval-maps`.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic", "report_only"]))]
 #[command(after_help = "Examples:\n  \
@@ -87,8 +86,7 @@ struct FeatureOptions {
 #[command(next_help_heading = "Methods")]
 struct MethodOptions {
     /// Which methods, by comma: fused, anchored, sinkhorn, nearest, semfm+, semfm+image, semfm,
-    /// semfm-image, wks, oracle, whole; for true correspondences wks, wks+zoomout,
-    /// wks+orientation+zoomout, landmarks, landmarks+zoomout, true20+zoomout [default: all]
+    /// semfm-image, wks, oracle, whole [default: all]
     #[arg(long, value_delimiter = ',', value_name = "A,B")]
     methods: Vec<String>,
     /// Change a setting of a method, as fused.threshold=0.35 (repeatable)
@@ -114,9 +112,6 @@ struct WorkOptions {
     /// Say what changed since these results, worst first
     #[arg(long, value_name = "OLD/results.json")]
     compare: Option<PathBuf>,
-    /// For true correspondences: samples that an error is the mean of; 0 takes all
-    #[arg(long, default_value_t = MatchingSettings::default().n_samples, value_name = "N")]
-    samples: usize,
     /// Forget what an interrupted run left
     #[arg(long)]
     fresh: bool,
@@ -132,9 +127,6 @@ impl Evaluate {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         if self.page.report_only {
             return self.page.again(&self.output, common);
-        }
-        if let Some(path) = self.dataset.as_deref().filter(|path| MatchingDataset::is_one(path)) {
-            return self.run_matching(path, common);
         }
         // What cannot be compared with should be known before the work is done.
         let before = self.work.compare.as_deref().map(Results::read).transpose()?;
@@ -198,65 +190,21 @@ impl Evaluate {
             ..EvalSettings::default()
         };
         if !self.methods.methods.is_empty() {
-            settings.candidates = parsed(&self.methods.methods)?;
+            settings.variants = parsed(&self.methods.methods)?;
         }
         if self.features.features.as_deref() == Some("fused") {
-            let mut candidates: Vec<Candidate> = Vec::new();
-            for candidate in settings.candidates.iter().map(|c| c.with_our_features()) {
-                if !candidates.contains(&candidate) {
-                    candidates.push(candidate);
+            let mut variants: Vec<Variant> = Vec::new();
+            for variant in settings.variants.iter().map(|c| c.with_our_features()) {
+                if !variants.contains(&variant) {
+                    variants.push(variant);
                 }
             }
-            settings.candidates = candidates;
+            settings.variants = variants;
         }
         if let Some(n) = self.methods.working_vertices {
             settings.shape.working_vertices = n;
         }
         Ok(settings)
-    }
-
-    /// Point maps on sets with true correspondences.
-    fn run_matching(&self, path: &Path, common: &Common) -> Result<Outcome> {
-        let SyntheticOptions { synthetic, .. } = self.synthetic;
-        let FeatureOptions { embeddings, encoder, features } = &self.features;
-        let unfit = [
-            ("--synthetic", synthetic),
-            ("--embeddings", embeddings.is_some()),
-            ("--encoder", encoder.is_some()),
-            ("--features", features.is_some()),
-            ("--set", !self.methods.set.is_empty()),
-            ("--vlm", self.methods.vlm.is_some()),
-            ("--compare", self.work.compare.is_some()),
-        ];
-        if let Some((name, _)) = unfit.iter().find(|(_, given)| *given) {
-            bail!("{name} has no meaning for true correspondences, which {} holds", path.display());
-        }
-        let dataset = MatchingDataset::open(path)?;
-        let mut settings = MatchingSettings {
-            n_samples: self.work.samples,
-            workers: Workers::new(common.threads, self.work.jobs),
-            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
-            ..MatchingSettings::default()
-        };
-        if !self.methods.methods.is_empty() {
-            settings.methods = parsed(&self.methods.methods)?;
-        }
-        let task = talk::watched_with_time_left(common.quiet);
-        let results = matching::run(&dataset, &settings, &task)?;
-        let mut files = results.write(&self.output)?;
-        files.push(report::matching::write(&results, &self.output)?);
-        if common.json {
-            let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
-            talk::say(json!({ "summaries": results.summaries, "files": files }));
-        } else {
-            talk::say(matching::table::render(&results));
-            wrote(&files);
-        }
-        if results.rows.iter().all(|row| row.error.is_none()) {
-            let first = results.rows.iter().find_map(|row| row.failure.as_deref());
-            bail!("no map could be measured; the first: {}", first.unwrap_or("no pair"));
-        }
-        Ok(Outcome::Done)
     }
 
     fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
@@ -266,7 +214,7 @@ impl Evaluate {
                 dataset.n_pairs(),
                 dataset.objects.len(),
                 dataset.groups.len(),
-                settings.candidates.len(),
+                settings.variants.len(),
                 settings.workers.jobs,
             ));
         }
@@ -274,7 +222,9 @@ impl Evaluate {
 }
 
 /// Names of methods, read.
-fn parsed<T: std::str::FromStr<Err = semfm_eval::Error>>(names: &[String]) -> Result<Vec<T>> {
+pub(super) fn parsed<T: std::str::FromStr<Err = semfm_eval::Error>>(
+    names: &[String],
+) -> Result<Vec<T>> {
     Ok(names.iter().map(|name| name.trim().parse()).collect::<Result<_, _>>()?)
 }
 
@@ -366,7 +316,7 @@ fn tell(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], c
     wrote(files);
 }
 
-fn wrote(files: &[PathBuf]) {
+pub(super) fn wrote(files: &[PathBuf]) {
     talk::say("wrote");
     files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
 }

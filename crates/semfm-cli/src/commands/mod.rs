@@ -5,6 +5,7 @@ pub mod completions;
 pub mod demo;
 pub mod embed;
 pub mod eval;
+pub mod eval_maps;
 pub mod grasp;
 pub mod info;
 pub mod page;

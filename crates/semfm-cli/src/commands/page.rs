@@ -41,18 +41,9 @@ impl PageOptions {
 
     /// Makes the page and the table in a folder of results anew.
     pub fn again(&self, folder: &Path, common: &Common) -> Result<Outcome> {
-        let files = match report::matching::read(folder)? {
-            Some(results) => {
-                let mut files = results.write(folder)?;
-                files.push(report::matching::write(&results, folder)?);
-                files
-            }
-            None => {
-                let task = talk::watched(common.quiet);
-                let table = table::write(&Results::read(folder)?, folder)?;
-                vec![table, report::again(folder, &self.settings(), &task)?]
-            }
-        };
+        let task = talk::watched(common.quiet);
+        let table = table::write(&Results::read(folder)?, folder)?;
+        let files = [table, report::again(folder, &self.settings(), &task)?];
         files.iter().for_each(|file| talk::say(file.display()));
         Ok(Outcome::Done)
     }

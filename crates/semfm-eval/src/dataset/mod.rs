@@ -4,6 +4,7 @@ pub mod folder;
 pub mod synthetic;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::PathBuf;
 
 use semfm::geom::io::MeshFile;
@@ -44,6 +45,17 @@ pub enum DatasetOrigin {
         /// Objects of each category and seed.
         n_objects: usize,
     },
+}
+
+impl fmt::Display for DatasetOrigin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Folder { path } => write!(f, "folder {}", path.display()),
+            Self::Synthetic { level, seeds, n_objects } => {
+                write!(f, "procedural objects, level {level}, seeds {seeds:?}, {n_objects} each")
+            }
+        }
+    }
 }
 
 /// Pairs that are summed up together.
@@ -114,7 +126,8 @@ impl Dataset {
     /// compare [`Dataset::hash`].
     ///
     /// # Errors
-    /// As [`folder::open`] and [`synthetic::make`].
+    /// [`crate::Error::Io`], [`crate::Error::Format`] for a folder; [`crate::Error::Invalid`] for
+    /// impossible procedural objects.
     pub fn open(origin: &DatasetOrigin) -> Result<Self> {
         match origin {
             DatasetOrigin::Folder { path } => folder::open(path),

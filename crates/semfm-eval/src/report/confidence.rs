@@ -1,24 +1,28 @@
 //! Whether a method knows when it is wrong.
 
+use semfm::Verdict::{self, Accept, Check, Refuse};
+
 use super::context::Context;
 use super::html::{Cell, Table, escape, plot};
-use super::plots::{DrawError, trust};
+use super::plots::{DrawError, calibration};
+use crate::calibration::Calibration;
 use crate::table::number;
 
 /// The section; empty where no method says how sure it is.
 pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
-    let Some(first) = context.results.trust.first() else { return Ok(String::new()) };
-    let lead = context.results.trust.iter().find(|t| t.method == context.lead).unwrap_or(first);
-    let answers: Vec<trust::Answer> = context
+    let Some(first) = context.results.calibration.first() else { return Ok(String::new()) };
+    let lead =
+        context.results.calibration.iter().find(|t| t.method == context.lead).unwrap_or(first);
+    let answers: Vec<calibration::Answer> = context
         .rows_of(&lead.method)
         .filter_map(|row| {
             let (confidence, iou) = (row.confidence?, row.iou?);
-            Some(trust::Answer { confidence, iou, verdict: row.verdict })
+            Some(calibration::Answer { confidence, iou, verdict: row.verdict })
         })
         .collect();
     let method = escape(&lead.method);
     let scatter = plot(
-        &trust::scatter(&answers)?,
+        &calibration::scatter(&answers)?,
         "Scatter of confidence against IoU, one mark for each pair.",
         &format!(
             "{method}: one mark for each of {} pairs. Circles: accept; triangles: check; crosses: \
@@ -27,7 +31,7 @@ pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
         ),
     );
     let reliability = plot(
-        &trust::reliability(&lead.bins)?,
+        &calibration::reliability(&lead.bins)?,
         "Reliability diagram: share of right answers against confidence, in tenths.",
         &format!(
             "{method}: share of right answers in each tenth of confidence, with the number of \
@@ -36,18 +40,21 @@ pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
             number(Some(lead.calibration_error), 3)
         ),
     );
-    let half = |plot: String| plot.replace("class=\"plot\"", "class=\"plot half\"");
     Ok(format!(
         "<ul class=\"legend\"><li class=\"right\">accept</li><li class=\"missed\">check</li>\
          <li class=\"extra\">refuse</li></ul>\n<div class=\"side\">{}{}</div>\n{}",
-        half(scatter),
-        half(reliability),
+        half_wide(&scatter),
+        half_wide(&reliability),
         table(context).html()
     ))
 }
 
+/// A plot beside another.
+fn half_wide(plot: &str) -> String {
+    plot.replace("class=\"plot\"", "class=\"plot half\"")
+}
+
 fn table(context: &Context<'_>) -> Table {
-    use semfm::Verdict::{Accept, Check, Refuse};
     let head = [
         "Method",
         "Right (IoU ≥ .5)",
@@ -58,23 +65,24 @@ fn table(context: &Context<'_>) -> Table {
         "Refused (mean IoU)",
     ];
     let mut table = Table::new("What each method’s confidence is worth", head).sortable();
-    for trust in &context.results.trust {
-        let verdict = |verdict| {
-            let found = trust.verdicts.iter().find(|v| v.verdict == verdict);
-            let text = found
-                .map_or("–".into(), |v| format!("{} ({})", v.n, number(Some(v.mean_iou), 2)));
-            Cell::written(found.map(|v| v.n as f64), text)
-        };
+    for calibration in &context.results.calibration {
         let cells = [
-            Cell::number(Some(trust.right), 2),
-            Cell::number(trust.auc, 2),
-            Cell::number(Some(trust.calibration_error), 3),
-            verdict(Accept),
-            verdict(Check),
-            verdict(Refuse),
+            Cell::number(Some(calibration.right), 2),
+            Cell::number(calibration.auc, 2),
+            Cell::number(Some(calibration.calibration_error), 3),
+            verdict_cell(calibration, Accept),
+            verdict_cell(calibration, Check),
+            verdict_cell(calibration, Refuse),
         ];
-        let class = if trust.method == context.lead { "lead" } else { "" };
-        table.line(class, &trust.method, "", cells);
+        let class = if calibration.method == context.lead { "lead" } else { "" };
+        table.line(class, &calibration.method, "", cells);
     }
     table
+}
+
+/// Answers with this verdict and their mean IoU.
+fn verdict_cell(calibration: &Calibration, verdict: Verdict) -> Cell {
+    let found = calibration.verdicts.iter().find(|v| v.verdict == verdict);
+    let text = found.map_or("–".into(), |v| format!("{} ({})", v.n, number(Some(v.mean_iou), 2)));
+    Cell::written(found.map(|v| v.n as f64), text)
 }

@@ -1,17 +1,17 @@
-//! What all sections ask about the results: methods, groups, the paper's columns, the leading method.
+//! What all sections need of the results: methods, groups, the paper's columns, the leading method.
 
 use std::fmt::Write;
 
 use super::html::escape;
-use crate::candidate::Candidate;
 use crate::dataset::DatasetOrigin;
 use crate::published;
 use crate::results::Results;
 use crate::row::Row;
-use crate::summary::{Scope, ScoreTable, Summary};
+use crate::summary::{Scope, ScoreTable, Summary, is_bound};
 use crate::table::number;
+use crate::variant::Variant;
 
-/// The results, with what is often asked of them.
+/// The results, with what is often needed of them.
 pub(super) struct Context<'a> {
     pub results: &'a Results,
     /// In the order of the tables.
@@ -27,7 +27,7 @@ impl<'a> Context<'a> {
     pub fn new(results: &'a Results) -> Self {
         let ScoreTable { methods, .. } = ScoreTable::new(&results.rows);
         let table = ScoreTable::new(&results.rows);
-        let default = Candidate::Fused.name();
+        let default = Variant::Fused.name();
         let lead = methods.iter().find(|m| **m == default);
         let lead = lead.or_else(|| methods.iter().find(|m| !is_bound(m))).or(methods.first());
         let categories = table.categories();
@@ -58,8 +58,8 @@ impl<'a> Context<'a> {
 
     /// What a method is, in a few words.
     pub fn about(&self, method: &str) -> &'static str {
-        if let Ok(candidate) = method.parse::<Candidate>() {
-            return candidate.about();
+        if let Ok(variant) = method.parse::<Variant>() {
+            return variant.about();
         }
         let vlm = self.rows_of(method).find_map(|row| row.vlm.as_ref());
         match vlm {
@@ -129,26 +129,22 @@ impl<'a> Context<'a> {
             let ms = lead.median_matching_ms.map(|ms| format!("{ms:.0} ms"));
             tiles.push((ms.unwrap_or("–".into()), "to match prepared objects, median".into()));
         }
-        if let Some(trust) = self.results.trust.iter().find(|t| t.method == self.lead) {
+        if let Some(calibration) = self.results.calibration.iter().find(|t| t.method == self.lead) {
             let words = "AUC of its confidence for IoU ≥ .5".to_owned();
-            tiles.push((number(trust.auc, 2), words));
+            tiles.push((number(calibration.auc, 2), words));
         }
-        let tile = |(value, words): (String, String)| {
-            format!("<li><b>{}</b><span>{}</span></li>", escape(&value), escape(&words))
-        };
-        format!("<ul class=\"tiles\">{}</ul>\n", tiles.into_iter().map(tile).collect::<String>())
+        let mut html = String::from("<ul class=\"tiles\">");
+        for (value, words) in tiles {
+            let (value, words) = (escape(&value), escape(&words));
+            let _ = write!(html, "<li><b>{value}</b><span>{words}</span></li>");
+        }
+        html + "</ul>\n"
     }
 
     fn n_pairs(&self) -> usize {
-        let name = |row: &'a Row| (&row.group, &row.source, &row.target);
-        let pairs: std::collections::BTreeSet<_> = self.results.rows.iter().map(name).collect();
-        pairs.len()
+        let pairs = self.results.rows.iter().map(Row::pair_key);
+        pairs.collect::<std::collections::BTreeSet<_>>().len()
     }
-}
-
-/// Floor and ceiling are no methods.
-pub(super) fn is_bound(method: &str) -> bool {
-    [Candidate::Whole.name(), Candidate::Oracle.name()].contains(&method)
 }
 
 /// What a method is called beside the paper's.

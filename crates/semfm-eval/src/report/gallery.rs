@@ -8,13 +8,14 @@ use rayon::prelude::*;
 use semfm::{Task, Verdict};
 
 use super::ReportSettings;
-use super::album::{Album, Answer, Side};
 use super::context::Context;
 use super::html::{escape, shown};
+use super::thumbnails::{DrawnPair, Side, Thumbnails};
 use crate::Result;
-use crate::candidate::Candidate;
+use crate::prediction::Prediction;
 use crate::row::Row;
 use crate::table::number;
+use crate::variant::Variant;
 
 /// The section; empty without pictures.
 ///
@@ -22,15 +23,15 @@ use crate::table::number;
 /// Only cancellation.
 pub(super) fn body(
     context: &Context<'_>,
-    album: &Album<'_>,
+    thumbnails: &Thumbnails<'_>,
     settings: &ReportSettings,
     task: &Task,
 ) -> Result<String> {
-    let chosen = Chosen::new(context, album, settings);
+    let chosen = Chosen::new(context, thumbnails, settings);
     if chosen.rows.is_empty() {
         return Ok(String::new());
     }
-    let cards = cards(context, album, &chosen.rows, task)?;
+    let cards = cards(context, thumbnails, &chosen.rows, task)?;
     Ok(format!(
         "<p>Each method’s worst answers first. The demonstrated region and the true one are green; \
          what a method found is orange, paler where it is less sure.{}</p>\n\
@@ -48,58 +49,63 @@ struct Chosen<'a> {
     left_out: String,
 }
 
+/// A method of which only the worst rows have a card.
+struct Truncated<'a> {
+    method: &'a str,
+    limit: usize,
+}
+
 impl<'a> Chosen<'a> {
-    fn new(context: &Context<'a>, album: &Album<'_>, settings: &ReportSettings) -> Self {
-        let (mut rows, mut left_out) = (Vec::new(), Vec::new());
-        // The floor answers everything, always.
-        let shown = context.methods.iter().filter(|method| **method != Candidate::Whole.name());
+    fn new(context: &Context<'a>, thumbnails: &Thumbnails<'_>, settings: &ReportSettings) -> Self {
+        let (mut rows, mut truncated) = (Vec::new(), Vec::new());
+        // The lower bound answers everything, always.
+        let shown = context.methods.iter().filter(|method| **method != Variant::Whole.name());
         for &method in shown {
-            let answered = |row: &&Row| row.iou.is_some() && row.prediction.is_some();
             let mut own: Vec<&Row> = context
                 .rows_of(method)
-                .filter(answered)
-                .filter(|row| album.pair(row).is_some())
+                .filter(|row| row.iou.is_some() && row.prediction.is_some())
+                .filter(|row| thumbnails.pair(row).is_some())
                 .collect();
             own.sort_by(|a, b| {
-                a.iou
-                    .unwrap_or(0.0)
-                    .total_cmp(&b.iou.unwrap_or(0.0))
-                    .then_with(|| a.key().cmp(&b.key()))
+                a.iou_or_zero().total_cmp(&b.iou_or_zero()).then_with(|| a.key().cmp(&b.key()))
             });
             let limit =
                 if method == context.lead { settings.leading_cards } else { settings.other_cards };
             if own.len() > limit {
-                left_out.push((limit, method));
+                truncated.push(Truncated { method, limit });
                 own.truncate(limit);
             }
             rows.extend(own);
         }
-        let left_out = if left_out.is_empty() {
-            String::new()
-        } else {
-            let limits =
-                [settings.leading_cards, settings.other_cards].into_iter().filter_map(|limit| {
-                    let methods = left_out.iter().filter(|(own, _)| *own == limit).map(|(_, m)| *m);
-                    let methods: Vec<&str> = methods.collect();
-                    (!methods.is_empty())
-                        .then(|| format!("the worst {limit} of {}", methods.join(", ")))
-                });
-            let mut limits: Vec<String> = limits.collect();
-            limits.dedup();
-            format!(
-                " To keep this page small it holds {}; all scores are under “All pairs”, all answers in \
-                 the folder predictions.",
-                limits.join(" and ")
-            )
-        };
-        Self { rows, left_out }
+        Self { rows, left_out: left_out(&truncated, settings) }
     }
+}
+
+/// One sentence on what has no card; empty where everything has one.
+fn left_out(truncated: &[Truncated<'_>], settings: &ReportSettings) -> String {
+    if truncated.is_empty() {
+        return String::new();
+    }
+    let mut limits = Vec::new();
+    for limit in [settings.leading_cards, settings.other_cards] {
+        let own = truncated.iter().filter(|one| one.limit == limit);
+        let methods: Vec<&str> = own.map(|one| one.method).collect();
+        if !methods.is_empty() {
+            limits.push(format!("the worst {limit} of {}", methods.join(", ")));
+        }
+    }
+    limits.dedup();
+    format!(
+        " To keep this page small it holds {}; all scores are under “All pairs”, all answers in \
+         the folder predictions.",
+        limits.join(" and ")
+    )
 }
 
 /// Drawn pair by pair, so that each file of answers is read once.
 fn cards(
     context: &Context<'_>,
-    album: &Album<'_>,
+    thumbnails: &Thumbnails<'_>,
     rows: &[&Row],
     task: &Task,
 ) -> Result<Vec<String>> {
@@ -114,12 +120,12 @@ fn cards(
         .map(|places| {
             task.check()?;
             let answers =
-                places.first().map(|&first| album.answers(rows[first])).unwrap_or_default();
-            let card = |&place: &usize| {
+                places.first().map(|&first| thumbnails.answers(rows[first])).unwrap_or_default();
+            let cards = places.iter().map(|&place| {
                 let row = rows[place];
-                (place, card(context, album, row, answers.get(&row.method)))
-            };
-            let cards = places.iter().map(card).collect();
+                (place, card(context, thumbnails, row, answers.get(&row.method)))
+            });
+            let cards = cards.collect();
             let count = done.fetch_add(places.len(), Ordering::Relaxed) + places.len();
             task.step("gallery", count, rows.len())?;
             Ok(cards)
@@ -132,25 +138,28 @@ fn cards(
     Ok(cards)
 }
 
-fn card(context: &Context<'_>, album: &Album<'_>, row: &Row, answer: Option<&Answer>) -> String {
-    let (Some((source, target)), Some(answer)) = (album.pair(row), answer) else {
+fn card(
+    context: &Context<'_>,
+    thumbnails: &Thumbnails<'_>,
+    row: &Row,
+    answer: Option<&Prediction>,
+) -> String {
+    let (Some(DrawnPair { source, target }), Some(answer)) = (thumbnails.pair(row), answer) else {
         return String::new();
     };
     let iou = number(row.iou, 2);
-    let found = format!("{} by {}, IoU {iou}", row.target, row.method);
-    let pictures = [
-        Some(shown(&source.own("with the demonstrated region"), "source")),
-        Some(shown(&target.own("with the true region"), "truth")),
-        album
-            .region(target, answer, &format!("region found on {found}"))
-            .map(|p| shown(&p, "found")),
-        album
-            .error(target, answer, Side::Best, &format!("error on {found}"))
-            .map(|p| shown(&p, "error")),
-        album
-            .error(target, answer, Side::Other, &format!("error on {found}, from another side"))
-            .map(|p| shown(&p, "other side")),
-    ];
+    let by_method = format!("on {} by {}, IoU {iou}", row.target, row.method);
+    let found = thumbnails.region(target, answer, &format!("region found {by_method}"));
+    let error = thumbnails.error(target, answer, Side::Best, &format!("error {by_method}"));
+    let other_side = format!("error {by_method}, from another side");
+    let other_side = thumbnails.error(target, answer, Side::Other, &other_side);
+    let mut pictures = shown(&source.own("with the demonstrated region"), "source");
+    pictures += &shown(&target.own("with the true region"), "truth");
+    for (picture, words) in [(found, "found"), (error, "error"), (other_side, "other side")] {
+        if let Some(picture) = picture {
+            pictures += &shown(&picture, words);
+        }
+    }
     let mut words = format!("IoU <b>{iou}</b>");
     if let Some(confidence) = row.confidence {
         words += &format!(" · confidence <b>{}</b>", number(Some(confidence), 2));
@@ -158,7 +167,6 @@ fn card(context: &Context<'_>, album: &Album<'_>, row: &Row, answer: Option<&Ans
     if let Some(verdict) = row.verdict {
         words += &format!(" · {}", in_words(verdict));
     }
-    let attribute = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     format!(
         "<article class=\"card\" data-method=\"{method}\" data-rank=\"{rank}\" data-group=\"{group}\" \
          data-verdict=\"{verdict}\" data-iou=\"{iou}\" data-confidence=\"{confidence}\" \
@@ -172,8 +180,12 @@ fn card(context: &Context<'_>, album: &Album<'_>, row: &Row, answer: Option<&Ans
         confidence = attribute(row.confidence),
         source = escape(&row.source),
         target = escape(&row.target),
-        pictures = pictures.into_iter().flatten().collect::<String>(),
     )
+}
+
+/// A number as a `data-` attribute; empty for none.
+fn attribute(value: Option<f64>) -> String {
+    value.map_or(String::new(), |v| v.to_string())
 }
 
 fn in_words(verdict: Verdict) -> &'static str {
@@ -186,16 +198,9 @@ fn in_words(verdict: Verdict) -> &'static str {
 
 /// Filters and orders; hidden until the script that serves them runs.
 fn controls(context: &Context<'_>, rows: &[&Row]) -> String {
-    let option = |value: &str, words: &str, chosen: bool| {
-        let chosen = if chosen { " selected" } else { "" };
-        format!("<option value=\"{}\"{chosen}>{}</option>", escape(value), escape(words))
-    };
-    let select = |name: &str, label: &str, options: String| {
-        format!("<label>{label}<select name=\"{name}\">{options}</select></label>\n")
-    };
-    let has_card = |method: &&&str| rows.iter().any(|row| row.method == ***method);
-    let methods = context.methods.iter().filter(has_card);
-    let methods: String = methods.map(|m| option(m, m, *m == context.lead)).collect();
+    let with_card =
+        context.methods.iter().filter(|method| rows.iter().any(|row| row.method == ***method));
+    let methods: String = with_card.map(|m| option(m, m, *m == context.lead)).collect();
     let groups: String = context.groups.iter().map(|g| option(g, g, false)).collect();
     let verdicts: String = ["accept", "check", "refuse"].map(|v| option(v, v, false)).concat();
     let orders = [
@@ -217,4 +222,15 @@ fn controls(context: &Context<'_>, rows: &[&Row]) -> String {
         select("verdict", "Verdict", option("", "all", false) + &verdicts),
         select("order", "Order", orders),
     )
+}
+
+/// One choice of a list.
+fn option(value: &str, words: &str, chosen: bool) -> String {
+    let chosen = if chosen { " selected" } else { "" };
+    format!("<option value=\"{}\"{chosen}>{}</option>", escape(value), escape(words))
+}
+
+/// A list of choices with its label.
+fn select(name: &str, label: &str, options: String) -> String {
+    format!("<label>{label}<select name=\"{name}\">{options}</select></label>\n")
 }

@@ -130,11 +130,11 @@ impl Table {
     /// The element, in a frame that scrolls where the screen is narrower than the table.
     pub fn html(&self) -> String {
         let kinds = [false].iter().chain(&self.numeric).chain(std::iter::repeat(&false));
-        let heading = |(name, numeric): (&String, &bool)| {
+        let mut head = String::new();
+        for (name, numeric) in self.head.iter().zip(kinds) {
             let class = class_of(if *numeric { "n" } else { "" });
-            format!("<th scope=\"col\"{class}>{}</th>", escape(name))
-        };
-        let head: String = self.head.iter().zip(kinds).map(heading).collect();
+            let _ = write!(head, "<th scope=\"col\"{class}>{}</th>", escape(name));
+        }
         let class = if self.sortable { " class=\"sortable\"" } else { "" };
         format!(
             "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\">\

@@ -4,19 +4,19 @@
 //! are at hand as well, it holds pictures: categories, maps as colours, failures, and a gallery of
 //! pairs. Numbers are those of [`Results`], written as in `table.md`.
 
-mod album;
 mod confidence;
 mod context;
 mod data_uri;
 mod gallery;
 mod html;
-pub mod matching;
+mod maps;
 mod pairs;
 mod palette;
 mod paper;
 mod plots;
 mod scores;
 mod sheets;
+mod thumbnails;
 mod vlm;
 
 use std::path::{Path, PathBuf};
@@ -27,9 +27,11 @@ use semfm::geom::io::write_atomically;
 use crate::dataset::Dataset;
 use crate::results::Results;
 use crate::{Error, Result};
-use album::Album;
 use context::Context;
 use html::{escape, section};
+use thumbnails::Thumbnails;
+
+pub use maps::write_maps;
 
 /// The file in the output folder.
 pub const FILE: &str = "index.html";
@@ -67,41 +69,39 @@ pub fn write(
     settings: &ReportSettings,
     task: &Task,
 ) -> Result<PathBuf> {
-    let album = if dataset.hash == results.about.identity.dataset {
-        Album::open(dataset, results, folder, settings, task)?
+    let thumbnails = if dataset.hash == results.about.identity.dataset {
+        Thumbnails::draw(dataset, results, folder, settings, task)?
     } else {
-        Album::closed("the objects have changed since they were evaluated")
+        Thumbnails::none("the objects have changed since they were evaluated")
     };
-    write_with(results, &album, folder, settings, task)
+    write_with(results, &thumbnails, folder, settings, task)
 }
 
 /// Makes the page in a folder anew from its results. Objects that are gone or have changed leave
 /// the page without pictures, and it says so.
 ///
 /// # Errors
-/// As [`Results::read`] and [`write()`].
+/// [`Error::Io`], [`Error::Format`] for the results; [`Error::Facade`] where the page cannot be
+/// written, cancellation.
 pub fn again(folder: &Path, settings: &ReportSettings, task: &Task) -> Result<PathBuf> {
-    if let Some(results) = matching::read(folder)? {
-        return matching::write(&results, folder);
-    }
     let results = Results::read(folder)?;
     match Dataset::open(&results.about.origin) {
         Ok(dataset) => write(&results, &dataset, folder, settings, task),
         Err(error) => {
-            let album = Album::closed(&format!("the objects cannot be opened ({error})"));
-            write_with(&results, &album, folder, settings, task)
+            let thumbnails = Thumbnails::none(&format!("the objects cannot be opened ({error})"));
+            write_with(&results, &thumbnails, folder, settings, task)
         }
     }
 }
 
 fn write_with(
     results: &Results,
-    album: &Album<'_>,
+    thumbnails: &Thumbnails<'_>,
     folder: &Path,
     settings: &ReportSettings,
     task: &Task,
 ) -> Result<PathBuf> {
-    let page = page(&Context::new(results), album, settings, task)?;
+    let page = page(&Context::new(results), thumbnails, settings, task)?;
     let path = folder.join(FILE);
     write_atomically(&path, |out| out.write_all(page.as_bytes()))?;
     Ok(path)
@@ -109,39 +109,53 @@ fn write_with(
 
 fn page(
     context: &Context<'_>,
-    album: &Album<'_>,
+    thumbnails: &Thumbnails<'_>,
     settings: &ReportSettings,
     task: &Task,
 ) -> Result<String> {
-    let failed = |error: plots::DrawError| {
-        let place = PathBuf::from(FILE);
-        Error::Io { path: place, source: std::io::Error::other(error.to_string()) }
-    };
+    let paper = paper::body(context).map_err(cannot_draw)?;
+    let scores = scores::body(context).map_err(cannot_draw)?;
+    let confidence = confidence::body(context).map_err(cannot_draw)?;
     let sections = [
-        ("paper", "Beside the paper", paper::body(context).map_err(failed)?),
-        ("scores", "Methods and groups", scores::body(context).map_err(failed)?),
-        ("categories", "Category sheet", sheets::categories(context, album, task)?),
-        ("colours", "Maps as colours", sheets::colours(context, album, task)?),
-        ("wks", "Where geometry alone fails", sheets::wks(context, album, task)?),
-        ("vlm", "Vision-language model", vlm::body(context, album, settings, task)?),
-        ("confidence", "Confidence", confidence::body(context).map_err(failed)?),
-        ("gallery", "Gallery of pairs", gallery::body(context, album, settings, task)?),
+        ("paper", "Beside the paper", paper),
+        ("scores", "Methods and groups", scores),
+        ("categories", "Category sheet", sheets::categories(context, thumbnails, task)?),
+        ("colours", "Maps as colours", sheets::colours(context, thumbnails, task)?),
+        ("wks", "Where geometry alone fails", sheets::wks(context, thumbnails, task)?),
+        ("vlm", "Vision-language model", vlm::body(context, thumbnails, settings, task)?),
+        ("confidence", "Confidence", confidence),
+        ("gallery", "Gallery of pairs", gallery::body(context, thumbnails, settings, task)?),
         ("pairs", "All pairs", pairs::body(context)),
     ];
-    let head = context.head() + &album.missing();
-    Ok(shell("How well regions are carried over", &head, &album.shared_style(), &sections))
+    let sections = sections.map(|(id, title, body)| Section {
+        id: id.to_owned(),
+        title: title.to_owned(),
+        body,
+    });
+    let head = context.head() + &thumbnails.missing();
+    Ok(shell("How well regions are carried over", &head, &thumbnails.shared_style(), &sections))
 }
 
-/// The document around some sections, of which empty ones are left out.
-fn shell(title: &str, head: &str, style: &str, sections: &[(&str, &str, String)]) -> String {
-    let sections: Vec<_> = sections.iter().filter(|(_, _, body)| !body.is_empty()).collect();
-    let links: String = sections
-        .iter()
-        .map(|(id, title, _)| format!("<li><a href=\"#{id}\">{}</a></li>", escape(title)))
-        .collect();
-    let bodies: String =
-        sections.iter().map(|(id, title, body)| section(id, title, body)).collect();
-    // The policy is the promise of this page: whatever is not in it is not loaded.
+/// A plot that cannot be drawn leaves no page.
+fn cannot_draw(error: plots::DrawError) -> Error {
+    Error::Io { path: FILE.into(), source: std::io::Error::other(error.to_string()) }
+}
+
+/// A part of the page with its heading; left out where the body is empty.
+struct Section {
+    id: String,
+    title: String,
+    body: String,
+}
+
+/// The document around some sections.
+fn shell(title: &str, head: &str, style: &str, sections: &[Section]) -> String {
+    let (mut links, mut bodies) = (String::new(), String::new());
+    for Section { id, title, body } in sections.iter().filter(|s| !s.body.is_empty()) {
+        links += &format!("<li><a href=\"#{id}\">{}</a></li>", escape(title));
+        bodies += &section(id, title, body);
+    }
+    // The policy makes sure of it: whatever is not in this page is not loaded.
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

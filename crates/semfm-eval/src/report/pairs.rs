@@ -23,9 +23,11 @@ pub(super) fn body(context: &Context<'_>) -> String {
     };
     let mut table = Table::new(&caption, head).sortable();
     for ([group, source, target], ious) in pairs.iter().take(LISTED) {
-        let iou = |method: &&str| Cell::number(ious.get(*method).copied().flatten(), 2);
-        let cells = [Cell::text(group)].into_iter().chain(context.methods.iter().map(iou));
-        table.line("", &format!("{source} → {target}"), "", cells.collect::<Vec<_>>());
+        let mut cells = vec![Cell::text(group)];
+        for method in &context.methods {
+            cells.push(Cell::number(ious.get(method).copied().flatten(), 2));
+        }
+        table.line("", &format!("{source} → {target}"), "", cells);
     }
     format!(
         "<details><summary>Show all pairs</summary>\n{}</details>\n{}",

@@ -1,11 +1,11 @@
 //! The paper's tables and its figure of accuracy and runtime against views, its rows beside ours.
 
-use super::context::{Context, in_words, is_bound};
+use super::context::{Context, in_words};
 use super::html::{Cell, Table, escape, plot};
 use super::plots::{DrawError, against_views};
 use crate::dataset::DatasetOrigin;
 use crate::published::{self, PublishedRow};
-use crate::summary::{Scope, Summary};
+use crate::summary::{Scope, Summary, is_bound};
 use crate::table::number;
 
 /// The section; empty where no category is one of the paper's.
@@ -87,7 +87,7 @@ fn table(
     caption: &str,
     quoted: &[PublishedRow],
     digits: usize,
-    smaller_is_better: bool,
+    better: fn(f64, f64) -> f64,
     of: impl Fn(&Summary) -> Option<f64>,
 ) -> Table {
     let mut table = Table::new(caption, head());
@@ -96,22 +96,20 @@ fn table(
         let mean = Cell::number(Some(row.mean()), digits + 1);
         table.line("quoted", row.method, "quoted", values.chain([mean]));
     }
-    let ours: Vec<(&str, Vec<Option<f64>>)> =
-        context.methods.iter().map(|&method| (method, columns(context, method, &of))).collect();
-    let best = |column: usize| {
-        let contest = ours.iter().filter(|(method, _)| !is_bound(method));
-        let values = contest.filter_map(|(_, values)| values[column]);
-        if smaller_is_better { values.reduce(f64::min) } else { values.reduce(f64::max) }
-    };
+    let ours: Vec<Line<'_>> = context
+        .methods
+        .iter()
+        .map(|&method| Line { method, values: columns(context, method, &of) })
+        .collect();
     // What is written alike is equally good; means have a digit more, as in `table.md`.
     let mut class = "first";
-    for (method, values) in &ours {
+    for Line { method, values } in &ours {
         if values.iter().all(Option::is_none) {
             continue;
         }
         let cells = values.iter().enumerate().map(|(column, &value)| {
             let digits = if column == published::CATEGORIES.len() { digits + 1 } else { digits };
-            let alike = number(value, digits) == number(best(column), digits);
+            let alike = number(value, digits) == number(best(&ours, column, better), digits);
             Cell::number(value, digits).strong_if(alike && value.is_some() && !is_bound(method))
         });
         let own = if *method == context.lead { format!("{class} lead") } else { class.to_owned() };
@@ -121,15 +119,29 @@ fn table(
     table
 }
 
+/// One of our methods.
+struct Line<'a> {
+    method: &'a str,
+    values: Vec<Option<f64>>,
+}
+
+/// The best value of a column, bounds aside.
+fn best(ours: &[Line<'_>], column: usize, better: fn(f64, f64) -> f64) -> Option<f64> {
+    let compared = ours.iter().filter(|line| !is_bound(line.method));
+    compared.filter_map(|line| line.values[column]).reduce(better)
+}
+
 /// One value for each of the paper's categories, and their mean where all are there.
 fn columns(
     context: &Context<'_>,
     method: &str,
     of: impl Fn(&Summary) -> Option<f64>,
 ) -> Vec<Option<f64>> {
-    let value =
-        |name: &Option<&str>| of(context.summary(&Scope::Category((*name)?.into()), method)?);
-    let mut values: Vec<Option<f64>> = context.paper_columns.iter().map(value).collect();
+    let mut values: Vec<Option<f64>> = context
+        .paper_columns
+        .iter()
+        .map(|name| of(context.summary(&Scope::Category((*name)?.into()), method)?))
+        .collect();
     let known: Vec<f64> = values.iter().flatten().copied().collect();
     let mean = known.iter().sum::<f64>() / known.len() as f64;
     values.push((!known.is_empty()).then_some(mean));
@@ -138,8 +150,8 @@ fn columns(
 
 fn bound_note(method: &str) -> &'static str {
     match method {
-        "oracle" => "ceiling: true part labels",
-        "whole" => "floor: every vertex",
+        "oracle" => "upper bound: true part labels",
+        "whole" => "lower bound: every vertex",
         _ => "",
     }
 }
@@ -147,12 +159,12 @@ fn bound_note(method: &str) -> &'static str {
 fn accuracy(context: &Context<'_>) -> Table {
     let caption =
         "Accuracy: mean IoU of all ordered pairs (higher is better). Mean: of the categories.";
-    table(context, caption, &published::IOU, 2, false, |summary| summary.mean)
+    table(context, caption, &published::IOU, 2, f64::max, |summary| summary.mean)
 }
 
 fn runtime(context: &Context<'_>, time: Time) -> Table {
     let caption = "Runtime: seconds for one transfer (lower is better).";
-    table(context, caption, &published::SECONDS, 2, true, |summary| time.seconds(summary))
+    table(context, caption, &published::SECONDS, 2, f64::min, |summary| time.seconds(summary))
 }
 
 impl Context<'_> {
@@ -190,30 +202,8 @@ fn by_views(
 fn figures(context: &Context<'_>, time: Time) -> Result<String, DrawError> {
     let second = ["semfm", "semfm-image", "semfm+", "semfm+image"];
     let second = second.into_iter().find(|m| *m != context.lead && context.methods.contains(m));
-    let panels = |quoted: &[PublishedRow], of: &dyn Fn(&Summary) -> Option<f64>| {
-        (0..published::CATEGORIES.len())
-            .map(|place| {
-                let column = context.paper_columns[place];
-                let ours =
-                    |method: &str| of(context.summary(&Scope::Category(column?.into()), method)?);
-                let models =
-                    quoted.iter().filter_map(|row| Some((row.n_views? as f64, row.values[place])));
-                against_views::Panel {
-                    title: format!("C. {} {}", place + 1, published::CATEGORIES[place]),
-                    quoted_model: models.collect(),
-                    quoted_semfm: quoted
-                        .iter()
-                        .find(|r| r.method == "SemFM")
-                        .map(|r| r.values[place]),
-                    model: column.map_or_else(Vec::new, |name| by_views(context, name, of)),
-                    lead: ours(context.lead),
-                    second: second.and_then(ours),
-                }
-            })
-            .collect::<Vec<_>>()
-    };
-    let accuracy = panels(&published::IOU, &|summary| summary.mean);
-    let seconds = panels(&published::SECONDS, &|summary| time.seconds(summary));
+    let accuracy = panels(context, &published::IOU, second, |summary| summary.mean);
+    let seconds = panels(context, &published::SECONDS, second, |summary| time.seconds(summary));
     let mut legend = format!(
         "<ul class=\"legend\"><li class=\"solid vlmline\">VLM, quoted (solid)</li>\
          <li class=\"dashed quotedline\">the paper’s SemFM, quoted (dashed)</li>\
@@ -243,4 +233,29 @@ fn figures(context: &Context<'_>, time: Time) -> Result<String, DrawError> {
         &format!("Seconds for one transfer, logarithmic. {}", escape(time.in_words())),
     );
     Ok(html)
+}
+
+/// One panel for each of the paper's categories.
+fn panels(
+    context: &Context<'_>,
+    quoted: &[PublishedRow],
+    second: Option<&str>,
+    of: impl Fn(&Summary) -> Option<f64>,
+) -> Vec<against_views::Panel> {
+    let mut panels = Vec::new();
+    for (place, category) in published::CATEGORIES.iter().enumerate() {
+        let column = context.paper_columns[place];
+        let ours = |method: &str| of(context.summary(&Scope::Category(column?.into()), method)?);
+        let models = quoted.iter().filter_map(|row| Some((row.n_views? as f64, row.values[place])));
+        let quoted_semfm = quoted.iter().find(|row| row.method == "SemFM");
+        panels.push(against_views::Panel {
+            title: format!("C. {} {category}", place + 1),
+            quoted_model: models.collect(),
+            quoted_semfm: quoted_semfm.map(|row| row.values[place]),
+            model: column.map_or_else(Vec::new, |name| by_views(context, name, &of)),
+            lead: ours(context.lead),
+            second: second.and_then(ours),
+        });
+    }
+    panels
 }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use super::context::{Context, is_bound};
+use super::context::Context;
 use super::html::{Cell, Table, escape, plot};
 use super::plots::{DrawError, forest};
 use crate::row::Row;
-use crate::summary::Scope;
-use crate::table::number;
+use crate::summary::{Scope, is_bound};
+use crate::table;
 
 /// The section.
 pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
@@ -21,7 +21,7 @@ pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
             "Mean IoU of each method with its interval; the numbers are in the table below.",
             &format!(
                 "Mean IoU over all pairs with its {level:.0} % interval (objects resampled); small \
-                 dots are groups. Floor and ceiling are grey."
+                 dots are groups. The bounds are grey."
             ),
         );
     }
@@ -37,14 +37,17 @@ pub(super) fn body(context: &Context<'_>) -> Result<String, DrawError> {
 
 fn line(context: &Context<'_>, method: &str) -> Option<forest::Line> {
     let summary = context.overall(method)?;
-    let group = |name: &&str| context.summary(&Scope::Group((*name).into()), method)?.mean;
+    let groups = context.groups.iter();
+    let groups = groups.filter_map(|&name| {
+        context.summary(&Scope::Group(name.into()), method).and_then(|summary| summary.mean)
+    });
     Some(forest::Line {
         name: method.into(),
         is_bound: is_bound(method),
         is_lead: method == context.lead,
         mean: summary.mean?,
         interval: summary.interval,
-        groups: context.groups.iter().filter_map(group).collect(),
+        groups: groups.collect(),
     })
 }
 
@@ -63,22 +66,24 @@ fn by_group(context: &Context<'_>) -> Table {
     let caption = "Mean IoU by group (number of pairs)";
     let mut table = Table::new(caption, head).sortable();
     for &method in &context.methods {
-        let mean = |scope: &Scope| context.summary(scope, method).and_then(|s| s.mean);
-        let all = context.overall(method);
-        let cells = scopes
-            .iter()
-            .map(|scope| Cell::number(mean(scope), 2))
-            .chain([Cell::number(mean(&Scope::All), 3), Cell::number(all.and_then(|s| s.std), 2)])
-            .chain([Cell::number(mean(&Scope::MeanOfCategories), 3)])
-            .collect::<Vec<_>>();
+        let std = context.overall(method).and_then(|s| s.std);
+        let mut cells: Vec<Cell> =
+            scopes.iter().map(|scope| mean_cell(context, scope, method, 2)).collect();
+        cells.push(mean_cell(context, &Scope::All, method, 3));
+        cells.push(Cell::number(std, 2));
+        cells.push(mean_cell(context, &Scope::MeanOfCategories, method, 3));
         table.line(class(context, method), method, "", cells);
     }
     table
 }
 
-fn interval(ends: Option<[f64; 2]>, signed: bool) -> String {
-    let one = |x: f64| if signed { format!("{x:+.3}") } else { number(Some(x), 3) };
-    ends.map_or_else(String::new, |[low, high]| format!("{} … {}", one(low), one(high)))
+fn mean_cell(context: &Context<'_>, scope: &Scope, method: &str, digits: usize) -> Cell {
+    Cell::number(context.summary(scope, method).and_then(|summary| summary.mean), digits)
+}
+
+/// The ends of an interval; empty for none.
+fn ends(interval: Option<[f64; 2]>, signed: bool) -> String {
+    interval.map_or_else(String::new, |ends| table::interval(Some(ends), signed))
 }
 
 fn overall(context: &Context<'_>) -> Table {
@@ -87,7 +92,7 @@ fn overall(context: &Context<'_>) -> Table {
         "Mean IoU",
         "IoU by area",
         "Below .3",
-        "Floor to ceiling",
+        "Between bounds",
         "Anchors landed",
         "Pairs",
         "Failed",
@@ -96,14 +101,11 @@ fn overall(context: &Context<'_>) -> Table {
     let mut table = Table::new("All pairs together", head).sortable();
     for &method in &context.methods {
         let Some(s) = context.overall(method) else { continue };
-        let percent = |share: Option<f64>| {
-            Cell::written(share, share.map_or("–".into(), |x| format!("{:.0} %", 100.0 * x)))
-        };
         let cells = [
-            Cell::number(s.mean, 3).with_small(&interval(s.interval, false)),
+            Cell::number(s.mean, 3).with_small(&ends(s.interval, false)),
             Cell::number(s.area_mean, 2),
             percent(s.below_poor),
-            percent(s.way.filter(|_| !is_bound(method))),
+            percent(s.between_bounds.filter(|_| !is_bound(method))),
             percent(s.anchor_landed),
             Cell::written(Some(s.n as f64), s.n.to_string()),
             Cell::written(Some(s.n_failed as f64), s.n_failed.to_string()),
@@ -112,6 +114,11 @@ fn overall(context: &Context<'_>) -> Table {
         table.line(class(context, method), method, "", cells);
     }
     table
+}
+
+/// A share as a whole percentage.
+fn percent(share: Option<f64>) -> Cell {
+    Cell::written(share, table::percent(share))
 }
 
 /// The other methods against the leading one, group by group.
@@ -126,35 +133,20 @@ fn differences(context: &Context<'_>) -> Table {
     let mut table =
         Table::new(&caption, head.chain(["All", "Better / worse on (pairs)"])).sortable();
     for &method in context.methods.iter().filter(|m| **m != context.lead) {
-        // Differences are kept for each two methods once, in either order.
-        let find = |scope: &Scope| {
-            context.results.differences.iter().filter(|d| d.scope == *scope).find_map(|d| {
-                match (d.method.as_str(), d.against.as_str()) {
-                    (a, b) if (a, b) == (method, context.lead) => {
-                        Some((d.mean, d.interval, d.sign(), d.better_worse))
-                    }
-                    (a, b) if (a, b) == (context.lead, method) => {
-                        let ends = d.interval.map(|[low, high]| [-high, -low]);
-                        let [better, worse] = d.better_worse;
-                        Some((-d.mean, ends, -d.sign(), [worse, better]))
-                    }
-                    _ => None,
-                }
-            })
-        };
-        let Some((_, _, _, [better, worse])) = find(&Scope::All) else { continue };
+        let Some(over_all) = gain(context, &Scope::All, method) else { continue };
         let mut cells: Vec<Cell> = Vec::new();
         for scope in &scopes {
-            cells.push(match find(scope) {
+            cells.push(match gain(context, scope, method) {
                 None => Cell::number(None, 2),
-                Some((mean, ends, sign, _)) => {
-                    let ends = if *scope == Scope::All { ends } else { None };
-                    Cell::written(Some(mean), format!("{mean:+.2}"))
-                        .strong_if(sign != 0)
-                        .with_small(&interval(ends, true))
+                Some(gain) => {
+                    let interval = gain.interval.filter(|_| *scope == Scope::All);
+                    Cell::written(Some(gain.mean), format!("{:+.2}", gain.mean))
+                        .strong_if(gain.is_certain)
+                        .with_small(&ends(interval, true))
                 }
             });
         }
+        let Gain { better, worse, .. } = over_all;
         let balance = better as f64 - worse as f64;
         cells.push(Cell::written(Some(balance), format!("{better} / {worse}")));
         table.line("", method, "", cells);
@@ -162,48 +154,54 @@ fn differences(context: &Context<'_>) -> Table {
     table
 }
 
+/// How much better a method is than the leading one.
+struct Gain {
+    mean: f64,
+    interval: Option<[f64; 2]>,
+    /// Whether the interval excludes zero.
+    is_certain: bool,
+    better: usize,
+    worse: usize,
+}
+
+/// Differences are kept for each two methods once, in either order.
+fn gain(context: &Context<'_>, scope: &Scope, method: &str) -> Option<Gain> {
+    let lead = context.lead;
+    for d in context.results.differences.iter().filter(|d| d.scope == *scope) {
+        let (mean, interval, is_certain) = (d.mean, d.interval, d.sign() != 0);
+        let [better, worse] = d.better_worse;
+        if d.method == method && d.against == lead {
+            return Some(Gain { mean, interval, is_certain, better, worse });
+        }
+        if d.method == lead && d.against == method {
+            let interval = interval.map(|[low, high]| [-high, -low]);
+            let (better, worse) = (worse, better);
+            return Some(Gain { mean: -mean, interval, is_certain, better, worse });
+        }
+    }
+    None
+}
+
 /// Medians of the stages, and of what they add up to.
 fn times(context: &Context<'_>) -> String {
-    let rows = |method: &str| {
-        context.rows_of(method).filter(|row| !row.stages_ms.is_empty()).collect::<Vec<_>>()
-    };
     let names = context.results.rows.iter().flat_map(|row| row.stages_ms.keys());
-    let names: BTreeSet<(bool, &str)> = names.map(|name| stage_of(name)).collect();
-    let stages: Vec<(bool, &str)> = names.into_iter().rev().collect(); // preparation first
+    let stages: BTreeSet<Stage<'_>> = names.map(|name| Stage::of(name)).collect();
+    let stages: Vec<Stage<'_>> = stages.into_iter().rev().collect(); // preparation first
     if stages.is_empty() {
         return String::new();
     }
     let head = ["Method", "Matching", "Cold", "Whole"].map(str::to_owned);
-    let of_both = |&(both, name): &(bool, &str)| {
-        if both { format!("{name} (both)") } else { name.to_owned() }
-    };
-    let head = head.into_iter().chain(stages.iter().map(of_both));
+    let head = head.into_iter().chain(stages.iter().map(Stage::heading));
     let mut table = Table::new("Median milliseconds", head).sortable();
     for &method in &context.methods {
-        let rows = rows(method);
+        let rows: Vec<&Row> =
+            context.rows_of(method).filter(|row| !row.stages_ms.is_empty()).collect();
         let Some(s) = context.overall(method).filter(|_| !rows.is_empty()) else { continue };
-        let ms = |x: Option<f64>| {
-            Cell::written(
-                x,
-                x.map_or("–".into(), |x| {
-                    if x < 10.0 { format!("{x:.1}") } else { format!("{x:.0}") }
-                }),
-            )
-        };
         let whole = s.median_paper_runtime.map(|seconds| 1e3 * seconds);
         let sums = [s.median_matching_ms, s.median_cold_ms, whole];
-        let of_stage = |stage: &(bool, &str)| {
-            let of_row = |row: &&Row| {
-                let parts = row.stages_ms.iter().filter(|(name, _)| stage_of(name) == *stage);
-                let parts: Vec<f64> = parts.map(|(_, ms)| *ms).collect();
-                (!parts.is_empty()).then(|| parts.iter().sum::<f64>())
-            };
-            let mut values: Vec<f64> = rows.iter().filter_map(of_row).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied()
-        };
-        let cells = sums.into_iter().chain(stages.iter().map(of_stage)).map(ms);
-        table.line(class(context, method), method, "", cells.collect::<Vec<_>>());
+        let of_stages = stages.iter().map(|stage| stage.median_ms(&rows));
+        let cells: Vec<Cell> = sums.into_iter().chain(of_stages).map(milliseconds).collect();
+        table.line(class(context, method), method, "", cells);
     }
     format!(
         "<h3>Time</h3>\n<p>{}</p>\n{}",
@@ -216,8 +214,44 @@ fn times(context: &Context<'_>) -> String {
     )
 }
 
-/// Whether a stage is done for each of the objects, and its name.
-fn stage_of(name: &str) -> (bool, &str) {
-    let bare = name.strip_suffix("_source").or_else(|| name.strip_suffix("_target"));
-    (bare.is_some(), bare.unwrap_or(name))
+/// Milliseconds, with a digit after the point below ten.
+fn milliseconds(ms: Option<f64>) -> Cell {
+    let text = match ms {
+        None => "–".into(),
+        Some(ms) if ms < 10.0 => format!("{ms:.1}"),
+        Some(ms) => format!("{ms:.0}"),
+    };
+    Cell::written(ms, text)
+}
+
+/// A stage of the work, in the order of the columns from the right.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Stage<'a> {
+    /// Whether it is done for each of the two objects.
+    is_of_both: bool,
+    name: &'a str,
+}
+
+impl<'a> Stage<'a> {
+    fn of(name: &'a str) -> Self {
+        let bare = name.strip_suffix("_source").or_else(|| name.strip_suffix("_target"));
+        Self { is_of_both: bare.is_some(), name: bare.unwrap_or(name) }
+    }
+
+    fn heading(&self) -> String {
+        if self.is_of_both { format!("{} (both)", self.name) } else { self.name.to_owned() }
+    }
+
+    /// What it took in one row, both objects added up.
+    fn ms(&self, row: &Row) -> Option<f64> {
+        let parts = row.stages_ms.iter().filter(|(name, _)| Stage::of(name) == *self);
+        let parts: Vec<f64> = parts.map(|(_, ms)| *ms).collect();
+        (!parts.is_empty()).then(|| parts.iter().sum::<f64>())
+    }
+
+    fn median_ms(&self, rows: &[&Row]) -> Option<f64> {
+        let mut values: Vec<f64> = rows.iter().filter_map(|row| self.ms(row)).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    }
 }

@@ -6,43 +6,26 @@
 use rayon::prelude::*;
 use semfm::Task;
 
-use super::album::{Album, Side};
 use super::context::Context;
 use super::html::{escape, shown};
+use super::thumbnails::{DrawnObject, DrawnPair, Side, Thumbnails};
 use crate::Result;
-use crate::candidate::Candidate;
 use crate::row::Row;
 use crate::table::number;
+use crate::variant::Variant;
 
 /// Targets of each group in the category sheet.
 const SHEET_TARGETS: usize = 5;
 /// Targets of each group under the coloured source, as in the paper.
 const COLOURED_TARGETS: usize = 3;
 
-/// Each group: a source with its region, and targets with what arrived there.
-pub(super) fn categories(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Result<String> {
-    let groups = each_group(context, task, |rows| {
-        let rows = typical(album, rows, SHEET_TARGETS);
-        let (source, _) = album.pair(rows.first()?)?;
-        let mut strip = format!(
-            "<figure class=\"start\">{}<figcaption>{}: demonstrated</figcaption></figure>",
-            source.own("with the demonstrated region"),
-            escape(&source.name)
-        );
-        let mut n_shown = 0;
-        for row in rows {
-            let Some(((_, target), answer)) = album.pair(row).zip(album.answer(row)) else {
-                continue;
-            };
-            let words = format!("{} ({})", target.name, number(row.iou, 2));
-            let alt = format!("region found on {words}");
-            if let Some(picture) = album.region(target, &answer, &alt) {
-                strip += &shown(&picture, &words);
-                n_shown += 1;
-            }
-        }
-        (n_shown > 0).then(|| format!("<div class=\"strip\">{strip}</div>\n"))
-    })?;
+/// Each group: a source with its region, and targets with the transferred region.
+pub(super) fn categories(
+    context: &Context<'_>,
+    thumbnails: &Thumbnails<'_>,
+    task: &Task,
+) -> Result<String> {
+    let groups = each_group(context, context.lead, task, |rows| category_strip(thumbnails, rows))?;
     if groups.is_empty() {
         return Ok(String::new());
     }
@@ -56,25 +39,42 @@ pub(super) fn categories(context: &Context<'_>, album: &Album<'_>, task: &Task) 
     Ok(html)
 }
 
-/// A column for each group: the source painted by position, and targets in the colours that the map
-/// brings.
-pub(super) fn colours(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Result<String> {
-    let columns = each_group(context, task, |rows| {
-        let rows = typical(album, rows, COLOURED_TARGETS);
-        let (source, _) = album.pair(rows.first()?)?;
-        let painted = album.places(source, &format!("{} painted by position", source.name))?;
-        let mut column = shown(&painted, &source.name);
-        let mut n_shown = 0;
-        for row in rows {
-            let Some((pair, answer)) = album.pair(row).zip(album.answer(row)) else { continue };
-            let alt = format!("{} in the colours of {}", row.target, row.source);
-            if let Some(picture) = album.carried(pair, &answer, &alt) {
-                column += &shown(&picture, &format!("{} ({})", row.target, number(row.iou, 2)));
-                n_shown += 1;
-            }
+fn category_strip(thumbnails: &Thumbnails<'_>, rows: &[&Row]) -> Option<String> {
+    let rows = typical(thumbnails, rows, SHEET_TARGETS);
+    let source = thumbnails.pair(rows.first()?)?.source;
+    let mut strip = demonstrated(source, &format!("{}: demonstrated", source.name));
+    let mut n_shown = 0;
+    for row in rows {
+        let Some((pair, answer)) = thumbnails.pair(row).zip(thumbnails.answer(row)) else {
+            continue;
+        };
+        let words = format!("{} ({})", pair.target.name, number(row.iou, 2));
+        let alt = format!("region found on {words}");
+        if let Some(picture) = thumbnails.region(pair.target, &answer, &alt) {
+            strip += &shown(&picture, &words);
+            n_shown += 1;
         }
-        (n_shown > 0).then_some(column)
-    })?;
+    }
+    (n_shown > 0).then(|| format!("<div class=\"strip\">{strip}</div>\n"))
+}
+
+/// A source with its region, at the start of a strip.
+fn demonstrated(source: &DrawnObject, caption: &str) -> String {
+    format!(
+        "<figure class=\"start\">{}<figcaption>{}</figcaption></figure>",
+        source.own("with the demonstrated region"),
+        escape(caption)
+    )
+}
+
+/// A column for each group: the source coloured by position, and targets in the colours that the map
+/// brings.
+pub(super) fn colours(
+    context: &Context<'_>,
+    thumbnails: &Thumbnails<'_>,
+    task: &Task,
+) -> Result<String> {
+    let columns = each_group(context, context.lead, task, |rows| colour_column(thumbnails, rows))?;
     if columns.is_empty() {
         return Ok(String::new());
     }
@@ -91,44 +91,36 @@ pub(super) fn colours(context: &Context<'_>, album: &Album<'_>, task: &Task) -> 
     ))
 }
 
+fn colour_column(thumbnails: &Thumbnails<'_>, rows: &[&Row]) -> Option<String> {
+    let rows = typical(thumbnails, rows, COLOURED_TARGETS);
+    let source = thumbnails.pair(rows.first()?)?.source;
+    let coloured = thumbnails.places(source, &format!("{} painted by position", source.name))?;
+    let mut column = shown(&coloured, &source.name);
+    let mut n_shown = 0;
+    for row in rows {
+        let Some((pair, answer)) = thumbnails.pair(row).zip(thumbnails.answer(row)) else {
+            continue;
+        };
+        let alt = format!("{} in the colours of {}", row.target, row.source);
+        if let Some(picture) = thumbnails.mapped(&pair, &answer, &alt) {
+            column += &shown(&picture, &format!("{} ({})", row.target, number(row.iou, 2)));
+            n_shown += 1;
+        }
+    }
+    (n_shown > 0).then_some(column)
+}
+
 /// The worst pair of each group by geometry alone, with the leading method's answer beside it.
-pub(super) fn wks(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Result<String> {
-    let method = Candidate::Wks.name();
+pub(super) fn wks(
+    context: &Context<'_>,
+    thumbnails: &Thumbnails<'_>,
+    task: &Task,
+) -> Result<String> {
+    let method = Variant::Wks.name();
     if !context.methods.contains(&method) {
         return Ok(String::new());
     }
-    let groups = each_group_of(context, method, task, |rows| {
-        let worst = by_iou(rows.to_vec()).into_iter().next_back()?;
-        let (source, target) = album.pair(worst)?;
-        let mut answers = album.answers(worst);
-        let answer = answers.remove(method)?;
-        let iou = number(worst.iou, 2);
-        let alt = |what: &str| format!("{what} on {}, WKS, IoU {iou}", worst.target);
-        let mut strip = format!(
-            "<figure class=\"start\">{}<figcaption>{}</figcaption></figure>",
-            source.own("with the demonstrated region"),
-            escape(&source.name)
-        );
-        strip += &shown(&target.own("with the true region"), &format!("{}: truth", target.name));
-        strip +=
-            &shown(&album.region(target, &answer, &alt("region found"))?, &format!("WKS ({iou})"));
-        strip += &shown(
-            &album.error(target, &answer, Side::Best, &alt("error"))?,
-            "WKS: right, too much, missed",
-        );
-        if answer.has_map() {
-            strip += &shown(
-                &album.carried((source, target), &answer, &alt("map"))?,
-                "WKS: colours of the source",
-            );
-        }
-        if let Some((answer, row)) = answers.remove(context.lead).zip(twin(context, worst)) {
-            let words = format!("{} ({})", context.lead, number(row.iou, 2));
-            let alt = format!("region found on {} by {words}", worst.target);
-            strip += &shown(&album.region(target, &answer, &alt)?, &words);
-        }
-        Some(format!("<div class=\"strip\">{strip}</div>\n"))
-    })?;
+    let groups = each_group(context, method, task, |rows| wks_strip(context, thumbnails, rows))?;
     if groups.is_empty() {
         return Ok(String::new());
     }
@@ -140,30 +132,49 @@ pub(super) fn wks(context: &Context<'_>, album: &Album<'_>, task: &Task) -> Resu
     Ok(html)
 }
 
-/// One block for each group, side by side where there is room.
+fn wks_strip(context: &Context<'_>, thumbnails: &Thumbnails<'_>, rows: &[&Row]) -> Option<String> {
+    let worst = by_iou(rows.to_vec()).into_iter().next_back()?;
+    let pair = thumbnails.pair(worst)?;
+    let DrawnPair { source, target } = pair;
+    let mut answers = thumbnails.answers(worst);
+    let answer = answers.remove(Variant::Wks.name())?;
+    let iou = number(worst.iou, 2);
+    let on_target = format!("on {}, WKS, IoU {iou}", worst.target);
+    let mut strip = demonstrated(source, &source.name);
+    strip += &shown(&target.own("with the true region"), &format!("{}: truth", target.name));
+    let found = thumbnails.region(target, &answer, &format!("region found {on_target}"))?;
+    strip += &shown(&found, &format!("WKS ({iou})"));
+    let error = thumbnails.error(target, &answer, Side::Best, &format!("error {on_target}"))?;
+    strip += &shown(&error, "WKS: right, too much, missed");
+    if answer.point_map.is_some() {
+        let mapped = thumbnails.mapped(&pair, &answer, &format!("map {on_target}"))?;
+        strip += &shown(&mapped, "WKS: colours of the source");
+    }
+    if let Some((answer, row)) = answers.remove(context.lead).zip(leading_row(context, worst)) {
+        let words = format!("{} ({})", context.lead, number(row.iou, 2));
+        let alt = format!("region found on {} by {words}", worst.target);
+        strip += &shown(&thumbnails.region(target, &answer, &alt)?, &words);
+    }
+    Some(format!("<div class=\"strip\">{strip}</div>\n"))
+}
+
+/// One block for each group, side by side where there is space.
 fn blocks(groups: &[(&str, String)]) -> String {
-    let block = |(group, strip): &(&str, String)| {
-        format!("<div><h3>{}</h3>\n{strip}</div>\n", escape(group))
-    };
-    format!("<div class=\"sheets\">\n{}</div>\n", groups.iter().map(block).collect::<String>())
+    let mut html = String::from("<div class=\"sheets\">\n");
+    for (group, strip) in groups {
+        html += &format!("<div><h3>{}</h3>\n{strip}</div>\n", escape(group));
+    }
+    html + "</div>\n"
 }
 
 /// The leading method's row on the same pair.
-fn twin<'a>(context: &Context<'a>, row: &Row) -> Option<&'a Row> {
-    let pair = |row: &Row| (row.group.clone(), row.source.clone(), row.target.clone());
-    context.rows_of(context.lead).find(|other| pair(other) == pair(row))
-}
-
-fn each_group<'a>(
-    context: &Context<'a>,
-    task: &Task,
-    draw: impl Fn(&[&'a Row]) -> Option<String> + Sync,
-) -> Result<Vec<(&'a str, String)>> {
-    each_group_of(context, context.lead, task, draw)
+fn leading_row<'a>(context: &Context<'a>, row: &Row) -> Option<&'a Row> {
+    let pair = row.pair_key();
+    context.rows_of(context.lead).find(|other| other.pair_key() == pair)
 }
 
 /// What `draw` makes of each group's scored rows of a method, in the order of the groups.
-fn each_group_of<'a>(
+fn each_group<'a>(
     context: &Context<'a>,
     method: &str,
     task: &Task,
@@ -174,9 +185,10 @@ fn each_group_of<'a>(
         .par_iter()
         .map(|&group| {
             task.check()?;
-            let scored =
-                |row: &&Row| row.group == group && row.iou.is_some() && row.prediction.is_some();
-            let rows: Vec<&Row> = context.rows_of(method).filter(scored).collect();
+            let rows: Vec<&Row> = context
+                .rows_of(method)
+                .filter(|row| row.group == group && row.iou.is_some() && row.prediction.is_some())
+                .collect();
             Ok(draw(&rows).map(|html| (group, html)))
         })
         .collect();
@@ -184,33 +196,44 @@ fn each_group_of<'a>(
 }
 
 /// The rows of the source that is nearest to the mean, at most `n`, spread from best to worst.
-fn typical<'a>(album: &Album<'_>, rows: &[&'a Row], n: usize) -> Vec<&'a Row> {
-    let rows: Vec<&Row> = rows.iter().copied().filter(|row| album.pair(row).is_some()).collect();
+fn typical<'a>(thumbnails: &Thumbnails<'_>, rows: &[&'a Row], n: usize) -> Vec<&'a Row> {
+    let rows: Vec<&Row> =
+        rows.iter().copied().filter(|row| thumbnails.pair(row).is_some()).collect();
     spread(by_iou(of_typical_source(rows)), n)
 }
 
+/// The rows of the source whose mean IoU is nearest to that of all rows.
 fn of_typical_source(rows: Vec<&Row>) -> Vec<&Row> {
-    let mean =
-        |rows: &[&Row]| rows.iter().filter_map(|row| row.iou).sum::<f64>() / rows.len() as f64;
-    let of =
-        |source: &str| rows.iter().copied().filter(|row| row.source == source).collect::<Vec<_>>();
     let mut sources: Vec<&str> = rows.iter().map(|row| row.source.as_str()).collect();
     sources.sort_unstable();
     sources.dedup();
+    let by_source: Vec<Vec<&Row>> =
+        sources.into_iter().map(|source| of_source(&rows, source)).collect();
     // A source with several targets shows more than one with a single target.
-    let most =
-        sources.iter().map(|source| of(source).len().min(COLOURED_TARGETS)).max().unwrap_or(0);
-    let overall = mean(&rows);
-    let off = |source: &str| (mean(&of(source)) - overall).abs();
-    let rich = sources.into_iter().filter(|source| of(source).len() >= most);
-    let chosen = rich.min_by(|a, b| off(a).total_cmp(&off(b)));
-    chosen.map(of).unwrap_or_default()
+    let most = by_source.iter().map(|own| own.len().min(COLOURED_TARGETS)).max().unwrap_or(0);
+    let overall = mean_iou(&rows);
+    by_source
+        .into_iter()
+        .filter(|own| own.len() >= most)
+        .map(|own| ((mean_iou(&own) - overall).abs(), own))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, own)| own)
+        .unwrap_or_default()
+}
+
+fn of_source<'a>(rows: &[&'a Row], source: &str) -> Vec<&'a Row> {
+    rows.iter().copied().filter(|row| row.source == source).collect()
+}
+
+fn mean_iou(rows: &[&Row]) -> f64 {
+    rows.iter().filter_map(|row| row.iou).sum::<f64>() / rows.len() as f64
 }
 
 /// From the best to the worst.
 fn by_iou(mut rows: Vec<&Row>) -> Vec<&Row> {
-    let iou = |row: &Row| row.iou.unwrap_or(0.0);
-    rows.sort_by(|a, b| iou(b).total_cmp(&iou(a)).then_with(|| a.key().cmp(&b.key())));
+    rows.sort_by(|a, b| {
+        b.iou_or_zero().total_cmp(&a.iou_or_zero()).then_with(|| a.key().cmp(&b.key()))
+    });
     rows
 }
 

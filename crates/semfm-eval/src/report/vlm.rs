@@ -6,10 +6,10 @@ use image::imageops::FilterType;
 use semfm::Task;
 
 use super::ReportSettings;
-use super::album::{Album, Side};
 use super::context::Context;
 use super::data_uri;
 use super::html::{escape, img, shown};
+use super::thumbnails::{Side, Thumbnails};
 use crate::Result;
 use crate::row::Row;
 use crate::table::number;
@@ -25,7 +25,7 @@ const VIEWS: usize = 3;
 /// Only cancellation.
 pub(super) fn body(
     context: &Context<'_>,
-    album: &Album<'_>,
+    thumbnails: &Thumbnails<'_>,
     settings: &ReportSettings,
     task: &Task,
 ) -> Result<String> {
@@ -40,8 +40,9 @@ pub(super) fn body(
                 .into(),
         );
     }
-    let iou = |row: &Row| row.iou.unwrap_or(0.0);
-    rows.sort_by(|a, b| iou(b).total_cmp(&iou(a)).then_with(|| a.key().cmp(&b.key())));
+    rows.sort_by(|a, b| {
+        b.iou_or_zero().total_cmp(&a.iou_or_zero()).then_with(|| a.key().cmp(&b.key()))
+    });
     let middle = rows.len().saturating_sub(ROWS);
     if middle > 0 {
         rows.drain(ROWS / 2..ROWS / 2 + middle);
@@ -53,20 +54,20 @@ pub(super) fn body(
     );
     for row in rows {
         task.check()?;
-        html += &strip(album, row, settings).unwrap_or_default();
+        html += &strip(thumbnails, row, settings).unwrap_or_default();
     }
     Ok(html)
 }
 
-fn strip(album: &Album<'_>, row: &Row, settings: &ReportSettings) -> Option<String> {
-    let (vlm, (_, target)) = (row.vlm.as_ref()?, album.pair(row)?);
-    let answer = album.answer(row)?;
-    let who =
+fn strip(thumbnails: &Thumbnails<'_>, row: &Row, settings: &ReportSettings) -> Option<String> {
+    let (vlm, target) = (row.vlm.as_ref()?, thumbnails.pair(row)?.target);
+    let answer = thumbnails.answer(row)?;
+    let model =
         if vlm.real_model { vlm.model.clone() } else { format!("stand-in “{}”", vlm.model) };
     let inconsistency =
         vlm.inconsistency.map(|x| format!(", inconsistency {}", number(Some(x), 2)));
     let title = format!(
-        "{} → {}: {who}, {} {}, IoU {}{}",
+        "{} → {}: {model}, {} {}, IoU {}{}",
         row.source,
         row.target,
         vlm.n_views,
@@ -85,18 +86,24 @@ fn strip(album: &Album<'_>, row: &Row, settings: &ReportSettings) -> Option<Stri
         }
     }
     let alt = format!("on {}, IoU {}", row.target, number(row.iou, 2));
-    strip += &shown(&album.region(target, &answer, &format!("lifted region {alt}"))?, "lifted");
+    strip +=
+        &shown(&thumbnails.region(target, &answer, &format!("lifted region {alt}"))?, "lifted");
     for (side, words) in [(Side::Best, "error"), (Side::Other, "error, other side")] {
-        strip += &shown(&album.error(target, &answer, side, &format!("{words} {alt}"))?, words);
+        strip +=
+            &shown(&thumbnails.error(target, &answer, side, &format!("{words} {alt}"))?, words);
     }
     Some(format!("<h3>{}</h3>\n<div class=\"strip\">{strip}</div>\n", escape(&title)))
 }
 
 /// Where `semfm-vlm --pictures` keeps what was asked and answered on a pair.
 fn folder_of(root: &Path, row: &Row, n_views: usize) -> PathBuf {
-    let keep = |c: char| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' };
-    let group: String = row.group.chars().map(keep).collect();
+    let group: String = row.group.chars().map(|c| if is_kept(c) { c } else { '_' }).collect();
     root.join(group).join(format!("{}--{}--{n_views}", row.source, row.target))
+}
+
+/// Whether `semfm-vlm` leaves a character of a folder's name as it is.
+fn is_kept(c: char) -> bool {
+    c.is_alphanumeric() || "-_. ".contains(c)
 }
 
 /// The answer in one view, made small.

@@ -1,9 +1,9 @@
 //! Plots as SVG text. Sizes are pixels of an unscaled page; the page's style sheet chooses the font.
 
 pub(super) mod against_views;
-pub(super) mod curves;
+pub(super) mod calibration;
+pub(super) mod error_curves;
 pub(super) mod forest;
-pub(super) mod trust;
 
 use plotters::coord::Shift;
 use plotters::prelude::*;

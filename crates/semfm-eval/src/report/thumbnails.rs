@@ -1,4 +1,4 @@
-//! Pictures of objects and answers: what is rendered, from where, and in which colours.
+//! Thumbnails of objects and answers: what is rendered, from where, and in which colours.
 //!
 //! An object looks the same in every picture of it: from where its true region shows best, and from
 //! another side. The picture with its true region stands in the page once, as a style class, however
@@ -6,34 +6,34 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use rayon::prelude::*;
 use semfm::geom::Pinhole;
 use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Region, Task};
 use semfm_show::{position_colors, viewpoints};
-use serde::Deserialize;
 
 use super::ReportSettings;
 use super::html::{escape, img};
 use super::{data_uri, palette};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, ObjectEntry};
+use crate::prediction::{PairPredictions, Prediction};
 use crate::results::Results;
 use crate::row::Row;
 use crate::{Error, Result};
 
-/// The objects of the results, ready to be drawn.
-pub(super) struct Album<'a> {
+/// The objects of the results, prepared for drawing.
+pub(super) struct Thumbnails<'a> {
     folder: &'a Path,
-    subjects: BTreeMap<(&'a str, &'a str), Subject>,
+    objects: BTreeMap<(&'a str, &'a str), DrawnObject>,
     /// Why there are fewer pictures than there could be.
     missing: Vec<String>,
     task: Task,
 }
 
 /// One object.
-pub(super) struct Subject {
+pub(super) struct DrawnObject {
     pub name: String,
     mesh: Mesh,
     truth: Region,
@@ -42,6 +42,12 @@ pub(super) struct Subject {
     place: usize,
     /// The picture with its true region.
     own: String,
+}
+
+/// Source and target of a row.
+pub(super) struct DrawnPair<'a> {
+    pub source: &'a DrawnObject,
+    pub target: &'a DrawnObject,
 }
 
 /// From which side a picture is taken.
@@ -53,27 +59,11 @@ pub(super) enum Side {
     Other = 1,
 }
 
-/// The answers on one pair, as the evaluation keeps them.
-#[derive(Deserialize)]
-struct Page {
-    methods: BTreeMap<String, Answer>,
-}
-
-/// One method's answer on one pair.
-#[derive(Clone, Deserialize)]
-pub(super) struct Answer {
-    vertices: Vec<u32>,
-    weights: Vec<f64>,
-    /// Source vertex for each target vertex; none without a map.
-    #[serde(default)]
-    point_map: Option<Vec<u32>>,
-}
-
-impl<'a> Album<'a> {
+impl<'a> Thumbnails<'a> {
     /// No pictures, for this reason.
-    pub fn closed(reason: &str) -> Self {
+    pub fn none(reason: &str) -> Self {
         let missing = vec![reason.to_owned()];
-        Self { folder: Path::new(""), subjects: BTreeMap::new(), missing, task: Task::default() }
+        Self { folder: Path::new(""), objects: BTreeMap::new(), missing, task: Task::default() }
     }
 
     /// Loads and draws the objects that rows name. An object that cannot be loaded or drawn is left
@@ -81,7 +71,7 @@ impl<'a> Album<'a> {
     ///
     /// # Errors
     /// Only cancellation.
-    pub fn open(
+    pub fn draw(
         dataset: &Dataset,
         results: &'a Results,
         folder: &'a Path,
@@ -95,7 +85,7 @@ impl<'a> Album<'a> {
             .collect();
         let names: Vec<_> = names.into_iter().collect();
         let quiet = Task::default();
-        let drawn: Vec<Result<Subject>> = names
+        let drawn: Vec<Result<DrawnObject>> = names
             .par_iter()
             .enumerate()
             .map(|(place, (category, name))| {
@@ -103,13 +93,13 @@ impl<'a> Album<'a> {
                 let found = dataset.find(category, name).ok_or_else(|| {
                     Error::invalid("object", "one of the dataset", format!("{category}/{name}"))
                 })?;
-                Subject::new(&dataset.objects[found], place, settings.picture_side, &quiet)
+                DrawnObject::new(&dataset.objects[found], place, settings.picture_side, &quiet)
             })
             .collect();
-        let (mut subjects, mut missing) = (BTreeMap::new(), Vec::new());
-        for (name, subject) in names.into_iter().zip(drawn) {
-            match subject {
-                Ok(subject) => drop(subjects.insert(name, subject)),
+        let (mut objects, mut missing) = (BTreeMap::new(), Vec::new());
+        for (name, object) in names.into_iter().zip(drawn) {
+            match object {
+                Ok(object) => drop(objects.insert(name, object)),
                 Err(error) if error.is_cancelled() => return Err(error),
                 Err(error) => missing.push(format!("{} cannot be shown ({error})", name.1)),
             }
@@ -117,13 +107,13 @@ impl<'a> Album<'a> {
         if !results.rows.iter().any(|row| row.prediction.is_some()) {
             missing.push("the predictions were not kept".into());
         }
-        Ok(Self { folder, subjects, missing, task: quiet })
+        Ok(Self { folder, objects, missing, task: quiet })
     }
 
     /// A style class for the picture of each object.
     pub fn shared_style(&self) -> String {
-        self.subjects.values().fold(String::new(), |mut style, subject| {
-            let _ = writeln!(style, ".o{}{{background-image:url({})}}", subject.place, subject.own);
+        self.objects.values().fold(String::new(), |mut style, object| {
+            let _ = writeln!(style, ".o{}{{background-image:url({})}}", object.place, object.own);
             style
         })
     }
@@ -138,38 +128,39 @@ impl<'a> Album<'a> {
     }
 
     /// Source and target of a row.
-    pub fn pair(&self, row: &Row) -> Option<(&Subject, &Subject)> {
-        let find = |name: &str| {
-            let found = self.subjects.iter().find(|(key, _)| **key == (&*row.category, name));
-            found.map(|(_, subject)| subject)
-        };
-        Some((find(&row.source)?, find(&row.target)?))
+    pub fn pair(&self, row: &Row) -> Option<DrawnPair<'_>> {
+        Some(DrawnPair {
+            source: self.object(&row.category, &row.source)?,
+            target: self.object(&row.category, &row.target)?,
+        })
+    }
+
+    fn object(&self, category: &str, name: &str) -> Option<&DrawnObject> {
+        let found = self.objects.iter().find(|(key, _)| **key == (category, name));
+        found.map(|(_, object)| object)
     }
 
     /// What each of the methods answered on the pair of `row`; empty where nobody kept it.
-    pub fn answers(&self, row: &Row) -> BTreeMap<String, Answer> {
-        let Some(path) = row.prediction.as_ref().and_then(|name| self.inside(name)) else {
-            return BTreeMap::new();
-        };
-        let page = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        page.map_or_else(BTreeMap::new, |page: Page| page.methods)
+    pub fn answers(&self, row: &Row) -> BTreeMap<String, Prediction> {
+        let path = row.prediction.as_ref().and_then(|name| self.inside(name));
+        let predictions = path.and_then(|path| PairPredictions::read(&path));
+        predictions.map_or_else(BTreeMap::new, |predictions| predictions.methods)
     }
 
     /// What the method of `row` answered.
-    pub fn answer(&self, row: &Row) -> Option<Answer> {
+    pub fn answer(&self, row: &Row) -> Option<Prediction> {
         self.answers(row).remove(&row.method)
     }
 
     /// A file of the results' folder: names that lead out of it are none.
     fn inside(&self, name: &str) -> Option<PathBuf> {
-        let plain =
-            |part: std::path::Component<'_>| matches!(part, std::path::Component::Normal(_));
-        Path::new(name).components().all(plain).then(|| self.folder.join(name))
+        let mut parts = Path::new(name).components();
+        parts.all(|part| matches!(part, Component::Normal(_))).then(|| self.folder.join(name))
     }
 
     /// The region that was found.
-    pub fn region(&self, target: &Subject, answer: &Answer, alt: &str) -> Option<String> {
-        let found = answer.region(&target.mesh)?;
+    pub fn region(&self, target: &DrawnObject, answer: &Prediction, alt: &str) -> Option<String> {
+        let found = answer.region(target.mesh.n_vertices())?;
         let colors = palette::by_weight(found.weights(), palette::EXTRA);
         target.draw(&colors, Side::Best, alt, &self.task)
     }
@@ -177,28 +168,24 @@ impl<'a> Album<'a> {
     /// What is right, too much and missed.
     pub fn error(
         &self,
-        target: &Subject,
-        answer: &Answer,
+        target: &DrawnObject,
+        answer: &Prediction,
         side: Side,
         alt: &str,
     ) -> Option<String> {
-        let found = answer.region(&target.mesh)?;
+        let found = answer.region(target.mesh.n_vertices())?;
         let colors = palette::by_error(&found.mask(), &target.truth.mask());
         target.draw(&colors, side, alt, &self.task)
     }
 
-    /// The source painted by position: what a map carries over.
-    pub fn places(&self, source: &Subject, alt: &str) -> Option<String> {
+    /// The source coloured by position: what a map transfers.
+    pub fn places(&self, source: &DrawnObject, alt: &str) -> Option<String> {
         source.draw(&position_colors(source.mesh.vertices()), Side::Best, alt, &self.task)
     }
 
     /// The target in the colours of the places that its vertices are mapped to.
-    pub fn carried(
-        &self,
-        (source, target): (&Subject, &Subject),
-        answer: &Answer,
-        alt: &str,
-    ) -> Option<String> {
+    pub fn mapped(&self, pair: &DrawnPair<'_>, answer: &Prediction, alt: &str) -> Option<String> {
+        let DrawnPair { source, target } = pair;
         let places = position_colors(source.mesh.vertices());
         let map = answer.point_map.as_ref().filter(|map| map.len() == target.mesh.n_vertices())?;
         let colors: Option<Vec<[f32; 3]>> =
@@ -207,24 +194,19 @@ impl<'a> Album<'a> {
     }
 }
 
-impl Subject {
-    fn new(
-        entry: &crate::dataset::ObjectEntry,
-        place: usize,
-        side: u32,
-        task: &Task,
-    ) -> Result<Self> {
+impl DrawnObject {
+    fn new(entry: &ObjectEntry, place: usize, side: u32, task: &Task) -> Result<Self> {
         let object = entry.load()?;
         let (mesh, truth) = (object.file.mesh, object.truth);
         let sides = viewpoints(&mesh, truth.weights(), side, task)?;
         let cameras = [sides.best, sides.other];
-        let mut subject =
+        let mut object =
             Self { name: entry.name.clone(), mesh, truth, cameras, place, own: String::new() };
-        let colors = palette::by_weight(subject.truth.weights(), palette::RIGHT);
-        subject.own = subject.uri(&colors, Side::Best, task).ok_or_else(|| {
+        let colors = palette::by_weight(object.truth.weights(), palette::RIGHT);
+        object.own = object.uri(&colors, Side::Best, task).ok_or_else(|| {
             Error::invalid(&entry.name, "a surface that can be drawn", "one that cannot")
         })?;
-        Ok(subject)
+        Ok(object)
     }
 
     /// The object with its true region.
@@ -246,41 +228,32 @@ impl Subject {
     }
 }
 
-impl Answer {
-    /// As a region of this mesh; none where it does not fit.
-    fn region(&self, mesh: &Mesh) -> Option<Region> {
-        let mut weights = vec![0.0; mesh.n_vertices()];
-        for (&vertex, &weight) in self.vertices.iter().zip(&self.weights) {
-            *weights.get_mut(vertex as usize)? = weight;
-        }
-        Region::from_weights(weights).ok()
-    }
-
-    /// Whether there is a map to show.
-    pub fn has_map(&self) -> bool {
-        self.point_map.is_some()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn names_do_not_lead_out_of_the_folder_and_wrong_answers_are_none() {
-        let album = Album { folder: Path::new("report"), ..Album::closed("nothing there") };
-        assert_eq!(album.inside("predictions/a.json"), Some("report/predictions/a.json".into()));
+        let thumbnails =
+            Thumbnails { folder: Path::new("report"), ..Thumbnails::none("nothing there") };
+        assert_eq!(
+            thumbnails.inside("predictions/a.json"),
+            Some("report/predictions/a.json".into())
+        );
         for name in ["../a", "/etc/passwd", "a/../../b"] {
-            assert_eq!(album.inside(name), None, "{name}");
+            assert_eq!(thumbnails.inside(name), None, "{name}");
         }
         let triangle = Mesh::new(
             [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Into::into).to_vec(),
             vec![[0, 1, 2]],
         );
-        let answer =
-            |vertex: u32| Answer { vertices: vec![vertex], weights: vec![0.8], point_map: None };
-        let triangle = triangle.unwrap();
-        assert_eq!(answer(2).region(&triangle).unwrap().vertices(), [2]);
-        assert!(answer(3).region(&triangle).is_none());
+        let answer = |vertex: u32| Prediction {
+            vertices: vec![vertex],
+            weights: vec![0.8],
+            ..Prediction::default()
+        };
+        let n = triangle.unwrap().n_vertices();
+        assert_eq!(answer(2).region(n).unwrap().vertices(), [2]);
+        assert!(answer(3).region(n).is_none());
     }
 }

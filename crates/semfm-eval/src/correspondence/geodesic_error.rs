@@ -6,25 +6,34 @@ use faer::Mat;
 use semfm::fmap::PointMap;
 use semfm::geom::geodesic::{HeatGeodesics, HeatSettings};
 
-use super::shape::MatchingShape;
+use super::annotated_shape::AnnotatedShape;
 use crate::{Error, Result};
 
-/// Distances from the true vertices of one pair's samples: computed once, asked for every map.
-pub(crate) struct Measure<'a> {
-    target: &'a MatchingShape,
-    source: &'a MatchingShape,
+/// Distances from the true vertices of one pair's samples: computed once, used for every map.
+pub(super) struct GeodesicError<'a> {
+    source: &'a AnnotatedShape,
+    target: &'a AnnotatedShape,
     samples: Vec<usize>,
     /// Distances (n_source × distinct true vertices).
     distances: Mat<f64>,
     column_of: BTreeMap<u32, usize>,
+    /// √A of the source.
     unit: f64,
 }
 
-impl<'a> Measure<'a> {
+/// Mean errors of one map × 100 / √area.
+pub(super) struct MapErrors {
+    /// Against the truth.
+    pub to_truth: f64,
+    /// Against the mirrored truth, where it is known.
+    pub to_mirror: Option<f64>,
+}
+
+impl<'a> GeodesicError<'a> {
     /// Distances for at most `n_samples` (0: all) of the samples that both shapes have.
     pub fn new(
-        source: &'a MatchingShape,
-        target: &'a MatchingShape,
+        source: &'a AnnotatedShape,
+        target: &'a AnnotatedShape,
         n_samples: usize,
     ) -> std::result::Result<Self, String> {
         let (n, other) = (source.truth.len(), target.truth.len());
@@ -50,25 +59,27 @@ impl<'a> Measure<'a> {
         Ok(Self { source, target, samples, distances, column_of, unit: mesh.area().sqrt() })
     }
 
-    /// Mean error of a map between the originals, and against the mirrored truth where it is known,
-    /// × 100 / √area.
-    pub fn of(&self, map: &PointMap) -> Result<(f64, Option<f64>)> {
-        if map.n_target() != self.target.shape.original().n_vertices() {
-            let expected = self.target.shape.original().n_vertices().to_string();
-            return Err(Error::invalid(
-                "vertices of the map",
-                expected,
-                map.n_target().to_string(),
-            ));
+    /// Errors of a map T between the meshes as read.
+    pub fn of(&self, map: &PointMap) -> Result<MapErrors> {
+        let expected = self.target.shape.original().n_vertices();
+        if map.n_target() != expected {
+            let (expected, found) = (expected.to_string(), map.n_target().to_string());
+            return Err(Error::invalid("vertices of the map", expected, found));
         }
-        let mean = |truth: &[u32]| {
-            let distance = |&i: &usize| {
-                let sent = map.source_of[self.target.truth[i] as usize];
-                self.distances[(sent as usize, self.column_of[&truth[i]])]
-            };
-            let total: f64 = self.samples.iter().map(distance).sum();
-            100.0 * total / (self.samples.len() as f64 * self.unit)
-        };
-        Ok((mean(&self.source.truth), self.source.mirrored.as_deref().map(mean)))
+        Ok(MapErrors {
+            to_truth: self.mean(map, &self.source.truth),
+            to_mirror: self.source.mirrored.as_deref().map(|truth| self.mean(map, truth)),
+        })
+    }
+
+    /// 100 / (|S| √A) · Σ_{s ∈ S} d(T(y_s), x_s): d the geodesic distance on the source, x_s the
+    /// source's vertex at sample s (`truth`), y_s the target's, T the map target → source.
+    fn mean(&self, map: &PointMap, truth: &[u32]) -> f64 {
+        let mut total = 0.0;
+        for &s in &self.samples {
+            let sent = map.source_of[self.target.truth[s] as usize];
+            total += self.distances[(sent as usize, self.column_of[&truth[s]])];
+        }
+        100.0 * total / (self.samples.len() as f64 * self.unit)
     }
 }

@@ -9,10 +9,17 @@ use crate::{Error, Result};
 const LARGEST: u64 = 1 << 30;
 
 /// A ZIP file in memory, its directory read.
-pub(crate) struct Archive<'a> {
+pub(super) struct Archive<'a> {
     path: &'a Path,
     bytes: Vec<u8>,
     entries: Vec<Entry>,
+}
+
+/// An array of numbers.
+pub(super) struct Array {
+    /// Row-major.
+    pub values: Vec<f64>,
+    pub shape: Vec<u64>,
 }
 
 struct Entry {
@@ -48,9 +55,8 @@ impl<'a> Archive<'a> {
         Ok(Self { path, bytes, entries })
     }
 
-    /// The array `name`, any number type turned into `f64`, row-major, and its shape; none where the
-    /// archive does not hold it.
-    pub fn array(&self, name: &str) -> Result<Option<(Vec<f64>, Vec<u64>)>> {
+    /// The array `name`, any number type turned into `f64`; none where the archive does not hold it.
+    pub fn array(&self, name: &str) -> Result<Option<Array>> {
         let file = format!("{name}.npy");
         let Some(entry) = self.entries.iter().find(|entry| entry.name == file) else {
             return Ok(None);
@@ -74,7 +80,7 @@ impl<'a> Archive<'a> {
                 $(if let Ok(reader) = open()?.data::<$kind>() {
                     let values = reader.map(|value| value.map(|x| x as f64));
                     let values = values.collect::<std::io::Result<Vec<f64>>>().map_err(unread)?;
-                    return Ok(Some((values, shape)));
+                    return Ok(Some(Array { values, shape }));
                 })*
             };
         }
@@ -220,9 +226,9 @@ pub(crate) mod tests {
             let whole = zip(&files(), deflated);
             std::fs::write(&path, &whole).unwrap();
             let archive = Archive::read(&path).unwrap();
-            let (values, shape) = archive.array("V").unwrap().unwrap();
-            assert_eq!((shape, values[5]), (vec![2, 3], 5.0));
-            assert_eq!(archive.array("gt").unwrap().unwrap().0, [7.0, 1.0]);
+            let array = archive.array("V").unwrap().unwrap();
+            assert_eq!((array.shape, array.values[5]), (vec![2, 3], 5.0));
+            assert_eq!(archive.array("gt").unwrap().unwrap().values, [7.0, 1.0]);
             assert!(archive.array("gt_sym").unwrap().is_none());
             for at in 0..whole.len() {
                 let mut broken = whole.clone();

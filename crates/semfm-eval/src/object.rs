@@ -8,29 +8,28 @@ use semfm::fmap::{PreparedShape, SemanticShape};
 use semfm::geom::{SemanticCloud, Shape, ShapeCache, ShapeSettings};
 use semfm::pipeline::semantic_cloud;
 use semfm::{Meaning, Region, Task};
-use serde::{Deserialize, Serialize};
 
-use crate::candidate::Features;
 use crate::dataset::{LabelledObject, ObjectEntry};
 use crate::embeddings::EmbeddingSource;
-use crate::row::Failure;
+use crate::row::{Failure, ObjectRow};
+use crate::variant::Features;
 use crate::{Error, Result};
 
 /// Or why not.
 pub(crate) type Tried<T> = std::result::Result<T, Failure>;
 
 /// What preparing needs besides the object.
-pub(crate) struct Workshop<'a> {
+pub(crate) struct Preparation<'a> {
     pub embeddings: &'a EmbeddingSource<'a>,
     pub shape: &'a ShapeSettings,
     pub cache: &'a ShapeCache,
     pub seed: u64,
-    /// The features that some candidate asks for.
+    /// The features that some variant asks for.
     pub wanted: &'a BTreeSet<Features>,
 }
 
 /// One object: its truth, its shape, and its meaning in each sense that is wanted.
-pub(crate) struct Actor {
+pub(crate) struct EvalObject {
     pub truth: Region,
     /// Area of each vertex as read.
     pub areas: Vec<f64>,
@@ -46,37 +45,10 @@ struct Seen {
     times: BTreeMap<&'static str, f64>,
 }
 
-/// What the results say of an object.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ObjectRow {
-    /// Its name.
-    pub name: String,
-    /// Its category.
-    pub category: String,
-    /// Hash of the mesh as read.
-    pub mesh: String,
-    /// Vertices as read.
-    pub n_vertices: usize,
-    /// Triangles as read.
-    pub n_triangles: usize,
-    /// Vertices of the true region.
-    pub n_region: usize,
-    /// Names of its parts.
-    pub parts: Vec<String>,
-    /// Who made the features of our views.
-    pub encoder: Option<String>,
-    /// Rotations that were averaged in them.
-    pub rolls: Option<u32>,
-    /// Share of the samples that some view saw.
-    pub seen: Option<f64>,
-    /// Why it cannot take part.
-    pub failure: Option<Failure>,
-}
-
-/// An actor ready to be matched, in each sense.
+/// An object ready to be matched, in each sense.
 pub(crate) type Ready<'a> = BTreeMap<Features, Tried<(PreparedShape<'a>, f64)>>;
 
-impl Actor {
+impl EvalObject {
     /// Loads and prepares an object. `part_names` are those of the whole group, so that all its
     /// objects have features of one dimension.
     ///
@@ -86,7 +58,7 @@ impl Actor {
         entry: &ObjectEntry,
         object: Tried<LabelledObject>,
         part_names: &[String],
-        shop: &Workshop<'_>,
+        preparation: &Preparation<'_>,
         task: &Task,
     ) -> Result<Tried<Self>> {
         task.check()?;
@@ -106,14 +78,14 @@ impl Actor {
             ..ObjectRow::default()
         };
         let mut meanings = BTreeMap::new();
-        for &features in shop.wanted {
-            let seen = see(entry, &object, features, part_names, shop, &mut about, task);
+        for &features in preparation.wanted {
+            let seen = see(entry, &object, features, part_names, preparation, &mut about, task);
             meanings.insert(features, tried("features", seen)?);
         }
-        let shape = if shop.wanted.is_empty() {
+        let shape = if preparation.wanted.is_empty() {
             Ok(None)
         } else {
-            let made = shop.cache.shape(mesh.clone(), shop.shape, task);
+            let made = preparation.cache.shape(mesh.clone(), preparation.shape, task);
             tried("object", made.map(|made| Some(made.shape)).map_err(Error::from))?
         };
         Ok(Ok(Self { areas: mesh.vertex_areas(), truth: object.truth, about, shape, meanings }))
@@ -170,18 +142,18 @@ fn see(
     object: &LabelledObject,
     features: Features,
     part_names: &[String],
-    shop: &Workshop<'_>,
+    preparation: &Preparation<'_>,
     about: &mut ObjectRow,
     task: &Task,
 ) -> Result<Seen> {
     let mut times = BTreeMap::new();
-    let lift = features.lift(shop.seed);
+    let lift = features.lift(preparation.seed);
     let mesh = object.mesh();
     let cloud = if features == Features::Parts {
         let labels = part_features(object, part_names);
         semantic_cloud(mesh, Meaning::PerVertex(&labels), &lift, task)?.0
     } else {
-        let embedded = shop.embeddings.views(entry, object, features.rolls(), task)?;
+        let embedded = preparation.embeddings.views(entry, object, features.rolls(), task)?;
         for (stage, ms) in [("views", embedded.views_ms), ("embed", embedded.embed_ms)] {
             ms.and_then(|ms| times.insert(stage, ms));
         }
@@ -195,13 +167,13 @@ fn see(
         cloud
     };
     let start = Instant::now();
-    let settings = ClusterSettings { seed: shop.seed, ..ClusterSettings::default() };
+    let settings = ClusterSettings { seed: preparation.seed, ..ClusterSettings::default() };
     let clusters = spectral_clusters(&cloud, &settings, task)?;
     times.insert("clusters", start.elapsed().as_secs_f64() * 1e3);
     Ok(Seen { cloud, clusters, times })
 }
 
-/// One-hot part labels (n × parts): the ceiling's features. Where some object of the group names no
+/// One-hot part labels (n × parts): the features of the upper bound. Where some object of the group names no
 /// parts, region and rest are the parts.
 fn part_features(object: &LabelledObject, part_names: &[String]) -> Vec<f32> {
     let n = object.mesh().n_vertices();

@@ -5,9 +5,9 @@ use plotters::style::text_anchor::{HPos, VPos};
 use semfm::Verdict;
 
 use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, svg};
+use crate::calibration::{self, ReliabilityBin};
 use crate::report::palette::{EXTRA, MISSED, RIGHT, ink};
 use crate::table::number;
-use crate::trust::{self, TrustBin};
 
 const SIZE: (u32, u32) = (440, 410);
 
@@ -22,7 +22,7 @@ pub(in crate::report) struct Answer {
 pub(in crate::report) fn scatter(answers: &[Answer]) -> Result<String, DrawError> {
     svg(SIZE, |area| {
         let mut chart = square(area, "confidence", "IoU")?;
-        let right = trust::RIGHT;
+        let right = calibration::RIGHT;
         let style = SOFT_INK.stroke_width(1);
         chart.draw_series(dashes((0.0, right), (1.0, right), 5, 4, style))?;
         for answer in answers {
@@ -47,7 +47,7 @@ pub(in crate::report) fn scatter(answers: &[Answer]) -> Result<String, DrawError
 }
 
 /// Share of right answers in each tenth of confidence, at its mean confidence.
-pub(in crate::report) fn reliability(bins: &[TrustBin]) -> Result<String, DrawError> {
+pub(in crate::report) fn reliability(bins: &[ReliabilityBin]) -> Result<String, DrawError> {
     svg(SIZE, |area| {
         let mut chart = square(area, "confidence", "share of answers with IoU ≥ .5")?;
         for bin in bins {

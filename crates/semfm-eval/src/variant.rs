@@ -1,4 +1,4 @@
-//! The methods that an evaluation compares: the six, the paper's variants, floor and ceiling.
+//! The methods that an evaluation compares: the six, the paper's variants, lower and upper bound.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use crate::{Error, Result};
 
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Candidate {
+pub enum Variant {
     /// The default method.
     Fused,
     /// The published method to the letter, preimage rule.
@@ -31,9 +31,9 @@ pub enum Candidate {
     Nearest,
     /// Geometry alone, the paper's baseline.
     Wks,
-    /// True part labels as features, and the default method: the ceiling.
+    /// True part labels as features, and the default method: the upper bound.
     Oracle,
-    /// Every vertex: the floor.
+    /// Every vertex: the lower bound.
     Whole,
 }
 
@@ -64,8 +64,8 @@ impl Features {
     }
 }
 
-impl Candidate {
-    /// All candidates, in the order of the tables.
+impl Variant {
+    /// All variants, in the order of the tables.
     pub const ALL: [Self; 11] = [
         Self::Fused,
         Self::Anchored,
@@ -109,12 +109,12 @@ impl Candidate {
             Self::Sinkhorn => "transport between the clouds, no map",
             Self::Nearest => "nearest features, no map",
             Self::Wks => "wave kernel signatures: geometry alone",
-            Self::Oracle => "the default method with true part labels as features: the ceiling",
-            Self::Whole => "every vertex: the floor",
+            Self::Oracle => "the default method with true part labels as features: the upper bound",
+            Self::Whole => "every vertex: the lower bound",
         }
     }
 
-    /// The features it needs; none for the floor.
+    /// The features it needs; none for the lower bound.
     pub fn features(self) -> Option<Features> {
         match self {
             Self::Whole => None,
@@ -124,7 +124,7 @@ impl Candidate {
         }
     }
 
-    /// How it matches; none for the floor.
+    /// How it matches; none for the lower bound.
     pub fn settings(self, seed: u64) -> Option<TransferSettings> {
         let method = match self {
             Self::Whole => return None,
@@ -143,7 +143,7 @@ impl Candidate {
         Some(settings)
     }
 
-    /// The same matching on our features, where that is another candidate.
+    /// The same matching on our features, where that is another variant.
     pub fn with_our_features(self) -> Self {
         match self {
             Self::Semfm => Self::SemfmPlus,
@@ -153,25 +153,25 @@ impl Candidate {
     }
 }
 
-impl fmt::Display for Candidate {
+impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl FromStr for Candidate {
+impl FromStr for Variant {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let found = Self::ALL.into_iter().find(|candidate| candidate.name() == text);
+        let found = Self::ALL.into_iter().find(|variant| variant.name() == text);
         found.ok_or_else(|| Error::invalid("method", Self::ALL.map(Self::name).join(", "), text))
     }
 }
 
-/// One setting of one candidate, changed: `fused.threshold=0.35`.
+/// One setting of one variant, changed: `fused.threshold=0.35`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Override {
-    /// Name of the candidate.
+    /// Name of the variant.
     pub method: String,
     /// Where in its settings, keys joined by points.
     pub key: String,
@@ -180,16 +180,12 @@ pub struct Override {
 }
 
 impl Override {
-    /// Changes `settings` where they are those of this override's candidate.
+    /// Changes `settings` where they are those of this override's variant.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a key that is not there or a value of another kind.
-    pub fn apply(
-        &self,
-        candidate: Candidate,
-        settings: TransferSettings,
-    ) -> Result<TransferSettings> {
-        if candidate.name() != self.method {
+    pub fn apply(&self, variant: Variant, settings: TransferSettings) -> Result<TransferSettings> {
+        if variant.name() != self.method {
             return Ok(settings);
         }
         let unfit = |error: serde_json::Error| {
@@ -219,7 +215,7 @@ impl FromStr for Override {
         let unfit = || Error::invalid("setting", "METHOD.KEY=VALUE", text);
         let (place, value) = text.split_once('=').ok_or_else(unfit)?;
         let (method, key) = place.split_once('.').ok_or_else(unfit)?;
-        method.parse::<Candidate>()?;
+        method.parse::<Variant>()?;
         // A word that is no JSON is meant as a string.
         let value = serde_json::from_str(value).unwrap_or_else(|_| value.into());
         Ok(Self { method: method.into(), key: key.into(), value })
@@ -231,27 +227,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_back_and_only_the_floor_needs_nothing() {
-        for candidate in Candidate::ALL {
-            assert_eq!(candidate.name().parse::<Candidate>().unwrap(), candidate);
-            let needs_nothing = candidate.features().is_none();
-            assert_eq!(needs_nothing, candidate == Candidate::Whole);
-            assert_eq!(needs_nothing, candidate.settings(0).is_none());
+    fn names_are_read_back_and_only_the_lower_bound_needs_nothing() {
+        for variant in Variant::ALL {
+            assert_eq!(variant.name().parse::<Variant>().unwrap(), variant);
+            let needs_nothing = variant.features().is_none();
+            assert_eq!(needs_nothing, variant == Variant::Whole);
+            assert_eq!(needs_nothing, variant.settings(0).is_none());
         }
-        let error = "magic".parse::<Candidate>().unwrap_err().to_string();
+        let error = "magic".parse::<Variant>().unwrap_err().to_string();
         assert!(error.contains("semfm+image") && error.contains("magic"), "{error}");
     }
 
     #[test]
     fn settings_are_changed_by_name_or_the_fault_is_named() {
         let change = |text: &str| -> Result<TransferSettings> {
-            let base = Candidate::Fused.settings(0).unwrap();
-            text.parse::<Override>()?.apply(Candidate::Fused, base)
+            let base = Variant::Fused.settings(0).unwrap();
+            text.parse::<Override>()?.apply(Variant::Fused, base)
         };
         assert_eq!(change("fused.threshold=0.35").unwrap().threshold, 0.35);
         assert_eq!(change("fused.zoomout.k_final=40").unwrap().zoomout.k_final, 40);
         assert_eq!(change("fused.rule=image").unwrap().rule, Rule::Image);
-        assert_eq!(change("wks.threshold=0.9").unwrap(), Candidate::Fused.settings(0).unwrap());
+        assert_eq!(change("wks.threshold=0.9").unwrap(), Variant::Fused.settings(0).unwrap());
         for bad in ["fused.treshold=1", "fused.threshold=high", "fused", "fused.x", "magic.x=1"] {
             assert!(change(bad).is_err(), "{bad}");
         }

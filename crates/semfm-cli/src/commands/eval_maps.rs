@@ -1,0 +1,88 @@
+//! `semfm-cli eval-maps`: point maps measured on true correspondences.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::{ArgGroup, Args};
+use semfm::geom::ShapeCache;
+use semfm_eval::workers::Workers;
+use semfm_eval::{CorrespondenceDataset, MapResults, MapSettings, report, run_maps};
+use serde_json::json;
+
+use super::Outcome;
+use super::eval::{parsed, wrote};
+use crate::options::Common;
+use crate::talk;
+
+/// Measure point maps against true correspondences: functional maps beside another library
+///
+/// SETS is a folder of sets: `SET/pairs.txt` with a line "source target" for each pair, and
+/// `SET/NAME.npz` with vertices, triangles and the vertex at each sample of a template.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["sets", "report_only"]))]
+#[command(after_help = "Examples:\n  \
+    semfm-cli eval-maps matching -o report\n  \
+    semfm-cli eval-maps matching --methods wks,landmarks+zoomout --samples 0 -o report\n\n\
+    Exit code 0: measured (failed pairs are told in the results). 2: bad input, or nothing could be measured.")]
+pub struct EvaluateMaps {
+    /// Folder of sets
+    sets: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Which methods, by comma: wks, wks+zoomout, wks+orientation+zoomout, landmarks,
+    /// landmarks+zoomout, true20+zoomout [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "A,B")]
+    methods: Vec<String>,
+    /// Samples that an error is the mean of; 0 takes all
+    #[arg(long, default_value_t = MapSettings::default().n_samples, value_name = "N")]
+    samples: usize,
+    /// Pairs at once; 0 takes one for each thread. Results do not depend on it
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    jobs: usize,
+    /// Neither use nor keep prepared shapes
+    #[arg(long)]
+    no_cache: bool,
+    /// Measure nothing: make index.html and table.md anew from the results in the output folder
+    #[arg(long)]
+    report_only: bool,
+}
+
+impl EvaluateMaps {
+    pub fn run(self, common: &Common) -> Result<Outcome> {
+        let Some(sets) = &self.sets else {
+            let files = report::write_maps(&MapResults::read(&self.output)?, &self.output)?;
+            files.iter().for_each(|file| talk::say(file.display()));
+            return Ok(Outcome::Done);
+        };
+        let dataset = CorrespondenceDataset::open(sets)?;
+        let task = talk::watched_with_time_left(common.quiet);
+        let results = run_maps(&dataset, &self.settings(common)?, &task)?;
+        let files = report::write_maps(&results, &self.output)?;
+        if common.json {
+            let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+            talk::say(json!({ "summaries": results.summaries, "files": files }));
+        } else {
+            talk::say(results.to_markdown());
+            wrote(&files);
+        }
+        if results.rows.iter().all(|row| row.error.is_none()) {
+            let first = results.rows.iter().find_map(|row| row.failure.as_deref());
+            bail!("no map could be measured; the first: {}", first.unwrap_or("no pair"));
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn settings(&self, common: &Common) -> Result<MapSettings> {
+        let mut settings = MapSettings {
+            n_samples: self.samples,
+            workers: Workers::new(common.threads, self.jobs),
+            cache: if self.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            ..MapSettings::default()
+        };
+        if !self.methods.is_empty() {
+            settings.methods = parsed(&self.methods)?;
+        }
+        Ok(settings)
+    }
+}
