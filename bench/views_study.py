@@ -6,17 +6,16 @@
 
 DATA is a folder as `semfm-cli eval` takes it. For every protocol below, each labelled object is
 drawn (`semfm-cli views`), embedded (`semfm.sidecar`, so the package must be installed) and every
-pair is carried (`semfm-cli eval --methods fused`). What is finished is kept in the output folder
-and not done again; `table.md` there holds all protocols so far.
+pair is evaluated (`semfm-cli eval --methods fused`), compared with `default`. What is finished is
+kept in the output folder and not done again; `table.md` there holds all protocols so far.
 
 Objects are halved by turns within each group, in alphabetical order. A -> A are the pairs inside
 the half that choices may be made on, B -> B those inside the other. Differences are to `default`,
-pair by pair, with a 95 % interval from resampling the objects.
+pair by pair, with a 95 % interval from resampling the objects (`semfm-cli eval --compare`).
 """
 
 import argparse
 import json
-import random
 import shutil
 import statistics
 import subprocess
@@ -28,9 +27,12 @@ from pathlib import Path
 #: has two of them, so every pair that they are in sees colour on one side only.
 ONE_SIDE = "colours"
 
+#: The protocol that the others are compared with.
+DEFAULT = "default"
+
 #: Name -> (options of `semfm-cli views`, rolls of each picture).
 PROTOCOLS = {
-    "default": ("", 4),
+    DEFAULT: ("", 4),
     "1 roll": ("", 1),
     "2 rolls": ("", 2),
     "6 views": ("--count 6", 4),
@@ -95,24 +97,29 @@ def embed(binary: str, mesh: Path, options: str, rolls: int, output: Path) -> No
     views.unlink()
 
 
-def measure(args: argparse.Namespace, name: str, objects: list[Path], pool) -> dict:
-    """One protocol: the rows of its pairs."""
+def measure(args: argparse.Namespace, name: str, objects: list[Path], pool) -> None:
+    """One protocol: draws, embeds and evaluates it into its folder."""
     options, rolls = PROTOCOLS[name]
-    folder = args.output / "work"
-    shutil.rmtree(folder, ignore_errors=True)
-    (folder / "embedded").mkdir(parents=True)
-    outputs = [folder / "embedded" / f"{mesh.stem}.emb.mcap" for mesh in objects]
+    embedded, report = args.output / "embedded", folder_of(args, name)
+    shutil.rmtree(embedded, ignore_errors=True)
+    embedded.mkdir(parents=True)
+    outputs = [embedded / f"{mesh.stem}.emb.mcap" for mesh in objects]
     n = len(objects)
     list(pool.map(embed, [args.binary] * n, objects, [options] * n, [rolls] * n, outputs))
-    command = [args.binary, "eval", args.data, "--embeddings", folder / "embedded"]
+    command = [args.binary, "eval", args.data, "--embeddings", embedded, "-o", report]
     command += ["--methods", "fused", "--gallery", 0, "--no-predictions", "--fresh", "--quiet"]
-    command += ["-o", folder / "report"]
+    if name != DEFAULT:
+        command += ["--compare", folder_of(args, DEFAULT) / "results.json"]
     subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
-    rows = json.loads((folder / "report" / "results.json").read_text())["rows"]
-    shutil.rmtree(folder)
-    kept = ("group", "source", "target", "iou", "confidence")
-    rows = [{key: row[key] for key in kept} for row in rows]
-    return {"options": options, "rolls": rolls, "rows": rows}
+    shutil.rmtree(embedded)
+
+
+def folder_of(args: argparse.Namespace, name: str) -> Path:
+    return args.output / name
+
+
+def read(folder: Path, name: str) -> dict:
+    return json.loads((folder / name).read_text())
 
 
 def halves(rows: list[dict]) -> dict[str, str]:
@@ -124,49 +131,40 @@ def halves(rows: list[dict]) -> dict[str, str]:
     return half
 
 
-def difference(rows: list[dict], base: dict) -> tuple[float, float, float]:
-    """Mean of the paired differences and its interval, objects resampled."""
-    pairs = [(row["source"], row["target"]) for row in rows]
-    gains = [row["iou"] - base[pair] for row, pair in zip(rows, pairs)]
-    names, rng, means = sorted({name for pair in pairs for name in pair}), random.Random(0), []
-    for _ in range(2000):
-        counts = dict.fromkeys(names, 0)
-        for name in rng.choices(names, k=len(names)):
-            counts[name] += 1
-        weights = [counts[a] * counts[b] for a, b in pairs]
-        if sum(weights):
-            means.append(sum(w * g for w, g in zip(weights, gains)) / sum(weights))
-    means.sort()
-    return statistics.mean(gains), means[len(means) // 40], means[-len(means) // 40]
+def summary(results: dict, scope: str) -> dict:
+    return next(one for one in results["summaries"] if one["scope"] == scope)
 
 
-def category_mean(rows: list[dict]) -> float:
-    by_category: dict[str, list[float]] = {}
-    for row in rows:
-        by_category.setdefault(row["group"][:1], []).append(row["iou"])
-    return statistics.mean(map(statistics.mean, by_category.values()))
+def difference(folder: Path) -> str:
+    """Mean of the paired differences to `default` and its interval."""
+    if not (folder / "compare.json").is_file():
+        return "–"
+    change = read(folder, "compare.json")["methods"][0]
+    low, high = change["interval"]
+    return f"{change['now'] - change['before']:+.3f} ({low:+.3f} … {high:+.3f})"
 
 
-def table(measured: dict[str, dict]) -> str:
-    base_rows = measured["default"]["rows"]
-    base = {(row["source"], row["target"]): row["iou"] for row in base_rows}
-    half = halves(base_rows)
+def table(measured: dict[str, Path]) -> str:
+    half = halves(read(measured[DEFAULT], "results.json")["rows"])
     heads = "protocol | pictures | all | categories | < .3 | A → A | B → B | against the default"
     lines = [f"| {heads} |", "| --- " * 8 + "|"]
-    for name, one in measured.items():
-        rows = one["rows"]
-        ious = [row["iou"] for row in rows]
-        words = dict(zip(one["options"].split()[::2], one["options"].split()[1::2]))
+    for name, folder in measured.items():
+        results = read(folder, "results.json")
+        options, rolls = PROTOCOLS[name]
+        words = dict(zip(options.split()[::2], options.split()[1::2]))
         shots = int(words.get("--count", 14)) * (1 + int(words.get("--close-ups", 0)))
-        low_share = sum(iou < 0.3 for iou in ious) / len(ious)
-        numbers = [statistics.mean(ious), category_mean(rows), low_share]
+        over_all = summary(results, "all")
+        numbers = [over_all["mean"], summary(results, "mean_of_categories")["mean"]]
+        numbers.append(over_all["below_poor"])
         for letter in "AB":
-            inside = [row for row in rows if half[row["source"]] == half[row["target"]] == letter]
-            numbers.append(statistics.mean(row["iou"] for row in inside))
-        mean, low, high = difference(rows, base)
-        cells = [name, str(shots * one["rolls"]), *(f"{number:.3f}" for number in numbers)]
-        cells.append(f"{mean:+.3f} ({low:+.3f} … {high:+.3f})")
-        lines.append("| " + " | ".join(cells) + " |")
+            inside = [
+                row["iou"]
+                for row in results["rows"]
+                if half[row["source"]] == half[row["target"]] == letter
+            ]
+            numbers.append(statistics.mean(inside))
+        cells = [name, str(shots * rolls), *(f"{number:.3f}" for number in numbers)]
+        lines.append("| " + " | ".join([*cells, difference(folder)]) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -189,19 +187,18 @@ def main() -> None:
     names = sorted({name for group in pairs.values() for pair in group for name in pair})
     objects = [find(args.data, name) for name in names]
     args.output.mkdir(parents=True, exist_ok=True)
-    wanted = args.only or list(PROTOCOLS)
+    wanted = {DEFAULT, *(args.only or PROTOCOLS)}
     measured = {}
     with ProcessPoolExecutor(args.jobs, None, open_worker, (args.encoder, 1)) as pool:
         for name in PROTOCOLS:
-            kept = args.output / f"{name}.json"
-            if not kept.is_file() and name in wanted:
-                kept.write_text(json.dumps(measure(args, name, objects, pool)))
-            if kept.is_file():
-                measured[name] = json.loads(kept.read_text())
-                if "default" in measured:
-                    text = table(measured)
-                    (args.output / "table.md").write_text(text)
-                    print(text.splitlines()[-1], file=sys.stderr, flush=True)
+            folder = folder_of(args, name)
+            if not (folder / "results.json").is_file() and name in wanted:
+                measure(args, name, objects, pool)
+            if (folder / "results.json").is_file():
+                measured[name] = folder
+                text = table(measured)
+                (args.output / "table.md").write_text(text)
+                print(text.splitlines()[-1], file=sys.stderr, flush=True)
     print(args.output / "table.md")
 
 
