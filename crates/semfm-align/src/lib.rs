@@ -17,25 +17,57 @@
 //!   are seen), the same question settles it.
 
 mod align;
-mod certainty;
-mod depth;
+mod alignment;
+mod correspondence;
+mod depth_image;
+mod downsample;
 mod error;
-mod field;
+mod extent;
+mod gauss_newton;
+mod initial_pose;
+mod judgement;
+mod kernel;
 mod model;
+mod nearest_table;
 mod observation;
+mod oriented_point;
+mod refine;
+mod rotations;
 mod search;
-mod settle;
-mod sight;
+mod settings;
+mod silhouette;
 mod sim3;
-mod solve;
-mod starts;
-mod thin;
+mod uncertainty;
 mod verdict;
+mod visibility;
+mod weak_directions;
 
-pub use align::{AlignSettings, Alignment, align, align_model};
-pub use depth::{DepthImage, Intrinsics};
+pub use align::{align, align_model};
+pub use alignment::Alignment;
+pub use depth_image::{DepthImage, DepthPoints};
 pub use error::{Error, Result};
 pub use model::AlignModel;
 pub use observation::Observation;
+pub use settings::AlignSettings;
 pub use sim3::Sim3;
 pub use verdict::Verdict;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_send_sync<T: Send + Sync>() {}
+
+    #[test]
+    fn public_types_can_be_shared_between_threads() {
+        assert_send_sync::<AlignModel>();
+        assert_send_sync::<AlignSettings>();
+        assert_send_sync::<Alignment>();
+        assert_send_sync::<DepthImage>();
+        assert_send_sync::<DepthPoints>();
+        assert_send_sync::<Error>();
+        assert_send_sync::<Observation>();
+        assert_send_sync::<Sim3>();
+        assert_send_sync::<Verdict>();
+    }
+}

@@ -1,4 +1,4 @@
-//! The reconstruction, made ready to be found: measured in its own radius, sampled, indexed.
+//! The mesh that is sought: in units of its own radius, sampled, indexed.
 
 use rayon::prelude::*;
 use semfm_geom::math::DVec3;
@@ -6,9 +6,10 @@ use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, SurfaceIndex, Task};
 
 use crate::Result;
-use crate::field::{NearestField, Sample};
+use crate::nearest_table::NearestTable;
+use crate::oriented_point::OrientedPoint;
+use crate::rotations::super_fibonacci;
 use crate::sim3::Sim3;
-use crate::starts::rotations;
 
 /// Samples of the surface, uniform by area: about 3 % of the diagonal apart on a round object.
 const N_SAMPLES: usize = 2000;
@@ -16,13 +17,16 @@ const N_SAMPLES: usize = 2000;
 /// How far the tables of nearest samples reach beyond the object, in its radii.
 const REACH: f64 = 0.4;
 
-/// Rays that ask which way the triangles face.
+/// Rays that find out which way the triangles face.
 const N_RAYS: usize = 128;
 
 /// From this share of rays on that meet a front (or a back), the winding is believed.
 const WOUND: f64 = 0.9;
 
-/// A mesh that observations are aligned to: built once, asked often.
+/// 78°: a triangle that leans further away from a point's normal is another side of the object.
+const LEAST_COSINE: f64 = 0.2;
+
+/// A mesh that observations are aligned to, prepared once for many of them.
 ///
 /// Inside, lengths are radii of the object from the centre of its bounding box, so that any frame
 /// and any unit will do. Triangles may be wound outward, inward or anyhow; the last costs the
@@ -35,8 +39,8 @@ pub struct AlignModel {
     pub(crate) normals: Vec<DVec3>,
     /// Whether the sign of a normal says nothing.
     pub(crate) both_sides: bool,
-    pub(crate) samples: Vec<Sample>,
-    pub(crate) field: NearestField,
+    pub(crate) samples: Vec<OrientedPoint>,
+    pub(crate) nearest: NearestTable,
 }
 
 impl AlignModel {
@@ -62,13 +66,13 @@ impl AlignModel {
             normals.iter_mut().for_each(|normal| *normal = -*normal);
         }
         let both_sides = front > 1.0 - WOUND && front < WOUND;
-        let samples: Vec<Sample> = sample_uniform(&unit, N_SAMPLES, seed)?
+        let samples: Vec<OrientedPoint> = sample_uniform(&unit, N_SAMPLES, seed)?
             .iter()
-            .map(|s| Sample { point: s.point, normal: normals[s.face as usize] })
+            .map(|s| OrientedPoint { point: s.point, normal: normals[s.face as usize] })
             .collect();
-        let field = NearestField::new(&samples, REACH, both_sides);
+        let nearest = NearestTable::new(&samples, REACH, both_sides);
         let object_from_unit = Sim3 { scale: radius, translation: centre, ..Sim3::IDENTITY };
-        Ok(Self { object_from_unit, surface, normals, both_sides, samples, field })
+        Ok(Self { object_from_unit, surface, normals, both_sides, samples, nearest })
     }
 
     /// The nearest point of the surface within a distance, among the triangles that lean as
@@ -78,15 +82,17 @@ impl AlignModel {
         query: DVec3,
         normal: DVec3,
         within: f64,
-    ) -> Option<(DVec3, DVec3)> {
-        /// 78°: what leans away further is another side of the object.
-        const LEAST_COSINE: f64 = 0.2;
-        let leans = |face: u32| {
-            let cosine = self.normals[face as usize].dot(normal);
-            (if self.both_sides { cosine.abs() } else { cosine }) >= LEAST_COSINE
-        };
-        let hit = self.surface.closest_among(query, within, leans)?;
-        Some((hit.point, self.normals[hit.face as usize]))
+    ) -> Option<OrientedPoint> {
+        let hit = self.surface.closest_among(query, within, |face| {
+            self.agreement(self.normals[face as usize], normal) >= LEAST_COSINE
+        })?;
+        Some(OrientedPoint { point: hit.point, normal: self.normals[hit.face as usize] })
+    }
+
+    /// Cosine between two normals; its absolute value where the sign of a normal says nothing.
+    pub(crate) fn agreement(&self, a: DVec3, b: DVec3) -> f64 {
+        let cosine = a.dot(b);
+        if self.both_sides { cosine.abs() } else { cosine }
     }
 }
 
@@ -102,7 +108,7 @@ impl std::fmt::Debug for AlignModel {
 
 /// Of the triangles that are seen first from outside, the share whose front is seen.
 fn front_share(surface: &SurfaceIndex, normals: &[DVec3]) -> f64 {
-    let fronts: Vec<bool> = rotations(N_RAYS)
+    let fronts: Vec<bool> = super_fibonacci(N_RAYS)
         .collect::<Vec<_>>()
         .par_iter()
         .filter_map(|turn| {
@@ -112,9 +118,11 @@ fn front_share(surface: &SurfaceIndex, normals: &[DVec3]) -> f64 {
             Some(normals[hit.face as usize].dot(from) > 0.0)
         })
         .collect();
-    let n = fronts.len().max(1);
-    // An object that no ray meets is thin all over: nothing is known.
-    if fronts.is_empty() { 0.5 } else { fronts.iter().filter(|&&f| f).count() as f64 / n as f64 }
+    if fronts.is_empty() {
+        // An object that no ray meets is thin all over: nothing is known.
+        return 0.5;
+    }
+    fronts.iter().filter(|&&front| front).count() as f64 / fronts.len() as f64
 }
 
 #[cfg(test)]
@@ -122,20 +130,20 @@ mod tests {
     use super::*;
     use semfm_geom::zoo;
 
+    /// The mesh with every `every`th triangle wound the other way.
+    fn with_turned_faces(mesh: &Mesh, every: usize) -> Mesh {
+        let faces = mesh.faces().iter().enumerate();
+        let faces = faces
+            .map(|(i, &[a, b, c])| if i % every == 0 { [a, c, b] } else { [a, b, c] })
+            .collect();
+        Mesh::new(mesh.vertices().to_vec(), faces).unwrap()
+    }
+
     #[test]
     fn the_winding_is_found_out() {
-        let sphere = zoo::icosphere(2);
-        let turned = |every: usize| {
-            let faces = sphere.faces().iter().enumerate();
-            let faces = faces
-                .map(|(i, &[a, b, c])| if i % every == 0 { [a, c, b] } else { [a, b, c] })
-                .collect();
-            Mesh::new(sphere.vertices().to_vec(), faces).unwrap()
-        };
-        for (mesh, both_sides) in
-            [(turned(usize::MAX), false), (turned(1), false), (turned(2), true)]
-        {
-            // `turned(usize::MAX)` turns the first triangle only.
+        // `usize::MAX` turns the first triangle only.
+        for (every, both_sides) in [(usize::MAX, false), (1, false), (2, true)] {
+            let mesh = with_turned_faces(&zoo::icosphere(2), every);
             let model = AlignModel::new(&mesh, 0, &Task::default()).unwrap();
             assert_eq!(model.both_sides, both_sides);
             let outward = model.samples.iter().filter(|s| s.normal.dot(s.point) > 0.0).count();

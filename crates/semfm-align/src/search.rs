@@ -2,14 +2,16 @@
 
 use rayon::prelude::*;
 use semfm_geom::Task;
-use semfm_geom::math::DVec3;
+use semfm_geom::math::{DQuat, DVec3};
 
 use crate::Result;
-use crate::observation::Evidence;
-use crate::sight::Seen;
+use crate::correspondence::{NearestBy, Problem};
+use crate::initial_pose::fit_extent;
+use crate::kernel::geman_mcclure;
+use crate::observation::Coverage;
+use crate::rotations::{around_guess, super_fibonacci};
 use crate::sim3::Sim3;
-use crate::solve::{Matching, Problem, geman_mcclure};
-use crate::starts::{fit_extent, rotations, rotations_nearby};
+use crate::visibility::Visibility;
 
 /// Points of the first round; each start takes about .2 ms.
 const FIRST_POINTS: usize = 160;
@@ -35,6 +37,9 @@ const WIDTHS: [f64; 3] = [0.25, 0.05, 0.02];
 /// Width by which poses are scored, as a share of the observed diameter: about 3 mm on a mug.
 const SCORE_WIDTH: f64 = 0.025;
 
+/// A point whose normal agrees this well with its match's counts in full for the score.
+const FULL_AGREEMENT: f64 = 0.7;
+
 /// An initial pose that scores this much is believed without trying others.
 const GOOD_ENOUGH: f64 = 0.7;
 
@@ -43,151 +48,185 @@ const SAME: f64 = 0.06;
 
 /// A pose (camera from the model's inner frame) and how much it explains, 0 to 1.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
+pub(crate) struct ScoredPose {
     pub pose: Sim3,
     pub score: f64,
 }
 
+/// What a search found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SearchResult {
+    pub best: ScoredPose,
+    /// The best of the poses with another place of the surface.
+    pub rival: Option<ScoredPose>,
+    /// Starts tried.
+    pub n_starts: usize,
+}
+
+/// How the poses of one round are refined and scored.
+struct Round {
+    /// Ids of the observed points that take part.
+    ids: Vec<u32>,
+    /// First and last width of the kernel, metres.
+    widths: [f64; 2],
+    n_steps: usize,
+    nearest_by: NearestBy,
+    /// Every so many-th sample of the model takes part in the score.
+    every: usize,
+}
+
 impl Problem<'_> {
-    /// The best pose found, the best of the others (with another place of the surface), and how
-    /// many starts were tried. `None` where no start leads anywhere.
+    /// The best pose found, and the best of those that place the surface elsewhere. `None` where no
+    /// start leads anywhere.
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::Cancelled`].
     pub fn search(
         &self,
-        init: Option<Sim3>,
+        guess: Option<Sim3>,
         n_starts: usize,
         task: &Task,
-    ) -> Result<Option<(Candidate, Option<Candidate>, usize)>> {
+    ) -> Result<Option<SearchResult>> {
         let mut n_tried = 0;
-        if let Some(init) = init {
-            let starts = self.around(init.rotation, [init].into_iter());
+        if let Some(guess) = guess {
+            let starts = self.starts(guess.rotation, Some(guess));
             n_tried += starts.len();
-            let found = self.rounds(starts, task)?;
+            let found = self.all_rounds(starts, task)?;
             if found.first().is_some_and(|best| best.score >= GOOD_ENOUGH) {
-                return Ok(self.best_and_rival(found).map(|(best, rival)| (best, rival, n_tried)));
+                return Ok(self.best_and_rival(&found, n_tried));
             }
         }
-        let starts: Vec<Sim3> = match init {
-            Some(init) => rotations_nearby()
-                .flat_map(|turn| {
-                    let moved = Sim3 { rotation: turn * init.rotation, ..init };
-                    self.around(moved.rotation, [moved].into_iter())
-                })
-                .chain([init])
+        let starts: Vec<Sim3> = match guess {
+            Some(guess) => around_guess()
+                .map(|turn| Sim3 { rotation: turn * guess.rotation, ..guess })
+                .flat_map(|turned| self.starts(turned.rotation, Some(turned)))
+                .chain([guess])
                 .collect(),
-            None => rotations(n_starts).flat_map(|r| self.around(r, std::iter::empty())).collect(),
+            None => {
+                super_fibonacci(n_starts).flat_map(|rotation| self.starts(rotation, None)).collect()
+            }
         };
         n_tried += starts.len();
-        let found = self.rounds(starts, task)?;
-        Ok(self.best_and_rival(found).map(|(best, rival)| (best, rival, n_tried)))
+        let found = self.all_rounds(starts, task)?;
+        Ok(self.best_and_rival(&found, n_tried))
     }
 
-    /// The given starts and the one that fits the observed extent, scales brought into bounds.
-    fn around(
-        &self,
-        rotation: semfm_geom::math::DQuat,
-        given: impl Iterator<Item = Sim3>,
-    ) -> Vec<Sim3> {
+    /// The given start and the one with this rotation that fits the observed extent, scales brought
+    /// into bounds.
+    fn starts(&self, rotation: DQuat, given: Option<Sim3>) -> Vec<Sim3> {
         given
+            .into_iter()
             .chain(fit_extent(self.model, self.observed, rotation))
             .map(|pose| Sim3 { scale: pose.scale.clamp(self.scales[0], self.scales[1]), ..pose })
             .collect()
     }
 
     /// All three rounds; the best first.
-    fn rounds(&self, starts: Vec<Sim3>, task: &Task) -> Result<Vec<Candidate>> {
-        let size = self.observed.diameter();
-        let [first, second, third] =
-            [FIRST_POINTS, SECOND_POINTS, THIRD_POINTS].map(|n| self.observed.some(n));
-        let [wide, narrow, fine] = WIDTHS.map(|share| share * size);
+    fn all_rounds(&self, starts: Vec<Sim3>, task: &Task) -> Result<Vec<ScoredPose>> {
+        let [wide, narrow, fine] = WIDTHS.map(|share| share * self.observed.diameter());
+        let first = Round {
+            ids: self.observed.subset(FIRST_POINTS),
+            widths: [wide, narrow],
+            n_steps: FIRST_STEPS,
+            nearest_by: NearestBy::Table,
+            every: 3,
+        };
+        let second = Round {
+            ids: self.observed.subset(SECOND_POINTS),
+            widths: [1.6 * narrow, 0.7 * narrow],
+            n_steps: SECOND_STEPS,
+            nearest_by: NearestBy::Table,
+            every: 1,
+        };
+        let third = Round {
+            ids: self.observed.subset(THIRD_POINTS),
+            widths: [narrow, fine],
+            n_steps: THIRD_STEPS,
+            nearest_by: NearestBy::Triangles,
+            every: 1,
+        };
         let n = starts.len();
-        let found = self.round(starts, task, |pose| {
-            let pose = self.anneal(pose, &first, [wide, narrow], FIRST_STEPS, Matching::Coarse)?;
-            Some(Candidate { pose, score: self.score(&pose, &first, Matching::Coarse, 3) })
-        })?;
-        task.step("align", n, n + SECOND_POSES + THIRD_POSES)?;
-        let chosen = self.distinct(found, SECOND_POSES);
-        let found = self.round(chosen, task, |pose| {
-            let widths = [1.6 * narrow, 0.7 * narrow];
-            let pose = self.anneal(pose, &second, widths, SECOND_STEPS, Matching::Coarse)?;
-            Some(Candidate { pose, score: self.score(&pose, &second, Matching::Coarse, 1) })
-        })?;
-        task.step("align", n + SECOND_POSES, n + SECOND_POSES + THIRD_POSES)?;
-        let chosen = self.distinct(found, THIRD_POSES);
-        let found = self.round(chosen, task, |pose| {
-            let widths = [narrow, fine];
-            let pose = self.anneal(pose, &third, widths, THIRD_STEPS, Matching::Exact)?;
-            Some(Candidate { pose, score: self.score(&pose, &third, Matching::Exact, 1) })
-        })?;
-        Ok(found)
+        let n_all = n + SECOND_POSES + THIRD_POSES;
+        let found = self.round(&first, starts, task)?;
+        task.step("align", n, n_all)?;
+        let found = self.round(&second, distinct(&found, SECOND_POSES), task)?;
+        task.step("align", n + SECOND_POSES, n_all)?;
+        self.round(&third, distinct(&found, THIRD_POSES), task)
     }
 
-    /// The poses that `work` makes of others, the highest score first, ties in order.
-    fn round(
-        &self,
-        poses: Vec<Sim3>,
-        task: &Task,
-        work: impl Fn(Sim3) -> Option<Candidate> + Sync,
-    ) -> Result<Vec<Candidate>> {
-        let work = |pose| task.check().map(|()| work(pose));
-        let found: semfm_geom::Result<Vec<_>> = if poses.len() < 3 {
-            poses.into_iter().map(work).collect()
+    /// The poses refined and scored, the highest score first, ties in order.
+    fn round(&self, round: &Round, poses: Vec<Sim3>, task: &Task) -> Result<Vec<ScoredPose>> {
+        let found: semfm_geom::Result<Vec<Option<ScoredPose>>> = if poses.len() < 3 {
+            poses.into_iter().map(|pose| self.refined(round, pose, task)).collect()
         } else {
-            poses.into_par_iter().map(work).collect()
+            poses.into_par_iter().map(|pose| self.refined(round, pose, task)).collect()
         };
-        let mut found: Vec<Candidate> = found?.into_iter().flatten().collect();
+        let mut found: Vec<ScoredPose> = found?.into_iter().flatten().collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(found)
     }
 
+    /// `None` for a pose under which nothing matches.
+    fn refined(
+        &self,
+        round: &Round,
+        start: Sim3,
+        task: &Task,
+    ) -> semfm_geom::Result<Option<ScoredPose>> {
+        task.check()?;
+        let Round { ids, widths, n_steps, nearest_by, every } = round;
+        let refined = self.anneal(start, ids, *widths, *n_steps, *nearest_by);
+        Ok(refined.map(|pose| {
+            let score = self.score(&pose, ids, *nearest_by, *every);
+            ScoredPose { pose, score }
+        }))
+    }
+
     /// How much a pose explains: the share of observed points on the model times the share of the
-    /// model's visible side that was observed. Every `every`th sample of the model is asked.
-    fn score(&self, pose: &Sim3, ids: &[u32], matching: Matching, every: usize) -> f64 {
+    /// model's visible side that was observed. Every `every`th sample of the model takes part.
+    fn score(&self, pose: &Sim3, ids: &[u32], nearest_by: NearestBy, every: usize) -> f64 {
         let width = SCORE_WIDTH * self.observed.diameter();
         let mut on_model = 0.0;
-        self.pulls(pose, ids, width, matching, |_, pull| {
-            on_model += geman_mcclure(pull.squared, width) * pull.agreement.min(0.7) / 0.7;
+        self.for_each_correspondence(pose, ids, width, nearest_by, |c| {
+            on_model +=
+                geman_mcclure(c.squared, width) * c.agreement.min(FULL_AGREEMENT) / FULL_AGREEMENT;
         });
-        on_model / ids.len().max(1) as f64 * self.seen(pose, 2.0 * width, every, false).share()
+        on_model / ids.len().max(1) as f64
+            * self.visibility(pose, 2.0 * width, every, false).share()
     }
 
-    /// How the visible side of the model compares with what was observed.
-    pub fn seen(&self, pose: &Sim3, tolerance: f64, every: usize, exact: bool) -> Seen {
-        match &self.observed.evidence {
-            Evidence::Sight(sight) => sight.compare(self.model, pose, tolerance, every, exact),
-            Evidence::AllAround { index, spacing } => {
-                let near = |point: DVec3| index.nearest(pose.apply(point)).1 <= tolerance + spacing;
-                let samples = self.model.samples.iter().step_by(3 * every);
-                let mut seen = Seen::default();
-                samples.for_each(|s| match near(s.point) {
-                    true => seen.explained += 1,
-                    false => seen.violating += 1,
-                });
-                seen
+    /// How the visible side of the model compares with what was observed; with `exact`, rays tell
+    /// what the model itself hides. `tolerance` in metres.
+    pub fn visibility(&self, pose: &Sim3, tolerance: f64, every: usize, exact: bool) -> Visibility {
+        match &self.observed.coverage {
+            Coverage::SingleView(silhouette) => {
+                silhouette.compare(self.model, pose, tolerance, every, exact)
+            }
+            Coverage::AllAround { index, spacing } => {
+                let mut visibility = Visibility::default();
+                for sample in self.model.samples.iter().step_by(3 * every) {
+                    let distance = index.nearest(pose.apply(sample.point)).1;
+                    if distance <= tolerance + spacing {
+                        visibility.explained += 1;
+                    } else {
+                        visibility.violating += 1;
+                    }
+                }
+                visibility
             }
         }
-    }
-
-    /// Poses of the first `n` candidates that differ.
-    fn distinct(&self, found: Vec<Candidate>, n: usize) -> Vec<Sim3> {
-        let mut kept: Vec<Sim3> = Vec::with_capacity(n);
-        for candidate in found {
-            if kept.len() == n {
-                break;
-            }
-            if kept.iter().all(|other| corner_distance(other, &candidate.pose) > SAME) {
-                kept.push(candidate.pose);
-            }
-        }
-        kept
     }
 
     /// The best, and the best of those that place the surface elsewhere: a symmetric object turned
-    /// about its axis is no rival.
-    fn best_and_rival(&self, found: Vec<Candidate>) -> Option<(Candidate, Option<Candidate>)> {
+    /// about its axis is no rival. `found` has the best first.
+    fn best_and_rival(&self, found: &[ScoredPose], n_starts: usize) -> Option<SearchResult> {
         let best = *found.first()?;
-        let elsewhere =
-            |other: &&Candidate| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0;
-        Some((best, found.iter().skip(1).find(elsewhere).copied()))
+        let rival = found
+            .iter()
+            .skip(1)
+            .find(|other| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0)
+            .copied();
+        Some(SearchResult { best, rival, n_starts })
     }
 
     /// Mean distance from the surface at one pose to the surface at another, in radii (ADD-S,
@@ -204,13 +243,26 @@ impl Problem<'_> {
     }
 }
 
+/// The first `n` poses that differ from each other.
+fn distinct(found: &[ScoredPose], n: usize) -> Vec<Sim3> {
+    let mut kept: Vec<Sim3> = Vec::with_capacity(n);
+    for candidate in found {
+        if kept.len() == n {
+            break;
+        }
+        if kept.iter().all(|other| corner_distance(other, &candidate.pose) > SAME) {
+            kept.push(candidate.pose);
+        }
+    }
+    kept
+}
+
 /// Largest distance that a corner of the model's bounding cube moves from one pose to the other, in
 /// radii of the first.
 fn corner_distance(a: &Sim3, b: &Sim3) -> f64 {
     (0..8)
         .map(|i| {
-            let sign = |bit: i32| if i >> bit & 1 == 0 { -0.6 } else { 0.6 };
-            let corner = DVec3::new(sign(0), sign(1), sign(2));
+            let corner = DVec3::from_array([0, 1, 2].map(|k| [-0.6, 0.6][i >> k & 1]));
             a.apply(corner).distance(b.apply(corner)) / a.scale
         })
         .fold(0.0, f64::max)

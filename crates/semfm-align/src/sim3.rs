@@ -2,10 +2,14 @@
 
 use std::ops::Mul;
 
+use nalgebra::SVector;
 use parry3d_f64::math::Pose;
 use semfm_geom::math::{DMat3, DQuat, DVec3};
 
 use crate::{Error, Result};
+
+/// A small similarity as seven numbers: rotation vector (radians), shift, logarithm of the scale.
+pub(crate) type Tangent = SVector<f64, 7>;
 
 /// How far the rotation part of a given matrix may be from a multiple of a rotation, relative to
 /// its scale: matrices printed with six digits pass.
@@ -35,21 +39,19 @@ impl Sim3 {
     /// [`Error::OutOfRange`] for numbers that are not finite, a last row other than 0 0 0 1, a
     /// mirror image, or a linear part that is no multiple of a rotation.
     pub fn from_rows(rows: [[f64; 4]; 4]) -> Result<Self> {
-        let refuse = |expected: &str, found: String| {
-            let (what, expected) = ("4 × 4 matrix", expected.into());
-            Err(Error::OutOfRange { what, expected, found })
-        };
         if let Some(x) = rows.iter().flatten().find(|x| !x.is_finite()) {
-            return refuse("finite numbers", x.to_string());
+            return Err(not_a_similarity("finite numbers", x.to_string()));
         }
         if rows[3] != [0.0, 0.0, 0.0, 1.0] {
-            return refuse("a last row of 0 0 0 1", format!("{:?}", rows[3]));
+            let [a, b, c, d] = rows[3];
+            return Err(not_a_similarity("a last row of 0 0 0 1", format!("{a} {b} {c} {d}")));
         }
-        let row = |k: usize| DVec3::new(rows[k][0], rows[k][1], rows[k][2]);
-        let linear = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        let [x, y, z] = [0, 1, 2].map(|k| DVec3::new(rows[k][0], rows[k][1], rows[k][2]));
+        let linear = DMat3::from_cols(x, y, z).transpose();
         let volume = linear.determinant();
         if volume <= 0.0 {
-            return refuse("a rotation times a positive scale", format!("determinant {volume}"));
+            let found = format!("determinant {volume}");
+            return Err(not_a_similarity("a rotation times a positive scale", found));
         }
         let scale = volume.cbrt();
         let turn = linear * (1.0 / scale);
@@ -57,7 +59,7 @@ impl Sim3 {
         let worst = defect.iter().fold(0.0f64, |worst, x| worst.max(x.abs()));
         if worst > SIMILARITY_TOLERANCE {
             let found = format!("a matrix {worst:.1e} away from one");
-            return refuse("a rotation times one scale", found);
+            return Err(not_a_similarity("a rotation times one scale", found));
         }
         let rotation = DQuat::from_mat3(&turn).normalize();
         Ok(Self { scale, rotation, translation: DVec3::new(rows[0][3], rows[1][3], rows[2][3]) })
@@ -76,7 +78,7 @@ impl Sim3 {
         self.scale * (self.rotation * point) + self.translation
     }
 
-    /// The way back.
+    /// `b_from_a`.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.conjugate();
         let scale = 1.0 / self.scale;
@@ -90,9 +92,9 @@ impl Sim3 {
         Pose::from_parts(self.translation, self.rotation)
     }
 
-    /// This transform after a small one of the right-hand frame: turned by the rotation vector
+    /// This transform moved a little within its right-hand frame: turned by the rotation vector
     /// `turn`, moved by `shift`, grown by the factor exp(`growth`).
-    pub(crate) fn then_within(&self, turn: DVec3, shift: DVec3, growth: f64) -> Self {
+    pub(crate) fn moved_within(&self, turn: DVec3, shift: DVec3, growth: f64) -> Self {
         let small = Self {
             scale: growth.exp(),
             rotation: DQuat::from_scaled_axis(turn),
@@ -101,6 +103,29 @@ impl Sim3 {
         let moved = *self * small;
         Self { rotation: moved.rotation.normalize(), ..moved }
     }
+}
+
+impl Sim3 {
+    /// This transform moved along a direction of its right-hand frame, as a screw with growth, so
+    /// that a point that stays at first stays for good:
+    ///
+    /// > a_from_b · exp(distance · direction),  exp(x) = exp(x/64)⁶⁴
+    ///
+    /// where exp(x/64) is taken to first order in the shift, exactly in rotation and scale.
+    pub(crate) fn moved_along(&self, direction: &Tangent, distance: f64) -> Self {
+        let [rx, ry, rz, tx, ty, tz] = [0, 1, 2, 3, 4, 5].map(|k| direction[k] * distance / 64.0);
+        let (turn, shift) = (DVec3::new(rx, ry, rz), DVec3::new(tx, ty, tz));
+        let mut small = Self::IDENTITY.moved_within(turn, shift, direction[6] * distance / 64.0);
+        for _ in 0..6 {
+            small = small * small;
+        }
+        let moved = *self * small;
+        Self { rotation: moved.rotation.normalize(), ..moved }
+    }
+}
+
+fn not_a_similarity(expected: &str, found: String) -> Error {
+    Error::OutOfRange { what: "4 × 4 matrix", expected: expected.into(), found }
 }
 
 impl Mul for Sim3 {
@@ -130,9 +155,9 @@ mod tests {
         let back = Sim3::from_rows(a.to_rows()).unwrap();
         assert!(back.apply(p).distance(a.apply(p)) < 1e-15);
         assert!(a.inverse().apply(a.apply(p)).distance(p) < 1e-14);
-        let b = a.then_within(DVec3::new(0.1, 0.2, -0.3), DVec3::X, 0.4);
+        let b = a.moved_within(DVec3::new(0.1, 0.2, -0.3), DVec3::X, 0.4);
         assert!((a * b).apply(p).distance(a.apply(b.apply(p))) < 1e-14);
-        assert!(Sim3::IDENTITY.then_within(DVec3::ZERO, DVec3::ZERO, 0.0).apply(p) == p);
+        assert!(Sim3::IDENTITY.moved_within(DVec3::ZERO, DVec3::ZERO, 0.0).apply(p) == p);
     }
 
     #[test]
@@ -146,6 +171,16 @@ mod tests {
         let camera_from_tcp = camera_from_object.rigid() * object_from_tcp;
         let by_hand = camera_from_object.apply(DVec3::new(0.5, 0.2, 0.1));
         assert!(camera_from_tcp.translation.distance(by_hand) < 1e-15);
+    }
+
+    #[test]
+    fn growing_out_of_a_corner_leaves_the_corner() {
+        let corner = DVec3::new(0.3, -0.4, 0.5);
+        let direction =
+            Tangent::from_column_slice(&[0.0, 0.0, 0.0, -corner.x, -corner.y, -corner.z, 1.0]);
+        let grown = Sim3::IDENTITY.moved_along(&direction, 0.2);
+        assert!((grown.scale - 0.2f64.exp()).abs() < 1e-12);
+        assert!(grown.apply(corner).distance(corner) < 1e-3);
     }
 
     #[test]

@@ -2,13 +2,10 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use semfm_align::Error;
-use semfm_align::{
-    AlignSettings, Alignment, DepthImage, Intrinsics, Observation, Sim3, Verdict, align,
-};
-use semfm_geom::math::{DQuat, DVec3};
+use semfm_align::{AlignSettings, Alignment, DepthImage, Error, Observation, Sim3, Verdict, align};
+use semfm_geom::math::{DAffine3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
-use semfm_geom::{Mesh, SurfaceIndex, Task, zoo};
+use semfm_geom::{Intrinsics, Mesh, Pinhole, SurfaceIndex, Task, zoo};
 
 /// No two sides alike, in units of nobody, far from its own origin.
 fn pebble() -> Mesh {
@@ -250,11 +247,13 @@ fn the_same_seed_gives_the_same_pose_at_every_thread_count() {
 fn a_depth_image_with_a_mask_knows_what_stands_before_the_object() {
     let mesh = pebble();
     let surface = SurfaceIndex::new(&mesh).unwrap();
-    let camera = Intrinsics { fx: 300.0, fy: 310.0, cx: 159.5, cy: 119.5 };
+    let calibrated =
+        Intrinsics { width: 320, height: 240, fx: 300.0, fy: 310.0, cx: 159.5, cy: 119.5 };
+    let camera = Pinhole::with_pixel_centres_at_integers(calibrated, DAffine3::IDENTITY).unwrap();
     let back = truth().inverse();
     let (mut depth, mut mask) = (Vec::new(), Vec::new());
     for pixel in 0..320 * 240 {
-        let ray = camera.ray(f64::from(pixel % 320), f64::from(pixel / 320));
+        let ray = camera.ray(f64::from(pixel % 320) + 0.5, f64::from(pixel / 320) + 0.5);
         let origin = back.apply(DVec3::ZERO);
         let hit = surface.first_hit(origin, back.apply(ray) - origin);
         // A pole stands before the left third of the object, a wall behind it all.

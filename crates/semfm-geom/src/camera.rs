@@ -161,9 +161,14 @@ impl Pinhole {
 
     /// Direction (world's frame, scaled so that its depth is 1) through pixel position (u, v).
     pub fn ray(&self, u: f64, v: f64) -> DVec3 {
+        self.camera_from_world.matrix3.transpose() * self.ray_in_camera(u, v)
+    }
+
+    /// Direction (the camera's own frame, scaled so that its depth is 1) through pixel position
+    /// (u, v).
+    pub fn ray_in_camera(&self, u: f64, v: f64) -> DVec3 {
         let Intrinsics { fx, fy, cx, cy, .. } = self.intrinsics;
-        let direction = DVec3::new((u - cx) / fx, (v - cy) / fy, 1.0);
-        self.camera_from_world.matrix3.transpose() * direction
+        DVec3::new((u - cx) / fx, (v - cy) / fy, 1.0)
     }
 }
 

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use image::DynamicImage;
-use semfm_align::{DepthImage, Intrinsics};
+use semfm_align::DepthImage;
+use semfm_geom::math::DAffine3;
+use semfm_geom::{Intrinsics, Pinhole};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -51,12 +53,13 @@ pub fn read_mask(path: &Path, image: &DepthImage) -> Result<Vec<bool>> {
 }
 
 /// Reads intrinsics: `{"fx", "fy", "cx", "cy"}`, or `{"K": …}` with a 3 × 3 matrix or its nine
-/// numbers row by row, or these bare. Pixel centres have whole coordinates, as calibration tools
-/// count. Where the file has `width` and `height`, they must be the image's.
+/// numbers row by row, or these bare. In the file, pixel centres have whole coordinates, as
+/// calibration tools count ([`Pinhole::with_pixel_centres_at_integers`]). Where it has `width` and
+/// `height`, they must be the image's.
 ///
 /// # Errors
 /// [`crate::Error::Format`] with the field at fault.
-pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Intrinsics> {
+pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
     let value = read_json(path)?;
     for (field, has) in [("width", image.width()), ("height", image.height())] {
         if let Some(told) = value.get(field).filter(|told| told.as_f64() != Some(has as f64)) {
@@ -64,7 +67,7 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Intrinsics> {
             return Err(fault(path, field, expected, told.to_string()));
         }
     }
-    let intrinsics = match value.get("K").or_else(|| value.get("k")) {
+    let [fx, fy, cx, cy] = match value.get("K").or_else(|| value.get("k")) {
         Some(matrix) => from_matrix(path, matrix)?,
         None if value.is_array() => from_matrix(path, &value)?,
         None => {
@@ -75,14 +78,23 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Intrinsics> {
                 })
             };
             let [fx, fy, cx, cy] = ["fx", "fy", "cx", "cy"].map(number);
-            Intrinsics { fx: fx?, fy: fy?, cx: cx?, cy: cy? }
+            [fx?, fy?, cx?, cy?]
         }
     };
-    intrinsics.check().map_err(|error| within(path, error))?;
-    Ok(intrinsics)
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+    Pinhole::with_pixel_centres_at_integers(intrinsics, DAffine3::IDENTITY).map_err(|error| {
+        match error {
+            semfm_geom::Error::OutOfRange { what, expected, found } => {
+                fault(path, what.trim_start_matches("camera: "), expected, found)
+            }
+            other => other.into(),
+        }
+    })
 }
 
-fn from_matrix(path: &Path, value: &Value) -> Result<Intrinsics> {
+/// fx, fy, cx, cy.
+fn from_matrix(path: &Path, value: &Value) -> Result<[f64; 4]> {
     let flat = <[f64; 9]>::deserialize(value).ok();
     let square = || <[[f64; 3]; 3]>::deserialize(value).ok().map(|rows| rows.concat());
     let Some(k) = flat.map(Vec::from).or_else(square) else {
@@ -94,7 +106,7 @@ fn from_matrix(path: &Path, value: &Value) -> Result<Intrinsics> {
         let expected = "fx 0 cx, 0 fy cy, 0 0 1".into();
         return Err(fault(path, "K", expected, format!("{k:?}")));
     }
-    Ok(Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5] })
+    Ok([k[0], k[4], k[2], k[5]])
 }
 
 fn picture(path: &Path) -> Result<DynamicImage> {
@@ -123,7 +135,7 @@ mod tests {
         DepthImage::new(2, 1, vec![0.5, 0.25]).unwrap()
     }
 
-    fn intrinsics(text: &str) -> Result<Intrinsics> {
+    fn intrinsics(text: &str) -> Result<Pinhole> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("K.json");
         std::fs::write(&path, text).unwrap();
@@ -132,7 +144,8 @@ mod tests {
 
     #[test]
     fn every_way_to_write_intrinsics_is_the_same_camera() {
-        let same = Intrinsics { fx: 500.0, fy: 510.0, cx: 0.5, cy: 0.25 };
+        let same = Intrinsics { width: 2, height: 1, fx: 500.0, fy: 510.0, cx: 0.5, cy: 0.25 };
+        let same = Pinhole::with_pixel_centres_at_integers(same, DAffine3::IDENTITY).unwrap();
         for text in [
             r#"{"fx": 500, "fy": 510, "cx": 0.5, "cy": 0.25, "width": 2, "height": 1}"#,
             r#"{"K": [[500, 0, 0.5], [0, 510, 0.25], [0, 0, 1]]}"#,

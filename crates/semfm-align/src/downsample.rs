@@ -6,6 +6,8 @@ use std::hash::{BuildHasherDefault, Hasher};
 use nalgebra::{Matrix3, SymmetricEigen};
 use semfm_geom::math::DVec3;
 
+use crate::extent::order_statistic;
+
 /// Cells that hold points; with as many, those around a place span about a sixth of an object.
 const N_CELLS: usize = 400;
 
@@ -18,7 +20,7 @@ const FOR_A_NORMAL: f64 = 5.0;
 /// A point of the cloud and the unit normal of the surface it lies on, of either sign; `None`
 /// where the surroundings are no surface.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ThinPoint {
+pub(crate) struct SampledPoint {
     pub point: DVec3,
     pub normal: Option<DVec3>,
 }
@@ -32,7 +34,7 @@ pub(crate) struct ThinPoint {
 /// cell would be more even, but biased: noise that crosses into a cell of its own would count as
 /// much as the many that stayed (measured on thirty views of ten objects: scales too small by 1.4
 /// standard deviations on average, against .4 now).
-pub(crate) fn thin(points: &[DVec3], n_wanted: usize) -> Vec<ThinPoint> {
+pub(crate) fn downsample(points: &[DVec3], n_wanted: usize) -> Vec<SampledPoint> {
     let n_cells = N_CELLS.min(points.len() / PER_CELL).max(1);
     let grid = Grid::with_about(points, n_cells);
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); grid.cells.len()];
@@ -40,21 +42,22 @@ pub(crate) fn thin(points: &[DVec3], n_wanted: usize) -> Vec<ThinPoint> {
         members[cell as usize].push(id as u32);
     }
     let n = n_wanted.min(points.len());
-    let mut thinned = Vec::with_capacity(n);
+    let mut sampled = Vec::with_capacity(n);
     let mut before = 0;
     for (cell, ids) in members.iter().enumerate() {
-        let due = |count: usize| (count * n).div_ceil(points.len());
-        let taken = due(before)..due(before + ids.len());
+        // Of the first m points, ⌈m n / all⌉ are taken.
+        let [first, end] = [before, before + ids.len()].map(|m| (m * n).div_ceil(points.len()));
+        let taken = first..end;
         if !taken.is_empty() {
             let normal = grid.normal(cell);
-            thinned.extend(taken.map(|i| {
+            sampled.extend(taken.map(|i| {
                 let id = ids[i * points.len() / n - before];
-                ThinPoint { point: points[id as usize], normal }
+                SampledPoint { point: points[id as usize], normal }
             }));
         }
         before += ids.len();
     }
-    thinned
+    sampled
 }
 
 /// Sums over the points of one cell, taken from the cell's first point for precision.
@@ -114,7 +117,15 @@ impl Grid {
         grid
     }
 
-    /// Normal of the plane through all points of the 27 cells around `cell`.
+    /// Normal of the plane through all points of the 27 cells around `cell`: the eigenvector with the
+    /// least eigenvalue of
+    ///
+    /// > Σ = ⟨d dᵀ⟩ − ⟨d⟩⟨d⟩ᵀ
+    ///
+    /// over their offsets d from this cell's origin. A neighbour has kept its sums S = Σ e and
+    /// P = Σ e eᵀ over offsets e from its own origin, m away: d = e + m, so that
+    ///
+    /// > Σ d dᵀ = P + m Sᵀ + S mᵀ + n m mᵀ
     fn normal(&self, cell: usize) -> Option<DVec3> {
         let here = &self.cells[cell];
         let (mut n, mut sum, mut products) = (0.0, DVec3::ZERO, [0.0; 6]);
@@ -209,16 +220,18 @@ impl Hasher for Mixer {
 /// A length that a few far points do not change: twice the median distance from the median point.
 /// Positive, whatever the points.
 fn typical_size(points: &[DVec3]) -> f64 {
-    let median = |mut values: Vec<f64>| {
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
     let every = points.len().div_ceil(4096);
-    let some = || points.iter().step_by(every);
-    let centre = DVec3::from_array(std::array::from_fn(|k| median(some().map(|p| p[k]).collect())));
-    let size = 2.0 * median(some().map(|p| p.distance(centre)).collect());
+    let some: Vec<DVec3> = points.iter().step_by(every).copied().collect();
+    let centre = std::array::from_fn(|k| median(some.iter().map(|p| p[k]).collect()));
+    let centre = DVec3::from_array(centre);
+    let size = 2.0 * median(some.iter().map(|p| p.distance(centre)).collect());
     // All points on one spot: any length will do that is not 0.
     size.max(1e-9 * (1.0 + centre.length()))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    order_statistic(&mut values, middle)
 }
 
 #[cfg(test)]
@@ -227,15 +240,15 @@ mod tests {
     use semfm_geom::{sampling::sample_uniform, zoo};
 
     #[test]
-    fn a_thinned_sphere_is_even_and_knows_its_normals() {
+    fn points_of_a_sphere_stay_themselves_and_get_its_normals() {
         let cloud: Vec<DVec3> = sample_uniform(&zoo::icosphere(4), 20_000, 1)
             .unwrap()
             .iter()
             .map(|s| s.point)
             .collect();
-        let thinned = thin(&cloud, 800);
-        assert_eq!(thinned.len(), 800);
-        for p in &thinned {
+        let sampled = downsample(&cloud, 800);
+        assert_eq!(sampled.len(), 800);
+        for p in &sampled {
             let cosine = p.normal.unwrap().dot(p.point.normalize()).abs();
             assert!(cosine > 0.95, "{cosine}");
             assert!(cloud.contains(&p.point));
@@ -243,13 +256,13 @@ mod tests {
     }
 
     #[test]
-    fn few_points_and_odd_ones_are_no_trouble() {
-        assert_eq!(thin(&[DVec3::ONE; 40], 100).len(), 40);
-        assert_eq!(thin(&[DVec3::ONE], 100).len(), 1);
+    fn few_points_a_line_and_a_far_point_are_accepted() {
+        assert_eq!(downsample(&[DVec3::ONE; 40], 100).len(), 40);
+        assert_eq!(downsample(&[DVec3::ONE], 100).len(), 1);
         let line: Vec<DVec3> = (0..200).map(|i| f64::from(i) * DVec3::X).collect();
-        assert!(thin(&line, 50).iter().all(|p| p.normal.is_none()));
+        assert!(downsample(&line, 50).iter().all(|p| p.normal.is_none()));
         let mut far = line;
         far.push(1e300 * DVec3::Y);
-        assert_eq!(thin(&far, 50).len(), 50);
+        assert_eq!(downsample(&far, 50).len(), 50);
     }
 }

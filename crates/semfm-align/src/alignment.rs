@@ -1,0 +1,35 @@
+//! The outcome of an alignment.
+
+use crate::sim3::Sim3;
+use crate::verdict::Verdict;
+
+/// The pose of an object in a camera's frame, and how far to trust it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alignment {
+    /// From the mesh's frame and units to the camera's frame in metres.
+    pub camera_from_object: Sim3,
+    /// Standard deviation of the scale, metres per unit of the mesh.
+    pub scale_std: f64,
+    /// Standard deviation of the rotation about its least certain axis, radians.
+    pub rotation_std: f64,
+    /// Standard deviation of the position in its least certain direction, metres.
+    pub position_std: f64,
+    /// Root mean square distance from the points that lie on the model to its surface, metres.
+    pub residual_m: f64,
+    /// Share of the observed points that lie on the model.
+    pub inlier_share: f64,
+    /// Of the model's side that faces the camera, the share that was seen where it is.
+    pub visibility: f64,
+    /// Score of the best pose with another place of the surface, as a share of this one's.
+    pub rival: f64,
+    /// Starts tried.
+    pub n_starts: usize,
+    /// Steps of the last, exact round.
+    pub iterations: usize,
+    /// What to do with the pose.
+    pub verdict: Verdict,
+    /// What speaks against accepting it, in words.
+    pub reasons: Vec<String>,
+    /// Time per stage in milliseconds, in order.
+    pub stages_ms: Vec<(&'static str, f64)>,
+}
