@@ -60,8 +60,9 @@ impl PatchEmbeddings {
         };
         let rect = arrays::floats32(rect, "rect", &[Axis::Is(4)])?.0;
         let rect = [rect[0], rect[1], rect[2], rect[3]];
-        let patches = views::PatchEmbeddings { rows, cols, dim, data, rect, coverage, valid };
-        guard(py, || Ok(patches.check("patches")?))?;
+        let grid = views::PatchGrid { rows, cols, rect };
+        let patches =
+            guard(py, || Ok(views::PatchEmbeddings::new(grid, dim, data, coverage, valid)?))?;
         Ok(Self { held: Held::new(patches) })
     }
 
@@ -69,36 +70,37 @@ impl PatchEmbeddings {
     #[getter]
     fn data<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let patches = &slf.get().held;
-        let shape = (patches.rows, patches.cols, patches.dim);
-        lend::vector(slf, |patches| patches.held.data.as_slice())?.call_method1("reshape", (shape,))
+        let shape = (patches.grid().rows, patches.grid().cols, patches.dim());
+        lend::vector(slf, |patches| patches.held.data())?.call_method1("reshape", (shape,))
     }
 
     /// (4,) float32 array: left, top, right, bottom of the grid in pixels.
     #[getter]
     fn rect<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.rect.to_vec())
+        lend::owned(py, self.held.grid().rect.to_vec())
     }
 
     /// (rows, cols) uint8 array: share of each patch covered by the object, a read-only view.
     #[getter]
     fn coverage<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, slf.get().held.cols, |patches| patches.held.coverage.as_slice())
+        lend::rows(slf, slf.get().held.grid().cols, |patches| patches.held.coverage())
     }
 
     /// (rows, cols) bool array: False where the patch is to be ignored, a read-only view.
     #[getter]
     fn valid<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, slf.get().held.cols, |patches| patches.held.valid.as_slice())
+        lend::rows(slf, slf.get().held.grid().cols, |patches| patches.held.valid())
     }
 
     /// int: dimension d of each vector.
     #[getter]
     fn dim(&self) -> usize {
-        self.held.dim
+        self.held.dim()
     }
 
     fn __repr__(&self) -> String {
-        format!("PatchEmbeddings({} × {}, dim {})", self.held.rows, self.held.cols, self.held.dim)
+        let views::PatchGrid { rows, cols, .. } = self.held.grid();
+        format!("PatchEmbeddings({rows} × {cols}, dim {})", self.held.dim())
     }
 
     fn __reduce__<'py>(
@@ -193,14 +195,14 @@ impl Embeddings {
             return Err(errors::invalid(py, "patches", &expected, &grids.len().to_string()));
         }
         let (width, height) = (cameras[0].width(), cameras[0].height());
-        let dim = grids[0].dim;
+        let dim = grids[0].dim();
         for (view, (camera, grid)) in cameras.iter().zip(&grids).enumerate() {
             if (camera.width(), camera.height()) != (width, height) {
                 let found = format!("{} × {} in view {view}", camera.width(), camera.height());
                 return Err(errors::invalid(py, "cameras", &format!("{width} × {height}"), &found));
             }
-            if grid.dim != dim {
-                let found = format!("{} in view {view}", grid.dim);
+            if grid.dim() != dim {
+                let found = format!("{} in view {view}", grid.dim());
                 return Err(errors::invalid(py, "patches", &format!("dimension {dim}"), &found));
             }
         }

@@ -11,7 +11,7 @@ use std::str::FromStr;
 
 use rayon::prelude::*;
 use semfm_geom::math::DVec3;
-use semfm_views::{EmbeddedView, PatchEmbeddings, View};
+use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid, View};
 
 use crate::object::SynthObject;
 use crate::seed::{direction, stream};
@@ -229,15 +229,9 @@ impl Appearance {
         self.disturb(&mut tokens, rows, cols, number);
         let coverage = seen.iter().map(|glance| (glance.covered * 255.0).round() as u8).collect();
         let (width, height) = (cols as u32 * PATCH, rows as u32 * PATCH);
-        let patches = PatchEmbeddings {
-            rows,
-            cols,
-            dim: DIM,
-            data: tokens.into_iter().flatten().collect(),
-            rect: [0.0, 0.0, width as f32, height as f32],
-            coverage,
-            valid: vec![true; rows * cols],
-        };
+        let grid = PatchGrid { rows, cols, rect: [0.0, 0.0, width as f32, height as f32] };
+        let data = tokens.into_iter().flatten().collect();
+        let patches = PatchEmbeddings::new(grid, DIM, data, coverage, vec![true; rows * cols])?;
         Ok(EmbeddedView { camera: view.camera, patches })
     }
 
@@ -387,8 +381,9 @@ mod tests {
             let mut met = vec![false; object.part_names.len()];
             for (number, view) in views.iter().enumerate() {
                 let patches = clean.embed(&object, view, number).unwrap().patches;
-                for (patch, token) in patches.data.chunks_exact(DIM).enumerate() {
-                    let (row, col) = (patch / patches.cols, patch % patches.cols);
+                let cols = patches.grid().cols;
+                for (patch, token) in patches.data().chunks_exact(DIM).enumerate() {
+                    let (row, col) = (patch / cols, patch % cols);
                     let shares = clean.look(&object, view, row, col).unwrap().shares;
                     let Some(own) = shares.iter().position(|&share| share == 1.0) else { continue };
                     met[own] = true;

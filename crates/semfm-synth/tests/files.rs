@@ -72,9 +72,9 @@ impl Seen {
         let mut tokens = Vec::new();
         for (view, embedded) in views.iter().zip(&embedded) {
             for (patch, token) in
-                embedded.patches.data.chunks_exact(embedded.patches.dim).enumerate()
+                embedded.patches.data().chunks_exact(embedded.patches.dim()).enumerate()
             {
-                if let Some(part) = only_part(object, view, patch, embedded.patches.cols) {
+                if let Some(part) = only_part(object, view, patch, embedded.patches.grid().cols) {
                     let norm = token.iter().map(|x| x * x).sum::<f32>().sqrt();
                     tokens.push((part, token.iter().map(|x| x / norm).collect::<Vec<_>>()));
                 }

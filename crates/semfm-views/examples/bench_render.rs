@@ -15,8 +15,8 @@ use std::time::Instant;
 
 use semfm_geom::{Mesh, Pinhole, Task};
 use semfm_views::{
-    EmbeddedView, LiftSettings, Paint, PatchEmbeddings, RenderSettings, RigSettings, View, lift,
-    render, rig,
+    EmbeddedView, LiftSettings, Paint, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings,
+    View, lift, render, rig,
 };
 use serde_json::{Value, json};
 
@@ -241,15 +241,12 @@ fn cpu_seconds() -> f64 {
 /// Tokens of the right shape without an encoder: patches of 16 pixels.
 fn noise_tokens(view: &View) -> EmbeddedView {
     let side = view.camera.width() as usize / 16;
-    let patches = PatchEmbeddings {
-        rows: side,
-        cols: side,
-        dim: DIM,
-        data: (0..side * side * DIM).map(|i| (i as f32 * 0.37).sin()).collect(),
-        rect: [0.0, 0.0, view.camera.width() as f32, view.camera.height() as f32],
-        coverage: vec![255; side * side],
-        valid: vec![true; side * side],
-    };
+    let rect = [0.0, 0.0, view.camera.width() as f32, view.camera.height() as f32];
+    let grid = PatchGrid { rows: side, cols: side, rect };
+    let data = (0..side * side * DIM).map(|i| (i as f32 * 0.37).sin()).collect();
+    let (coverage, valid) = (vec![255; side * side], vec![true; side * side]);
+    let patches = PatchEmbeddings::new(grid, DIM, data, coverage, valid)
+        .expect("sines are finite, and there is one for each dimension");
     EmbeddedView { camera: view.camera, patches }
 }
 

@@ -13,7 +13,7 @@ use std::time::Instant;
 use semfm_geom::math::{DAffine3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata, read_messages};
-use semfm_views::{EmbeddedView, PatchEmbeddings};
+use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid};
 
 const ROWS: usize = 37;
 const DIM: usize = 768;
@@ -113,15 +113,14 @@ fn embeddings() -> Result<EmbeddingsFile, semfm_geom::Error> {
             DAffine3::IDENTITY,
         )
         .unwrap(),
-        patches: PatchEmbeddings {
-            rows: ROWS,
-            cols: ROWS,
-            dim: DIM,
-            data: (0..ROWS * ROWS * DIM).map(|_| noise()).collect(),
-            rect: [0.0, 0.0, 518.0, 518.0],
-            coverage: vec![255; ROWS * ROWS],
-            valid: vec![true; ROWS * ROWS],
-        },
+        patches: PatchEmbeddings::new(
+            PatchGrid { rows: ROWS, cols: ROWS, rect: [0.0, 0.0, 518.0, 518.0] },
+            DIM,
+            (0..ROWS * ROWS * DIM).map(|_| noise()).collect(),
+            vec![255; ROWS * ROWS],
+            vec![true; ROWS * ROWS],
+        )
+        .unwrap(),
     };
     let metadata = EmbeddingsMetadata {
         views: ViewsMetadata::of(&mesh, 518, 518),

@@ -12,7 +12,7 @@ use semfm_views::mcap::{
     Dtype, EmbeddingsFile, EmbeddingsMetadata, Scene, SceneMesh, ScenePoints, ViewsMetadata,
     write_views,
 };
-use semfm_views::{EmbeddedView, PatchEmbeddings, Result, View};
+use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid, Result, View};
 
 const N_VIEWS: usize = 3;
 const WIDTH: u32 = 16;
@@ -108,14 +108,11 @@ fn view(index: usize) -> View {
 fn embedded(index: usize) -> EmbeddedView {
     let (rows, cols, dim) = (3, 4, 5);
     let number = |i: usize| ((i * 37 + index) % 101) as f32 / 64.0 - 0.5;
-    let patches = PatchEmbeddings {
-        rows,
-        cols,
-        dim,
-        data: (0..rows * cols * dim).map(number).collect(),
-        rect: [0.0, 0.0, WIDTH as f32, HEIGHT as f32],
-        coverage: (0..rows * cols).map(|patch| (20 * patch) as u8).collect(),
-        valid: (0..rows * cols).map(|patch| patch + 1 < rows * cols).collect(),
-    };
+    let grid = PatchGrid { rows, cols, rect: [0.0, 0.0, WIDTH as f32, HEIGHT as f32] };
+    let data = (0..rows * cols * dim).map(number).collect();
+    let coverage = (0..rows * cols).map(|patch| (20 * patch) as u8).collect();
+    let valid = (0..rows * cols).map(|patch| patch + 1 < rows * cols).collect();
+    let patches = PatchEmbeddings::new(grid, dim, data, coverage, valid)
+        .expect("arrays of the grid's length");
     EmbeddedView { camera: camera(index), patches }
 }

@@ -17,7 +17,7 @@ pub mod renderer;
 pub mod rig;
 pub mod view;
 
-pub use embeddings::{EmbeddedView, PatchEmbeddings};
+pub use embeddings::{EmbeddedView, PatchEmbeddings, PatchGrid};
 pub use error::{Error, Fault, Result};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuRenderer;

@@ -14,7 +14,7 @@ use semfm_views::mcap::{
     SceneMesh, SceneNumbers, ScenePicture, ScenePoints, ViewsFile, ViewsMetadata, inspect,
     read_bytes, read_messages, read_view, write_views,
 };
-use semfm_views::{EmbeddedView, Error, PatchEmbeddings, View};
+use semfm_views::{EmbeddedView, Error, PatchEmbeddings, PatchGrid, View};
 
 const SIZE: (u32, u32) = (12, 9);
 
@@ -60,15 +60,14 @@ fn embeddings() -> EmbeddingsFile {
     let (rows, cols, dim) = (2, 3, 4);
     let view = |view: usize| EmbeddedView {
         camera: camera(view),
-        patches: PatchEmbeddings {
-            rows,
-            cols,
+        patches: PatchEmbeddings::new(
+            PatchGrid { rows, cols, rect: [0.0, 0.5, 12.0, 9.0] },
             dim,
-            data: (0..rows * cols * dim).map(|i| ((i * 13 + view) % 29) as f32 / 29.0).collect(),
-            rect: [0.0, 0.5, 12.0, 9.0],
-            coverage: vec![0, 1, 2, 253, 254, 255],
-            valid: vec![true, true, true, true, true, false],
-        },
+            (0..rows * cols * dim).map(|i| ((i * 13 + view) % 29) as f32 / 29.0).collect(),
+            vec![0, 1, 2, 253, 254, 255],
+            vec![true, true, true, true, true, false],
+        )
+        .unwrap(),
     };
     let metadata = EmbeddingsMetadata {
         views: views_metadata(),
@@ -80,6 +79,12 @@ fn embeddings() -> EmbeddingsFile {
         simulated: true,
     };
     EmbeddingsFile { path: PathBuf::new(), metadata, views: vec![view(0), view(1)] }
+}
+
+/// The same patches with other vectors.
+fn with_data(patches: &PatchEmbeddings, dim: usize, data: Vec<f32>) -> PatchEmbeddings {
+    let (coverage, valid) = (patches.coverage().to_vec(), patches.valid().to_vec());
+    PatchEmbeddings::new(patches.grid(), dim, data, coverage, valid).unwrap()
 }
 
 /// A folder with an embeddings file in it, and the file.
@@ -112,7 +117,7 @@ fn single_precision_comes_back_bit_for_bit_and_half_to_its_rounding() {
         let [original, single, half] = [&original, &single, &half].map(|file| &file.views[view]);
         assert_same_camera(&single.camera, &original.camera);
         assert_eq!(single.patches, original.patches);
-        for (half, exact) in half.patches.data.iter().zip(&original.patches.data) {
+        for (half, exact) in half.patches.data().iter().zip(original.patches.data()) {
             assert!((half - exact).abs() <= exact.abs() * f32::powi(0.5, 11), "{half} {exact}");
         }
     }
@@ -184,27 +189,29 @@ fn embeddings_of_another_mesh_are_refused_by_name() {
 fn what_cannot_be_read_is_not_written_and_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.emb.mcap");
-    let mut nan = embeddings();
-    nan.views[1].patches.data[0] = f32::NAN;
     let mut dim = embeddings();
-    dim.views[1].patches.dim = 2;
+    let data = dim.views[1].patches.data()[..2 * 3 * 2].to_vec();
+    dim.views[1].patches = with_data(&dim.views[1].patches, 2, data);
     let mut scaled = embeddings();
     // Near enough to a rotation for a camera, but not for the quaternion of a file.
     let mut pose = scaled.views[0].camera.camera_from_world();
     pose.matrix3 *= 1.000_001;
     scaled.views[0].camera = scaled.views[0].camera.posed(pose).unwrap();
     let mut huge = embeddings();
-    huge.views[0].patches.data[3] = 70_000.0;
+    let mut data = huge.views[0].patches.data().to_vec();
+    data[3] = 70_000.0;
+    huge.views[0].patches = with_data(&huge.views[0].patches, 4, data);
     let empty = EmbeddingsFile { views: Vec::new(), ..embeddings() };
-    for file in [nan, dim, scaled, huge, empty] {
+    for file in [dim, scaled, huge, empty] {
         let error = file.write(&path, Dtype::F16).unwrap_err();
         assert!(matches!(error, Error::Invalid { .. }), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{error}");
     }
     // A NaN is welcome where the patch says that it is not valid.
     let mut invalid = embeddings();
-    let last = invalid.views[0].patches.data.len() - 1;
-    invalid.views[0].patches.data[last] = f32::NAN;
+    let mut data = invalid.views[0].patches.data().to_vec();
+    *data.last_mut().unwrap() = f32::NAN;
+    invalid.views[0].patches = with_data(&invalid.views[0].patches, 4, data);
     invalid.write(&path, Dtype::F16).unwrap();
     EmbeddingsFile::read(&path).unwrap();
 }
@@ -327,7 +334,7 @@ fn grids_that_contradict_themselves_are_refused_with_their_message() {
     let valid = grid_refusal(|grid| grid.valid = vec![1, 1, 1, 2, 1, 0].into());
     assert!(valid.contains("expected 0 or 1"), "{valid}");
     let coverage = grid_refusal(|grid| grid.coverage.truncate(5));
-    assert!(coverage.contains("[24, 5, 6]"), "{coverage}");
+    assert!(coverage.contains("coverages: 6, found 5"), "{coverage}");
     let rect = grid_refusal(|grid| grid.x1 = 0.0);
     assert!(rect.contains("left < right"), "{rect}");
 }

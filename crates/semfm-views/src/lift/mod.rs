@@ -112,9 +112,8 @@ struct Features {
 /// at every thread count.
 ///
 /// # Errors
-/// [`Error::Invalid`] for settings out of range, no views, views that disagree in dimension, arrays
-/// of the wrong length, values of valid patches that are not finite (each names the view), or when
-/// nothing of the surface is in sight; [`semfm_geom::Error::NoArea`];
+/// [`Error::Invalid`] for settings out of range, no views, a view that disagrees in dimension (named),
+/// or when nothing of the surface is in sight; [`semfm_geom::Error::NoArea`];
 /// [`semfm_geom::Error::Cancelled`].
 pub fn lift(
     mesh: &Mesh,
@@ -155,13 +154,12 @@ fn check(views: &[EmbeddedView]) -> Result<usize> {
     let Some(first) = views.first() else {
         return Err(Error::invalid("embedded views", "at least one", "none"));
     };
-    let dim = first.patches.dim;
+    let dim = first.patches.dim();
     for (k, view) in views.iter().enumerate() {
-        let name = format!("view {k}");
-        view.patches.check(&name)?;
-        if view.patches.dim != dim {
+        let found = view.patches.dim();
+        if found != dim {
             let expected = format!("{dim} dimensions, as in view 0");
-            return Err(Error::invalid(name, expected, view.patches.dim.to_string()));
+            return Err(Error::invalid(format!("view {k}"), expected, found.to_string()));
         }
     }
     Ok(dim)

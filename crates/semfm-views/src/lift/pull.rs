@@ -8,7 +8,7 @@ use super::nearest_seen::nearest_seen;
 use super::{Features, nothing_in_sight};
 use crate::render::probe::inverse_depths;
 use crate::render::triangle::Projection;
-use crate::{EmbeddedView, PatchEmbeddings, Result};
+use crate::{EmbeddedView, PatchEmbeddings, PatchGrid, Result};
 
 /// Weight of a view beside |cos(view direction, normal)|: a grazing view still counts a little
 /// where there is no other.
@@ -61,7 +61,7 @@ pub(super) fn pull(
                 // Dropped patches have weight 0 and may hold anything, NaN included.
                 for (patch, weight) in sighting.patches.into_iter().filter(|tap| tap.1 > 0.0) {
                     let weight = weight * sighting.weight / total;
-                    let token = &view.patches.data[patch * dim..][..dim];
+                    let token = view.patches.vector(patch);
                     feature.iter_mut().zip(token).for_each(|(f, t)| {
                         *f += weight * t;
                     });
@@ -118,21 +118,22 @@ fn sightings(
 /// The four patches around a pixel position with their weights (sum 1): bilinear between patch
 /// centres, times the trust in each patch. `None` outside the grid or where no patch is valid.
 fn patch_mix(patches: &PatchEmbeddings, u: f64, v: f64) -> Option<[(usize, f32); 4]> {
-    let [left, top, right, bottom] = patches.rect.map(f64::from);
+    let PatchGrid { rows, cols, rect } = patches.grid();
+    let [left, top, right, bottom] = rect.map(f64::from);
     // In patches from the first centre; the grid ends half a patch beyond its outer centres, and
     // images that are no multiple of the patch leave up to one patch of margin around it.
-    let x = (u - left) / (right - left) * patches.cols as f64 - 0.5;
-    let y = (v - top) / (bottom - top) * patches.rows as f64 - 0.5;
+    let x = (u - left) / (right - left) * cols as f64 - 0.5;
+    let y = (v - top) / (bottom - top) * rows as f64 - 0.5;
     let inside = |x: f64, count: usize| (-1.5..=count as f64 + 0.5).contains(&x);
-    if !(inside(x, patches.cols) && inside(y, patches.rows)) {
+    if !(inside(x, cols) && inside(y, rows)) {
         return None;
     }
     let mut mix = [(0, 0.0); 4];
     let mut sum = 0.0;
     for (k, tap) in mix.iter_mut().enumerate() {
-        let (column, column_weight) = tap_along(x, k % 2, patches.cols);
-        let (row, row_weight) = tap_along(y, k / 2, patches.rows);
-        let patch = row * patches.cols + column;
+        let (column, column_weight) = tap_along(x, k % 2, cols);
+        let (row, row_weight) = tap_along(y, k / 2, rows);
+        let patch = row * cols + column;
         let weight = (column_weight * row_weight).max(LEAST_BILINEAR) * trust(patches, patch);
         *tap = (patch, weight);
         sum += weight;
@@ -150,8 +151,8 @@ fn tap_along(x: f64, side: usize, count: usize) -> (usize, f32) {
 
 /// min(2·coverage, 1), hardly anything on the background, nothing for dropped tokens.
 fn trust(patches: &PatchEmbeddings, patch: usize) -> f32 {
-    let coverage = f32::from(patches.coverage[patch]) / 255.0;
-    match patches.valid[patch] {
+    let coverage = f32::from(patches.coverage()[patch]) / 255.0;
+    match patches.valid()[patch] {
         false => 0.0,
         true if coverage < LEAST_COVERAGE => BACKGROUND_WEIGHT,
         true => (2.0 * coverage).min(1.0),
@@ -163,15 +164,9 @@ mod tests {
     use super::*;
 
     fn grid(coverage: [u8; 6], valid: [bool; 6]) -> PatchEmbeddings {
-        PatchEmbeddings {
-            rows: 2,
-            cols: 3,
-            dim: 1,
-            data: vec![0.0; 6],
-            rect: [10.0, 20.0, 40.0, 60.0], // patches of 10 × 20 pixels
-            coverage: coverage.to_vec(),
-            valid: valid.to_vec(),
-        }
+        // Patches of 10 × 20 pixels.
+        let grid = PatchGrid { rows: 2, cols: 3, rect: [10.0, 20.0, 40.0, 60.0] };
+        PatchEmbeddings::new(grid, 1, vec![0.0; 6], coverage.to_vec(), valid.to_vec()).unwrap()
     }
 
     fn weight_of(mix: [(usize, f32); 4], patch: usize) -> f32 {

@@ -47,7 +47,7 @@ pub(super) fn unproject(
             let tokens = if near.is_empty() { &alone[..] } else { &near };
             let share = 1.0 / tokens.len() as f32;
             for &(i, _) in tokens {
-                let token = &views[lifted[i].view].patches.data[lifted[i].patch * dim..][..dim];
+                let token = views[lifted[i].view].patches.vector(lifted[i].patch);
                 feature.iter_mut().zip(token).for_each(|(f, t)| *f += share * t);
             }
             let mut seen_by: Vec<usize> = near.iter().map(|&(i, _)| lifted[i].view).collect();
@@ -64,11 +64,11 @@ pub(super) fn unproject(
 fn lifted_patches(mesh: &Mesh, views: &[EmbeddedView], k: usize) -> Vec<LiftedPatch> {
     let EmbeddedView { camera, patches } = &views[k];
     let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
-    let centres: Vec<[f64; 2]> = (0..patches.rows * patches.cols)
+    let centres: Vec<[f64; 2]> = (0..patches.n_patches())
         .map(|patch| {
-            let [u, v] = patches.centre(patch);
+            let [u, v] = patches.grid().centre(patch);
             let in_image = (0.0..=width).contains(&u) && (0.0..=height).contains(&v);
-            if in_image && patches.valid[patch] { [u, v] } else { [f64::NAN; 2] }
+            if in_image && patches.valid()[patch] { [u, v] } else { [f64::NAN; 2] }
         })
         .collect();
     let eye = camera.eye();

@@ -16,7 +16,7 @@ use super::metadata::{EmbeddingsMetadata, METADATA_NAME};
 use super::reader::{Message, read_messages};
 use super::topics::{OBJECT, TF, frame, parse_topic, time_of, topic};
 use super::writer::{ChunkCompression, McapWriter, write_mcap};
-use crate::{EmbeddedView, Error, PatchEmbeddings, Result};
+use crate::{EmbeddedView, Error, PatchEmbeddings, PatchGrid, Result};
 
 /// How vectors are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,9 +75,9 @@ impl EmbeddingsFile {
             Some((view, "camera")) => cameras.calibration(path, view, &message),
             Some((view, "embeddings")) => {
                 let grid = read_grid(path, view, &message)?;
-                if let Some(first) = patches.values().next().filter(|p| p.dim != grid.dim) {
-                    let expected = format!("dimension {}, as in the views before", first.dim);
-                    return Err(message_error(path, &message, &expected, grid.dim.to_string()));
+                if let Some(first) = patches.values().next().filter(|p| p.dim() != grid.dim()) {
+                    let expected = format!("dimension {}, as in the views before", first.dim());
+                    return Err(message_error(path, &message, &expected, grid.dim().to_string()));
                 }
                 insert_once(&mut patches, view, grid, path, &message)
             }
@@ -121,7 +121,7 @@ impl EmbeddingsFile {
 
     /// Dimension of the embeddings; 0 without views.
     pub fn dim(&self) -> usize {
-        self.views.first().map_or(0, |view| view.patches.dim)
+        self.views.first().map_or(0, |view| view.patches.dim())
     }
 
     fn check(&self) -> Result<()> {
@@ -136,8 +136,11 @@ impl EmbeddingsFile {
                 let what = format!("image size of view {view:03}");
                 return Err(invalid(what, format!("{size:?}"), format!("{found:?}")));
             }
-            check_grid(&embedded.patches, self.dim())
-                .map_err(|(expected, found)| invalid(format!("view {view:03}"), expected, found))?;
+            let found = embedded.patches.dim();
+            if found != self.dim() {
+                let expected = format!("dimension {}, as in view 000", self.dim());
+                return Err(invalid(format!("view {view:03}"), expected, found.to_string()));
+            }
         }
         Ok(())
     }
@@ -145,39 +148,6 @@ impl EmbeddingsFile {
 
 fn invalid(what: String, expected: impl Into<String>, found: impl Into<String>) -> Error {
     Error::Invalid { what, expected: expected.into(), found: found.into() }
-}
-
-/// Lengths and numbers of a grid; on failure what was expected and found.
-fn check_grid(patches: &PatchEmbeddings, dim: usize) -> std::result::Result<(), (String, String)> {
-    let n_patches = patches.rows.saturating_mul(patches.cols);
-    if n_patches == 0 || dim == 0 || patches.dim != dim {
-        let PatchEmbeddings { rows, cols, dim: found, .. } = patches;
-        let expected = format!("rows × cols × dim of at least 1 × 1 × 1, dim {dim}");
-        return Err((expected, format!("{rows} × {cols} × {found}")));
-    }
-    let lengths = [patches.data.len(), patches.coverage.len(), patches.valid.len()];
-    let expected = [n_patches.saturating_mul(dim), n_patches, n_patches];
-    if lengths != expected {
-        let [data, coverage, valid] = expected;
-        let expected = format!("{data} numbers, {coverage} coverages and {valid} validities");
-        return Err((expected, format!("{lengths:?}")));
-    }
-    let [x0, y0, x1, y1] = patches.rect;
-    if !(patches.rect.iter().all(|x| x.is_finite()) && x0 < x1 && y0 < y1) {
-        let expected = "a rectangle with left < right and top < bottom".to_owned();
-        return Err((expected, format!("{:?}", patches.rect)));
-    }
-    // Without an early exit, so that the compiler compares many numbers at once.
-    let is_finite = |vector: &[f32]| vector.iter().fold(true, |all, x| all & x.is_finite());
-    let mut cells = patches.data.chunks_exact(dim).zip(&patches.valid);
-    match cells.position(|(vector, &valid)| valid && !is_finite(vector)) {
-        None => Ok(()),
-        Some(patch) => {
-            let (row, col) = (patch / patches.cols, patch % patches.cols);
-            let expected = "finite numbers in every valid patch".to_owned();
-            Err((expected, format!("NaN or infinity at row {row}, column {col}")))
-        }
-    }
 }
 
 fn write_view(
@@ -190,21 +160,21 @@ fn write_view(
     let time = time_of(view);
     file.log(TF, time, &camera_transform(OBJECT, frame(view), time, camera))?;
     file.log(&topic(view, "camera"), time, &camera_calibration(frame(view), time, camera))?;
-    let [x0, y0, x1, y1] = patches.rect;
+    let PatchGrid { rows, cols, rect: [x0, y0, x1, y1] } = patches.grid();
     let message = PatchEmbeddingsMessage {
         timestamp: Some(timestamp(time)),
         frame_id: frame(view),
-        rows: count(patches.rows)?,
-        cols: count(patches.cols)?,
-        dim: count(patches.dim)?,
+        rows: count(rows)?,
+        cols: count(cols)?,
+        dim: count(patches.dim())?,
         dtype: dtype.name().to_owned(),
         data: encode(view, patches, dtype)?,
         x0,
         y0,
         x1,
         y1,
-        coverage: Bytes::copy_from_slice(&patches.coverage),
-        valid: patches.valid.iter().map(|&valid| valid.into()).collect::<Vec<u8>>().into(),
+        coverage: Bytes::copy_from_slice(patches.coverage()),
+        valid: patches.valid().iter().map(|&valid| valid.into()).collect::<Vec<u8>>().into(),
     };
     file.log(&topic(view, "embeddings"), time, &message)
 }
@@ -219,7 +189,7 @@ const BLOCK: usize = 4096;
 
 /// Vectors as little-endian bytes.
 fn encode(view: usize, patches: &PatchEmbeddings, dtype: Dtype) -> Result<Bytes> {
-    let numbers = &patches.data;
+    let numbers = patches.data();
     let mut bytes = Vec::with_capacity(numbers.len() * dtype.n_bytes());
     match dtype {
         Dtype::F32 => extend(&mut bytes, numbers, f32::to_le_bytes),
@@ -274,17 +244,21 @@ fn read_grid(path: &Path, view: usize, message: &Message<'_>) -> Result<PatchEmb
     if let Some(byte) = grid.valid.iter().find(|&&valid| valid > 1) {
         return Err(error("0 or 1 for the validity of a patch", byte.to_string()));
     }
-    let patches = PatchEmbeddings {
+    let place = PatchGrid {
         rows: grid.rows as usize,
         cols: grid.cols as usize,
-        dim: grid.dim as usize,
-        data: decode_numbers(&grid.data, dtype),
         rect: [grid.x0, grid.y0, grid.x1, grid.y1],
-        coverage: grid.coverage.to_vec(),
-        valid: grid.valid.iter().map(|&valid| valid == 1).collect(),
     };
-    check_grid(&patches, patches.dim).map_err(|(expected, found)| error(&expected, found))?;
-    Ok(patches)
+    let data = decode_numbers(&grid.data, dtype);
+    let valid = grid.valid.iter().map(|&valid| valid == 1).collect();
+    PatchEmbeddings::new(place, grid.dim as usize, data, grid.coverage.to_vec(), valid).map_err(
+        |refusal| match refusal {
+            Error::Invalid { what, expected, found } => {
+                error(&format!("{what}: {expected}"), found)
+            }
+            other => other,
+        },
+    )
 }
 
 /// Numbers out of little-endian bytes.
