@@ -1,10 +1,11 @@
 //! Objects made ready once, for all pairs and methods of a group.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Instant;
 
+use semfm::fmap::PreparedObject;
 use semfm::fmap::clusters::{ClusterSettings, Clusters, spectral_clusters};
-use semfm::fmap::{PreparedShape, SemanticShape};
 use semfm::geom::{SemanticCloud, Shape, ShapeCache, ShapeSettings};
 use semfm::pipeline::semantic_cloud;
 use semfm::{Meaning, Region, Task};
@@ -34,19 +35,19 @@ pub(crate) struct EvalObject {
     /// Area of each vertex as read.
     pub areas: Vec<f64>,
     pub about: ObjectRow,
-    shape: Tried<Option<Shape>>,
+    shape: Tried<Option<Arc<Shape>>>,
     meanings: BTreeMap<Features, Tried<Seen>>,
 }
 
 /// An object's meaning in one sense.
 struct Seen {
-    cloud: SemanticCloud,
-    clusters: Clusters,
+    cloud: Arc<SemanticCloud>,
+    clusters: Arc<Clusters>,
     times: BTreeMap<&'static str, f64>,
 }
 
 /// An object ready to be matched, in each sense.
-pub(crate) type Ready<'a> = BTreeMap<Features, Tried<(PreparedShape<'a>, f64)>>;
+pub(crate) type Ready = BTreeMap<Features, Tried<(PreparedObject, f64)>>;
 
 impl EvalObject {
     /// Loads and prepares an object. `part_names` are those of the whole group, so that all its
@@ -86,7 +87,7 @@ impl EvalObject {
             Ok(None)
         } else {
             let made = preparation.cache.shape(mesh.clone(), preparation.shape, task);
-            tried("object", made.map(|made| Some(made.shape)).map_err(Error::from))?
+            tried("object", made.map(|made| Some(Arc::new(made.shape))).map_err(Error::from))?
         };
         Ok(Ok(Self { areas: mesh.vertex_areas(), truth: object.truth, about, shape, meanings }))
     }
@@ -95,7 +96,7 @@ impl EvalObject {
     ///
     /// # Errors
     /// Only cancellation.
-    pub fn ready(&self, task: &Task) -> Result<Ready<'_>> {
+    pub fn ready(&self, task: &Task) -> Result<Ready> {
         let mut ready = Ready::new();
         for (&features, seen) in &self.meanings {
             ready.insert(features, self.ready_by(seen, task)?);
@@ -103,20 +104,15 @@ impl EvalObject {
         Ok(ready)
     }
 
-    fn ready_by<'a>(
-        &'a self,
-        seen: &'a Tried<Seen>,
-        task: &Task,
-    ) -> Result<Tried<(PreparedShape<'a>, f64)>> {
+    fn ready_by(&self, seen: &Tried<Seen>, task: &Task) -> Result<Tried<(PreparedObject, f64)>> {
         let (shape, seen) = match (&self.shape, seen) {
             (Ok(Some(shape)), Ok(seen)) => (shape, seen),
             (Err(failure), _) | (_, Err(failure)) => return Ok(Err(failure.clone())),
             (Ok(None), Ok(_)) => return Ok(Err(Failure::new("object", "no shape was made"))),
         };
         let start = Instant::now();
-        let semantic = SemanticShape { shape, cloud: &seen.cloud };
-        let clusters = std::borrow::Cow::Borrowed(&seen.clusters);
-        let prepared = PreparedShape::with_clusters(semantic, clusters, task);
+        let prepared = PreparedObject::new(Arc::clone(shape), Arc::clone(&seen.cloud), task)
+            .and_then(|object| object.with_clusters(Arc::clone(&seen.clusters)));
         let ms = start.elapsed().as_secs_f64() * 1e3;
         tried("object", prepared.map(|prepared| (prepared, ms)).map_err(Error::from))
     }
@@ -170,7 +166,7 @@ fn see(
     let settings = ClusterSettings { seed: preparation.seed, ..ClusterSettings::default() };
     let clusters = spectral_clusters(&cloud, &settings, task)?;
     times.insert("clusters", start.elapsed().as_secs_f64() * 1e3);
-    Ok(Seen { cloud, clusters, times })
+    Ok(Seen { cloud: Arc::new(cloud), clusters: Arc::new(clusters), times })
 }
 
 /// One-hot part labels (n × parts): the features of the upper bound. Where some object of the group names no

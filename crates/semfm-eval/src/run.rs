@@ -217,7 +217,7 @@ impl Evaluation<'_> {
             Ok(object) => Ok(Some(object.ready(self.progress.quiet())?)),
             Err(_) => Ok(None),
         })?;
-        let ready: BTreeMap<usize, Option<Ready<'_>>> = places.into_iter().zip(ready).collect();
+        let ready: BTreeMap<usize, Option<Ready>> = places.into_iter().zip(ready).collect();
         let rows = workers.each(open.len(), |i| {
             let (source, target) = group.pairs[open[i]];
             let side = |place: usize| Side {
@@ -333,13 +333,13 @@ struct Side<'a> {
     name: &'a str,
     category: &'a str,
     object: Option<&'a Tried<EvalObject>>,
-    ready: Option<&'a Ready<'a>>,
+    ready: Option<&'a Ready>,
 }
 
 /// A pair whose objects are sound.
 struct Job<'a> {
-    source: (&'a EvalObject, Option<&'a Ready<'a>>),
-    target: (&'a EvalObject, Option<&'a Ready<'a>>),
+    source: (&'a EvalObject, Option<&'a Ready>),
+    target: (&'a EvalObject, Option<&'a Ready>),
 }
 
 impl<'a> Job<'a> {
@@ -357,7 +357,7 @@ impl<'a> Job<'a> {
             row.score(&everything, truth, areas)?;
             return Ok(Ok(Prediction::of_region(&everything)));
         };
-        let by = |ready: Option<&'a Ready<'a>>| ready.and_then(|ready| ready.get(&features));
+        let by = |ready: Option<&'a Ready>| ready.and_then(|ready| ready.get(&features));
         let (Some(a), Some(b)) = (by(self.source.1), by(self.target.1)) else {
             return Ok(Err(Failure::new("object", "was not prepared")));
         };

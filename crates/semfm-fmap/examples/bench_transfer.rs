@@ -15,11 +15,12 @@ use std::error::Error;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use npyz::NpyFile;
 use semfm_fmap::transfer::{Matching, Method, TransferSettings};
-use semfm_fmap::{PreparedShape, Region, SemanticShape, metrics};
+use semfm_fmap::{PreparedObject, Region, metrics};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings, Task};
 
@@ -27,9 +28,9 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 struct Object {
     name: String,
-    shape: Shape,
-    even: SemanticCloud,
-    uniform: SemanticCloud,
+    shape: Arc<Shape>,
+    even: Arc<SemanticCloud>,
+    uniform: Arc<SemanticCloud>,
     grip: Region,
 }
 
@@ -44,11 +45,11 @@ fn points(folder: &Path, name: &str, what: &str) -> Outcome<Vec<DVec3>> {
     Ok(array::<f64>(folder, name, what)?.0.chunks(3).map(DVec3::from_slice).collect())
 }
 
-fn cloud(folder: &Path, name: &str, tag: &str) -> Outcome<SemanticCloud> {
+fn cloud(folder: &Path, name: &str, tag: &str) -> Outcome<Arc<SemanticCloud>> {
     let points = points(folder, name, &format!("{tag}_points"))?;
     let (features, dim) = array::<f32>(folder, name, &format!("{tag}_features"))?;
     let n = points.len();
-    Ok(SemanticCloud::new(points, features, dim, vec![1; n])?)
+    Ok(Arc::new(SemanticCloud::new(points, features, dim, vec![1; n])?))
 }
 
 fn load(folder: &Path, name: &str) -> Outcome<(Object, f64)> {
@@ -57,7 +58,7 @@ fn load(folder: &Path, name: &str) -> Outcome<(Object, f64)> {
     let mesh = Mesh::new(points(folder, name, "vertices")?, faces)?;
     let grip: Vec<bool> = array::<u8>(folder, name, "grip")?.0.iter().map(|&g| g == 1).collect();
     let start = Instant::now();
-    let shape = Shape::new(mesh, &ShapeSettings::default(), &Task::default())?;
+    let shape = Arc::new(Shape::new(mesh, &ShapeSettings::default(), &Task::default())?);
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let (even, uniform) = (cloud(folder, name, "even")?, cloud(folder, name, "uniform")?);
     Ok((Object { name: name.into(), shape, even, uniform, grip: Region::from_mask(&grip) }, ms))
@@ -103,8 +104,10 @@ fn main() -> Outcome<()> {
             for object in objects {
                 let cloud = if method == Method::Semfm { &object.uniform } else { &object.even };
                 let start = Instant::now();
-                let semantic = SemanticShape { shape: &object.shape, cloud };
-                ready.push(PreparedShape::new(semantic, &settings.clusters, &task)?);
+                let prepared =
+                    PreparedObject::new(Arc::clone(&object.shape), Arc::clone(cloud), &task)?;
+                prepared.clusters(&settings.clusters, &task)?;
+                ready.push(prepared);
                 prepare_ms.push(start.elapsed().as_secs_f64() * 1e3);
             }
             for (i, j) in (0..objects.len()).flat_map(|i| (0..objects.len()).map(move |j| (i, j))) {

@@ -73,7 +73,7 @@ pub fn normalised_coefficients(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pair::tests::{blob, shape};
+    use crate::test_objects::{blob, shape};
 
     #[test]
     fn descriptors_have_unit_norm_in_the_sense_that_was_asked_for() {

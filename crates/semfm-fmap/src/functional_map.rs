@@ -122,7 +122,7 @@ pub(crate) fn check_size(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pair::tests::{blob, shape};
+    use crate::test_objects::{blob, shape};
 
     #[test]
     fn the_identity_maps_to_the_identity_and_back() {

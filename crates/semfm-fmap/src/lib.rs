@@ -18,8 +18,8 @@
 //! any map); [`propagation`] draws the outline of what arrived along the target's own features. [`transfer`](mod@transfer) offers six methods made of these pieces under one interface,
 //! [`confidence`] says how far to trust the answer, [`metrics`] how good it was.
 //!
-//! The easy door is [`transfer()`]; [`PreparedShape`] and [`Matching`] keep what is worth keeping
-//! when one object meets many others, or one pair carries many regions.
+//! [`PreparedObject`] is made once for each object, [`Matching`] once for each pair; the matching
+//! carries any number of regions. [`transfer()`] is the short call for one region.
 
 pub mod anchors;
 pub mod assignment;
@@ -34,10 +34,12 @@ mod kmeans;
 pub mod metrics;
 mod nearest_rows;
 mod neighbour_graph;
-pub mod pair;
 pub mod point_map;
+mod prepared_object;
 pub mod propagation;
 pub mod region;
+#[cfg(test)]
+mod test_objects;
 pub mod transfer;
 pub mod transport;
 pub mod zoomout;
@@ -47,7 +49,7 @@ pub use confidence::{Evidence, Hypothesis, Verdict};
 pub use error::{Error, Result};
 pub use functional_map::FunctionalMap;
 pub use nearest_rows::nearest_rows;
-pub use pair::{PreparedShape, SemanticShape, ShapePair};
 pub use point_map::PointMap;
+pub use prepared_object::PreparedObject;
 pub use region::Region;
 pub use transfer::{Matching, Method, Rule, Transfer, TransferReport, TransferSettings, transfer};

@@ -222,7 +222,7 @@ fn check(settings: &ZoomOutSettings, source: &MapSide<'_>, target: &MapSide<'_>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pair::tests::{blob, shape};
+    use crate::test_objects::{blob, shape};
 
     /// Share of vertices that the map sends to themselves or to somewhere very near.
     fn right(map: &PointMap, shape: &semfm_geom::Shape) -> f64 {

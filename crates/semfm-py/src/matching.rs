@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use self_cell::self_cell;
 use semfm::fmap;
 use semfm::fmap::Matching as Matched;
 
@@ -11,20 +10,11 @@ use crate::anchors::Anchors;
 use crate::functional_map::FunctionalMap;
 use crate::held::Held;
 use crate::point_map::PointMap;
-use crate::prepared::{PreparedObject, PreparedParts};
+use crate::prepared::PreparedObject;
 use crate::region::region_of;
 use crate::settings::{Options, TransferSettings};
 use crate::transfer::Transfer;
 use crate::work::run;
-
-self_cell!(
-    /// A matched pair with both objects, from which it borrows.
-    struct MatchedPair {
-        owner: (Arc<PreparedParts>, Arc<PreparedParts>),
-        #[covariant]
-        dependent: Matched,
-    }
-);
 
 /// A matched pair: computed once, it carries any number of regions.
 ///
@@ -57,7 +47,7 @@ self_cell!(
 #[pyclass(frozen, module = "semfm")]
 #[derive(Clone)]
 pub struct Matching {
-    pair: Arc<MatchedPair>,
+    pair: Arc<Matched>,
     source: PreparedObject,
     target: PreparedObject,
 }
@@ -106,20 +96,20 @@ impl Matching {
     /// Anchors: the paired parts of the two objects.
     #[getter]
     fn anchors(&self) -> Anchors {
-        Anchors { held: Held::new(self.pair.borrow_dependent().anchors().clone()) }
+        Anchors { held: Held::new(self.pair.anchors().clone()) }
     }
 
     /// FunctionalMap, optional: C between the working shapes; None for methods without a map.
     #[getter]
     fn functional_map(&self) -> Option<FunctionalMap> {
-        let map = self.pair.borrow_dependent().functional_map()?;
+        let map = self.pair.functional_map()?;
         Some(FunctionalMap { held: Held::new(map.clone()) })
     }
 
     /// PointMap: target → source, between the working meshes.
     #[getter]
     fn working_point_map(&self) -> PointMap {
-        let map = self.pair.borrow_dependent().working_point_map();
+        let map = self.pair.working_point_map();
         let n_source = self.source.held.shape.mesh().n_vertices();
         PointMap { held: Held::new(map.clone()), n_source }
     }
@@ -149,17 +139,13 @@ impl Matching {
         settings: &fmap::TransferSettings,
         task: &semfm::Task,
     ) -> semfm::Result<Self> {
-        let parts = |object: &PreparedObject| object.parts(&settings.clusters, task);
-        let (on_source, on_target) = rayon::join(|| parts(&source), || parts(&target));
-        let pair = MatchedPair::try_new((on_source?, on_target?), |(source, target)| {
-            Matched::new(source.borrow_dependent(), target.borrow_dependent(), settings, task)
-        })?;
+        let pair = Matched::new(&source.held.object, &target.held.object, settings, task)?;
         Ok(Self { pair: Arc::new(pair), source, target })
     }
 
     /// Carries one region, which must be of the source's mesh.
     pub fn carry(&self, region: Held<semfm::Region>) -> semfm::Result<Transfer> {
-        let held = Held::new(self.pair.borrow_dependent().transfer(&region)?);
+        let held = Held::new(self.pair.transfer(&region)?);
         Ok(Transfer { held, source: self.source.clone(), target: self.target.clone(), region })
     }
 }

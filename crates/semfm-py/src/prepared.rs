@@ -1,14 +1,11 @@
 //! `PreparedObject`: shape and meaning of one object, made once.
 
 use std::borrow::Cow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use pyo3::prelude::*;
-use self_cell::self_cell;
-use semfm::fmap::clusters::ClusterSettings;
-use semfm::fmap::{PreparedShape, SemanticShape};
 use semfm::geom::SemanticCloud as Cloud;
-use semfm::{Meaning, PipelineSettings, Task};
+use semfm::{Meaning, PipelineSettings, Task, fmap};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
@@ -21,15 +18,6 @@ use crate::shape::{Shape, check_shape_size};
 use crate::work::run;
 use crate::{errors, json};
 
-self_cell!(
-    /// A prepared object with its parts, which borrow from it.
-    pub struct PreparedParts {
-        owner: Held<semfm::PreparedObject>,
-        #[covariant]
-        dependent: PreparedShape,
-    }
-);
-
 /// An object ready to be matched: its shape and its semantic cloud.
 ///
 /// Made by `prepare`. Semantic parts are cut at the first matching and kept.
@@ -37,36 +25,11 @@ self_cell!(
 #[derive(Clone)]
 pub struct PreparedObject {
     pub held: Held<semfm::PreparedObject>,
-    parts: Arc<Mutex<Option<Kept>>>,
 }
-
-/// The parts of the last matching and how they were cut.
-type Kept = (ClusterSettings, Arc<PreparedParts>);
 
 impl PreparedObject {
     pub fn new(object: semfm::PreparedObject) -> Self {
-        Self { held: Held::new(object), parts: Arc::default() }
-    }
-
-    /// The object's parts, cut as `settings` say; those of the last call are kept.
-    pub fn parts(
-        &self,
-        settings: &ClusterSettings,
-        task: &Task,
-    ) -> semfm::Result<Arc<PreparedParts>> {
-        let kept = || self.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((of, parts)) = &*kept()
-            && of == settings
-        {
-            return Ok(Arc::clone(parts));
-        }
-        let parts = PreparedParts::try_new(self.held.clone(), |object| {
-            let semantic = SemanticShape { shape: &object.shape, cloud: &object.cloud };
-            PreparedShape::new(semantic, settings, task)
-        })?;
-        let parts = Arc::new(parts);
-        *kept() = Some((*settings, Arc::clone(&parts)));
-        Ok(parts)
+        Self { held: Held::new(object) }
     }
 }
 
@@ -81,13 +44,13 @@ impl PreparedObject {
     /// Shape: working mesh and eigenbasis.
     #[getter]
     fn shape(&self) -> Shape {
-        Shape { held: self.held.part(|object| &object.shape) }
+        Shape { held: self.held.part(|object| &*object.shape) }
     }
 
     /// SemanticCloud: surface points with features.
     #[getter]
     fn cloud(&self) -> SemanticCloud {
-        SemanticCloud { held: self.held.part(|object| &object.cloud) }
+        SemanticCloud { held: self.held.part(|object| &*object.cloud) }
     }
 
     /// bool: whether the shape was read from the cache.
@@ -136,23 +99,33 @@ impl PreparedObject {
 #[pyfunction]
 #[pyo3(signature = (shape, cloud, from_cache, lifted, stages_ms))]
 pub fn _restore_prepared(
+    py: Python<'_>,
     shape: &Bound<'_, Shape>,
     cloud: &Bound<'_, SemanticCloud>,
     from_cache: bool,
     lifted: Option<(usize, Vec<usize>)>,
     stages_ms: Vec<(String, f64)>,
-) -> PreparedObject {
+) -> PyResult<PreparedObject> {
     let stages_ms = stages_ms
         .iter()
-        .map(|(name, ms)| (if name == "lift" { "lift" } else { "shape" }, *ms))
+        .map(|(name, ms)| match &**name {
+            "lift" => ("lift", *ms),
+            "shape" => ("shape", *ms),
+            _ => ("prepare", *ms),
+        })
         .collect();
-    PreparedObject::new(semfm::PreparedObject {
-        shape: (*shape.get().held).clone(),
+    let (shape, cloud) =
+        (Arc::new((*shape.get().held).clone()), Arc::new((*cloud.get().held).clone()));
+    let (of, on) = (Arc::clone(&shape), Arc::clone(&cloud));
+    let object = run(py, None, move |task| Ok(fmap::PreparedObject::new(of, on, task)?))?;
+    Ok(PreparedObject::new(semfm::PreparedObject {
+        object,
+        shape,
         from_cache,
-        cloud: (*cloud.get().held).clone(),
+        cloud,
         lifted: lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view }),
         stages_ms,
-    })
+    }))
 }
 
 /// Where an object's features come from, owned.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use semfm::fmap::{Matching, PreparedShape, SemanticShape};
+use semfm::fmap::Matching;
 use semfm::geom::math::DVec3;
 use semfm::geom::zoo::icosphere;
 use semfm::{Meaning, Mesh, PipelineSettings, PreparedObject, Region, Task};
@@ -36,7 +36,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Once: the demonstrated tool and its regions.
     let source = prepare(2.0, 0.4, &settings, &task)?;
-    let demonstrated = parts(&source, &settings, &task)?;
     let mesh = source.shape.original();
     let (low, high) = mesh.bounds();
     let share = |p: &DVec3| (p.x - low.x) / (high.x - low.x);
@@ -47,8 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // For each object that turns up: prepare it, match it, carry every region.
     for (length, thickness) in [(1.2, 0.6), (2.5, 0.3), (3.0, 0.5)] {
         let target = prepare(length, thickness, &settings, &task)?;
-        let observed = parts(&target, &settings, &task)?;
-        let matching = Matching::new(&demonstrated, &observed, &settings.transfer, &task)?;
+        let matching = Matching::new(&source.object, &target.object, &settings.transfer, &task)?;
         for (name, region) in &regions {
             let carried = matching.transfer(region)?;
             println!(
@@ -90,14 +88,4 @@ fn prepare(
     let features: Vec<f32> =
         sphere.vertices().iter().flat_map(|p| places.map(|centre| near(p.x, centre))).collect();
     PreparedObject::new(mesh, Meaning::PerVertex(&features), settings, task)
-}
-
-/// The object's semantic parts and features, ready to be matched.
-fn parts<'a>(
-    object: &'a PreparedObject,
-    settings: &PipelineSettings,
-    task: &Task,
-) -> semfm::Result<PreparedShape<'a>> {
-    let semantic = SemanticShape { shape: &object.shape, cloud: &object.cloud };
-    Ok(PreparedShape::new(semantic, &settings.transfer.clusters, task)?)
 }

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use semfm_fmap::Anchor;
-use semfm_fmap::clusters::spectral_clusters;
 use semfm_geom::io::{Paint, write_painted_mesh};
-use semfm_geom::{Mesh, PointIndex, Task};
+use semfm_geom::{Mesh, Task};
 use serde_json::{Map, Value, json};
 
 use crate::region_file::{region_json, write_json};
@@ -74,7 +73,7 @@ pub struct ObjectAnchors {
     pub of_vertex: Vec<i64>,
 }
 
-/// Where the anchors of a transfer lie. The clusters are made anew, which takes some ten milliseconds.
+/// Where the anchors of a transfer lie. The clusters are those that the objects keep.
 ///
 /// # Errors
 /// Whatever clustering reports.
@@ -86,15 +85,14 @@ pub fn anchor_ranks(
 ) -> Result<AnchorRanks> {
     let of = |object: &PreparedObject, side: fn(&Anchor) -> u32| -> Result<ObjectAnchors> {
         let settings = &transfer.report.settings.clusters;
-        let clusters = spectral_clusters(&object.cloud, settings, task)?;
+        let clusters = object.object.clusters(settings, task)?;
         let anchors = &transfer.report.anchors;
         let rank = |&label: &u32| {
             anchors.iter().position(|a| side(&a.anchor) == label).map_or(-1, |rank| rank as i64)
         };
         let of_point: Vec<i64> = clusters.labels().iter().map(rank).collect();
-        let index = PointIndex::new(object.cloud.points())?;
-        let vertices = object.shape.original().vertices();
-        let of_vertex = vertices.iter().map(|&p| of_point[index.nearest(p).0]).collect();
+        let point_of_vertex = object.object.point_of_original_vertex();
+        let of_vertex = point_of_vertex.iter().map(|&j| of_point[j as usize]).collect();
         Ok(ObjectAnchors { cluster_of_point: clusters.labels().to_vec(), of_point, of_vertex })
     };
     Ok(AnchorRanks { source: of(source, |a| a.source)?, target: of(target, |a| a.target)? })

@@ -8,9 +8,10 @@
 //! The shell and the Python package call these same two functions.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 use std::time::Instant;
 
-use semfm_fmap::{Method, Region, SemanticShape, ShapePair, Transfer, TransferSettings};
+use semfm_fmap::{Method, Region, Transfer, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeCache, ShapeSettings, Task};
@@ -69,15 +70,17 @@ pub enum Meaning<'a> {
 /// An object ready to be matched: its shape, its meaning, and how long each took.
 #[derive(Clone, Debug)]
 pub struct PreparedObject {
+    /// What matching reads, made once.
+    pub object: semfm_fmap::PreparedObject,
     /// Working mesh and eigenbasis.
-    pub shape: Shape,
+    pub shape: Arc<Shape>,
     /// Whether the shape was read from the cache.
     pub from_cache: bool,
     /// Surface points with features.
-    pub cloud: SemanticCloud,
+    pub cloud: Arc<SemanticCloud>,
     /// How well the views covered the surface, where there were views.
     pub lifted: Option<LiftReport>,
-    /// Milliseconds per stage: `shape`, `lift`.
+    /// Milliseconds per stage: `lift`, `shape`, `prepare`.
     pub stages_ms: Vec<(&'static str, f64)>,
 }
 
@@ -99,17 +102,18 @@ impl PreparedObject {
         let start = Instant::now();
         let cached = settings.cache.shape(mesh, &settings.shape, task)?;
         let shape_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let (shape, cloud) = (Arc::new(cached.shape), Arc::new(cloud));
+        let object = semfm_fmap::PreparedObject::new(Arc::clone(&shape), Arc::clone(&cloud), task)?;
+        let prepare_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(Self {
-            shape: cached.shape,
+            object,
+            shape,
             from_cache: cached.hit,
             cloud,
             lifted,
-            stages_ms: vec![("lift", lift_ms), ("shape", shape_ms)],
+            stages_ms: vec![("lift", lift_ms), ("shape", shape_ms), ("prepare", prepare_ms)],
         })
-    }
-
-    fn semantic(&self) -> SemanticShape<'_> {
-        SemanticShape { shape: &self.shape, cloud: &self.cloud }
     }
 }
 
@@ -148,8 +152,7 @@ pub fn transfer(
     settings: &TransferSettings,
     task: &Task,
 ) -> Result<Transfer> {
-    let pair = ShapePair { source: source.semantic(), target: target.semantic() };
-    Ok(semfm_fmap::transfer(pair, region, settings, task)?)
+    Ok(semfm_fmap::transfer(&source.object, &target.object, region, settings, task)?)
 }
 
 /// A cloud at up to `n_points` farthest-point vertices of the surface, with their features.

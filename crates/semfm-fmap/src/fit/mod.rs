@@ -180,7 +180,7 @@ fn rank(values: &[f64]) -> (usize, f64) {
 mod tests {
     use super::*;
     use crate::fit::solve::CG_LIMIT;
-    use crate::pair::tests::{blob, shape};
+    use crate::test_objects::{blob, shape};
     use faer::linalg::solvers::Solve;
     use faer::{Mat, Side};
     use semfm_geom::Shape;

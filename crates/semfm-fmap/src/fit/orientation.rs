@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::descriptors::normalised_coefficients;
     use crate::fit::{FitSettings, FitSide, fit};
-    use crate::pair::tests::{blob, shape};
+    use crate::test_objects::{blob, shape};
     use crate::{FunctionalMap, PointMap};
     use semfm_geom::descriptors::{WksSettings, wks};
     use semfm_geom::math::DVec3;

@@ -5,24 +5,25 @@
 //! vote is smoothed by heat.
 
 use super::semfm::anchor_fit;
-use super::{Matched, Pair, Rule, Stages};
+use super::{Matched, Pair, PairedParts, Rule, Stages};
+use crate::Result;
 use crate::zoomout::{point_map, reverse_point_map, zoomout};
-use crate::{Anchors, Result};
 
 pub(super) fn match_pair(
     pair: &Pair<'_>,
-    anchors: &Anchors,
+    parts: &PairedParts,
     stages: &mut Stages,
 ) -> Result<Matched> {
     let settings = pair.settings;
     let features = pair.vertex_features();
     let (source, target) = pair.sampled_sides(&features);
     let fit = stages.time("fit", || {
-        let (on_source, on_target) = (pair.source.vertex_labels(), pair.target.vertex_labels());
+        let (on_source, on_target) =
+            (pair.source.vertex_labels(&parts.source), pair.target.vertex_labels(&parts.target));
         anchor_fit(
             (source.basis, &on_source),
             (target.basis, &on_target),
-            anchors,
+            &parts.anchors,
             settings,
             pair.task,
         )

@@ -21,11 +21,13 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use faer::Mat;
 use semfm_geom::Task;
 
+use crate::clusters::Clusters;
 use crate::confidence::{
     Evidence, Hypothesis, Verdict, is_one_piece, islands, probability_by_agreement,
 };
@@ -35,7 +37,7 @@ use crate::metrics::overlap;
 use crate::propagation::{PropagationSettings, propagate};
 use crate::transport::{Plan, couple};
 use crate::zoomout::MapSide;
-use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedShape, Region, Result, ShapePair};
+use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result};
 
 pub use report::{AnchorReport, MapQuality, OtherRule, Stages, TransferReport, TransportReport};
 pub use settings::{Method, Rule, TransferSettings};
@@ -69,27 +71,23 @@ impl Transfer {
     }
 }
 
-/// Carries `region`, which lies on the source's original vertices, to the target: the easy door.
+/// Carries `region`, which lies on the source's original vertices, to the target: a [`Matching`]
+/// for one region.
 ///
 /// # Errors
 /// [`Error::EmptyRegion`], [`Error::Length`] where the region is not one of the source's mesh or
-/// the features differ in dimension, [`Error::OutOfRange`] for impossible settings, whatever the
-/// steps report; cancellation. A region that lands nowhere is no error but a refusal.
+/// the features differ in dimension, [`Error::OutOfRange`] for impossible settings,
+/// [`Error::LinearAlgebra`], [`Error::NotOriented`], [`Error::Geom`] on cancellation. A region that
+/// lands nowhere is no error but a refusal.
 pub fn transfer(
-    pair: ShapePair<'_>,
+    source: &PreparedObject,
+    target: &PreparedObject,
     region: &Region,
     settings: &TransferSettings,
     task: &Task,
 ) -> Result<Transfer> {
-    check_region(region, pair.source.shape.original().n_vertices())?;
-    let start = Instant::now();
-    let prepare = |semantic| PreparedShape::new(semantic, &settings.clusters, task);
-    let (source, target) = rayon::join(|| prepare(pair.source), || prepare(pair.target));
-    let (source, target) = (source?, target?);
-    let prepared = start.elapsed();
-    let mut matching = Matching::new(&source, &target, settings, task)?;
-    matching.stages.put_first("prepare", prepared);
-    matching.transfer(region)
+    check_region(region, source.shape().original().n_vertices())?;
+    Matching::new(source, target, settings, task)?.transfer(region)
 }
 
 /// What a method found out about a pair, on working vertices.
@@ -112,13 +110,13 @@ enum Voter {
 }
 
 /// A matched pair: computed once, it carries any number of regions.
-pub struct Matching<'a> {
-    source: &'a PreparedShape<'a>,
-    target: &'a PreparedShape<'a>,
+pub struct Matching {
+    source: PreparedObject,
+    target: PreparedObject,
     settings: TransferSettings,
     joint: JointFeatures,
     plan: Plan,
-    anchors: Anchors,
+    parts: PairedParts,
     matched: Matched,
     voter: Voter,
     /// The map that stands beside a method without one, so that there are two opinions.
@@ -126,15 +124,40 @@ pub struct Matching<'a> {
     stages: Stages,
 }
 
-impl<'a> Matching<'a> {
+/// The clusters of both objects and which of them are anchors.
+struct PairedParts {
+    source: Arc<Clusters>,
+    target: Arc<Clusters>,
+    anchors: Anchors,
+}
+
+impl PairedParts {
+    fn new(
+        source: &PreparedObject,
+        target: &PreparedObject,
+        settings: &TransferSettings,
+        task: &Task,
+    ) -> Result<Self> {
+        let dim = (source.cloud().dim(), target.cloud().dim());
+        Error::length("feature dimension of the target", dim.0, dim.1)?;
+        let clusters = |object: &PreparedObject| object.clusters(&settings.clusters, task);
+        let (on_source, on_target) = rayon::join(|| clusters(source), || clusters(target));
+        let (on_source, on_target) = (on_source?, on_target?);
+        let pair = ((&**source.cloud(), &*on_source), (&**target.cloud(), &*on_target));
+        let anchors = Anchors::select(pair.0, pair.1, settings.n_anchors);
+        Ok(Self { source: on_source, target: on_target, anchors })
+    }
+}
+
+impl Matching {
     /// Matches two prepared objects by the method and constants of `settings`. Map sizes are clipped
     /// to what both bases hold, and the report says so.
     ///
     /// # Errors
     /// As [`transfer`].
     pub fn new(
-        source: &'a PreparedShape<'a>,
-        target: &'a PreparedShape<'a>,
+        source: &PreparedObject,
+        target: &PreparedObject,
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
@@ -142,16 +165,7 @@ impl<'a> Matching<'a> {
         settings.check()?;
         let settings = settings.clipped(source.shape().basis().k().min(target.shape().basis().k()));
         let mut stages = Stages::default();
-        let anchors = stages.time("anchors", || {
-            Error::length(
-                "feature dimension of the target",
-                source.cloud().dim(),
-                target.cloud().dim(),
-            )?;
-            let (on_source, on_target) =
-                ((source.cloud(), source.clusters()), (target.cloud(), target.clusters()));
-            Ok(Anchors::select(on_source, on_target, settings.n_anchors))
-        })?;
+        let parts = stages.time("anchors", || PairedParts::new(source, target, &settings, task))?;
         task.check()?;
         let joint = stages.time("features", || {
             JointFeatures::new(source.features(), target.features(), settings.feature_dims)
@@ -168,8 +182,8 @@ impl<'a> Matching<'a> {
         let pair = Pair { source, target, joint: &joint, settings: &settings, task };
         let (matched, voter) = match settings.method {
             Method::Fused => (fused::match_pair(&pair, &plan, &mut stages)?, Voter::Map),
-            Method::Semfm => (semfm::match_pair(&pair, &anchors, &mut stages)?, Voter::Map),
-            Method::Anchored => (anchored::match_pair(&pair, &anchors, &mut stages)?, Voter::Map),
+            Method::Semfm => (semfm::match_pair(&pair, &parts, &mut stages)?, Voter::Map),
+            Method::Anchored => (anchored::match_pair(&pair, &parts, &mut stages)?, Voter::Map),
             Method::Wks => (baselines::match_by_wks(&pair, &mut stages)?, Voter::Map),
             Method::Sinkhorn => (baselines::match_by_plan(&pair, &plan), Voter::Transport),
             Method::Nearest => baselines::match_by_neighbours(&pair, &mut stages),
@@ -183,12 +197,23 @@ impl<'a> Matching<'a> {
                 Some(fused::match_pair(&pair, &plan, &mut stages)?)
             }
         };
-        Ok(Self { source, target, settings, joint, plan, anchors, matched, voter, witness, stages })
+        let (source, target) = (source.clone(), target.clone());
+        Ok(Self { source, target, settings, joint, plan, parts, matched, voter, witness, stages })
+    }
+
+    /// The demonstrated object.
+    pub fn source(&self) -> &PreparedObject {
+        &self.source
+    }
+
+    /// The object that the regions are carried to.
+    pub fn target(&self) -> &PreparedObject {
+        &self.target
     }
 
     /// The semantic anchors of the pair.
     pub fn anchors(&self) -> &Anchors {
-        &self.anchors
+        &self.parts.anchors
     }
 
     /// The functional map between the working shapes, where the method makes one.
@@ -296,7 +321,7 @@ impl<'a> Matching<'a> {
             .iter()
             .map(|&v| votes[v as usize].clamp(0.0, 1.0))
             .collect();
-        let spread = propagate(self.target.graph(), self.target.masses(), &on_points, settings)?;
+        let spread = propagate(self.target.graph()?, self.target.masses(), &on_points, settings)?;
         Ok(self.target.onto_vertices(&spread))
     }
 
@@ -370,8 +395,8 @@ impl<'a> Matching<'a> {
 
 /// What every method starts from.
 struct Pair<'a> {
-    source: &'a PreparedShape<'a>,
-    target: &'a PreparedShape<'a>,
+    source: &'a PreparedObject,
+    target: &'a PreparedObject,
     joint: &'a JointFeatures,
     settings: &'a TransferSettings,
     task: &'a Task,
@@ -389,10 +414,10 @@ impl Pair<'_> {
         &'b self,
         features: &'b (Mat<f64>, Mat<f64>),
     ) -> (MapSide<'b>, MapSide<'b>) {
-        let side = |shape: &'b PreparedShape<'_>, features: &'b Mat<f64>| MapSide {
-            basis: shape.shape().basis(),
+        let side = |object: &'b PreparedObject, features: &'b Mat<f64>| MapSide {
+            basis: object.shape().basis(),
             features: Some(features.as_ref()),
-            samples: shape.samples(),
+            samples: object.samples(),
         };
         (side(self.source, &features.0), side(self.target, &features.1))
     }

@@ -51,10 +51,6 @@ impl Stages {
             None => self.0.push((Cow::Borrowed(stage), ms)),
         }
     }
-
-    pub(super) fn put_first(&mut self, stage: &'static str, time: Duration) {
-        self.0.insert(0, (Cow::Borrowed(stage), time.as_secs_f64() * 1e3));
-    }
 }
 
 impl Serialize for Stages {
@@ -173,7 +169,7 @@ pub struct TransferReport {
     pub other_rule: Option<OtherRule>,
 }
 
-impl Matching<'_> {
+impl Matching {
     pub(super) fn report(
         &self,
         (agreement, evidence): (f64, Evidence),
@@ -207,8 +203,9 @@ impl Matching<'_> {
     }
 
     fn anchor_reports(&self) -> Vec<AnchorReport> {
-        let carried = self.matched.point_map.pull_back(&self.source.vertex_labels());
-        let labels = self.target.vertex_labels();
+        let carried =
+            self.matched.point_map.pull_back(&self.source.vertex_labels(&self.parts.source));
+        let labels = self.target.vertex_labels(&self.parts.target);
         let (mesh, areas) = (self.target.shape().mesh(), &self.target.shape().basis().mass);
         let report = |&anchor: &Anchor| {
             let from_source: Vec<bool> = carried.iter().map(|&l| l == anchor.source).collect();
@@ -227,7 +224,7 @@ impl Matching<'_> {
                 anchor_error(&from_source, &partner, areas, distance, self.target.shape().unit());
             AnchorReport { anchor, error }
         };
-        self.anchors.pairs.iter().map(report).collect()
+        self.parts.anchors.pairs.iter().map(report).collect()
     }
 
     fn map_quality(&self) -> MapQuality {

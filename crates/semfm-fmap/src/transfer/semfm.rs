@@ -8,7 +8,7 @@
 
 use semfm_geom::{Eigenbasis, Task};
 
-use super::{Matched, Pair, Stages, TransferSettings};
+use super::{Matched, Pair, PairedParts, Stages, TransferSettings};
 use crate::descriptors::diffused_indicators;
 use crate::fit::{Fit, fit};
 use crate::zoomout::{MapSide, point_map, zoomout};
@@ -35,18 +35,19 @@ pub fn anchor_fit(
 
 pub(super) fn match_pair(
     pair: &Pair<'_>,
-    anchors: &Anchors,
+    parts: &PairedParts,
     stages: &mut Stages,
 ) -> Result<Matched> {
     let (source, target) = pair.plain_sides();
-    let (on_source, on_target) = (pair.source.vertex_labels(), pair.target.vertex_labels());
-    let swapped = anchors.swapped();
+    let (on_source, on_target) =
+        (pair.source.vertex_labels(&parts.source), pair.target.vertex_labels(&parts.target));
+    let swapped = parts.anchors.swapped();
     let (forth, back) = stages.time("fit", || {
         let settings = pair.settings;
         let forth = anchor_fit(
             (source.basis, &on_source),
             (target.basis, &on_target),
-            anchors,
+            &parts.anchors,
             settings,
             pair.task,
         )?;

@@ -1,39 +1,31 @@
 //! Every method on small pairs: what is carried where, and what is refused.
 
 use super::*;
-use crate::pair::tests::{blob, cloud, shape};
-use crate::{SemanticShape, metrics};
+use crate::metrics;
+use crate::test_objects::{blob, cloud, shape};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings};
 
-struct Object(Shape, SemanticCloud);
-
-impl Object {
-    /// A blob whose features tell where along x its points are.
-    fn blob(stretch: f64, offset: f32) -> Self {
-        let mesh = blob(stretch);
-        Self(shape(&mesh, 60), cloud(&mesh, stretch, offset))
-    }
-
-    fn semantic(&self) -> SemanticShape<'_> {
-        SemanticShape { shape: &self.0, cloud: &self.1 }
-    }
+fn object(shape: Shape, cloud: SemanticCloud) -> PreparedObject {
+    PreparedObject::new(Arc::new(shape), Arc::new(cloud), &Task::default()).unwrap()
 }
 
-fn pair<'a>(source: &'a Object, target: &'a Object) -> ShapePair<'a> {
-    ShapePair { source: source.semantic(), target: target.semantic() }
+/// A blob whose features tell where along x its points are.
+fn blob_object(stretch: f64, offset: f32) -> PreparedObject {
+    let mesh = blob(stretch);
+    object(shape(&mesh, 60), cloud(&mesh, stretch, offset))
 }
 
 /// The end of a blob towards +x.
-fn tip(object: &Object, stretch: f64) -> Region {
+fn tip(object: &PreparedObject, stretch: f64) -> Region {
     let inside: Vec<bool> =
-        object.0.original().vertices().iter().map(|p| p.x / stretch > 1.0).collect();
+        object.shape().original().vertices().iter().map(|p| p.x / stretch > 1.0).collect();
     Region::from_mask(&inside)
 }
 
 #[test]
 fn every_method_with_meaning_carries_the_tip_to_the_tip() {
-    let (source, target) = (Object::blob(1.0, 0.2), Object::blob(1.5, 0.6));
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let (region, truth) = (tip(&source, 1.0), tip(&target, 1.5));
     for (method, least) in [
         (Method::Fused, 0.8),
@@ -44,17 +36,16 @@ fn every_method_with_meaning_carries_the_tip_to_the_tip() {
         (Method::Wks, 0.0),
     ] {
         let settings = TransferSettings::of(method);
-        let answer =
-            transfer(pair(&source, &target), &region, &settings, &Task::default()).unwrap();
+        let answer = transfer(&source, &target, &region, &settings, &Task::default()).unwrap();
         let iou = metrics::iou(&answer.region, &truth).unwrap();
         assert!(iou >= least, "{method} reaches IoU {iou:.2} only");
-        assert_eq!(answer.point_map.n_target(), target.0.original().n_vertices());
+        assert_eq!(answer.point_map.n_target(), target.shape().original().n_vertices());
         assert_eq!(answer.other_rule.is_some(), method == Method::Semfm);
         assert_eq!(answer.report.map.orthogonality.is_some(), method.has_map());
         assert_eq!(answer.report.anchors.len(), 2);
         let json = serde_json::to_value(&answer.report).unwrap();
         assert_eq!(json["settings"]["method"], method.name());
-        assert!(json["stages_ms"]["prepare"].as_f64().unwrap() > 0.0);
+        assert!(json["stages_ms"]["transport"].as_f64().unwrap() > 0.0);
         assert!(json["anchors"][0]["cosine"].as_f64().unwrap() <= 1.0 + 1e-9);
         if method == Method::Fused {
             assert_eq!(answer.verdict, Verdict::Accept, "agreement {}", answer.confidence);
@@ -67,14 +58,13 @@ fn every_method_with_meaning_carries_the_tip_to_the_tip() {
 
 #[test]
 fn the_image_rule_hits_fewer_vertices_of_the_same_place() {
-    let (source, target) = (Object::blob(1.0, 0.2), Object::blob(1.5, 0.6));
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let truth = tip(&target, 1.5).mask();
     for method in [Method::Semfm, Method::Anchored, Method::Wks, Method::Fused] {
         let settings =
             TransferSettings { rule: Rule::Image, diffusion: 0.0, ..TransferSettings::of(method) };
         let answer =
-            transfer(pair(&source, &target), &tip(&source, 1.0), &settings, &Task::default())
-                .unwrap();
+            transfer(&source, &target, &tip(&source, 1.0), &settings, &Task::default()).unwrap();
         assert!(!answer.region.is_empty(), "{method}");
         if method == Method::Fused {
             let right = answer.region.vertices().iter().filter(|&&v| truth[v as usize]).count();
@@ -83,31 +73,27 @@ fn the_image_rule_hits_fewer_vertices_of_the_same_place() {
     }
     for method in [Method::Nearest, Method::Sinkhorn] {
         let settings = TransferSettings { rule: Rule::Image, ..TransferSettings::of(method) };
-        let error =
-            transfer(pair(&source, &target), &tip(&source, 1.0), &settings, &Task::default());
+        let error = transfer(&source, &target, &tip(&source, 1.0), &settings, &Task::default());
         assert!(error.unwrap_err().to_string().contains(method.name()));
     }
 }
 
 #[test]
-fn one_matching_carries_many_regions_and_says_the_same_as_the_easy_door() {
-    let (source, target) = (Object::blob(1.0, 0.2), Object::blob(1.5, 0.6));
+fn one_matching_carries_many_regions_and_says_the_same_as_the_short_call() {
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let (task, settings) = (Task::default(), TransferSettings::default());
-    let source_ready = PreparedShape::new(source.semantic(), &settings.clusters, &task).unwrap();
-    let target_ready = PreparedShape::new(target.semantic(), &settings.clusters, &task).unwrap();
-    let matching = Matching::new(&source_ready, &target_ready, &settings, &task).unwrap();
+    let matching = Matching::new(&source, &target, &settings, &task).unwrap();
     let region = tip(&source, 1.0);
     let kept = matching.transfer(&region).unwrap();
-    let easy = transfer(pair(&source, &target), &region, &settings, &task).unwrap();
-    assert_eq!((kept.region, kept.point_map), (easy.region, easy.point_map));
+    let short = transfer(&source, &target, &region, &settings, &task).unwrap();
+    assert_eq!((kept.region, kept.point_map), (short.region, short.point_map));
     let rest = Region::from_mask(&region.mask().iter().map(|inside| !inside).collect::<Vec<_>>());
     assert!(matching.transfer(&rest).unwrap().report.target_area_share > 0.5);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let alone =
-        one.install(|| transfer(pair(&source, &target), &region, &settings, &task).unwrap());
+    let alone = one.install(|| transfer(&source, &target, &region, &settings, &task).unwrap());
     assert_eq!(
         (alone.region, alone.hypotheses),
-        (matching.transfer(&region).unwrap().region, easy.hypotheses)
+        (matching.transfer(&region).unwrap().region, short.hypotheses)
     );
 }
 
@@ -116,7 +102,7 @@ fn tiny_meshes_and_tiny_clouds_get_through_every_method() {
     let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     let mesh =
         Mesh::new(corners.clone(), vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
-    let tetrahedron = Object(
+    let tetrahedron = object(
         Shape::new(mesh, &ShapeSettings::default(), &Task::default()).unwrap(),
         SemanticCloud::new(corners, vec![1.0, 0.0, 0.9, 0.1, 0.0, 1.0, 0.1, 0.9], 2, vec![1; 4])
             .unwrap(),
@@ -127,15 +113,15 @@ fn tiny_meshes_and_tiny_clouds_get_through_every_method() {
     let n = points.len();
     assert_eq!(n, 5);
     let few =
-        Object(shape(&blob_mesh, 30), SemanticCloud::new(points, features, 2, vec![1; n]).unwrap());
+        object(shape(&blob_mesh, 30), SemanticCloud::new(points, features, 2, vec![1; n]).unwrap());
     let task = Task::default();
     for method in Method::ALL {
         let settings = TransferSettings::of(method);
         let region = Region::from_vertices(4, &[1]).unwrap();
-        let there = transfer(pair(&tetrahedron, &few), &region, &settings, &task).unwrap();
+        let there = transfer(&tetrahedron, &few, &region, &settings, &task).unwrap();
         assert_eq!(there.region.n_vertices(), 258);
         let region = Region::from_vertices(258, &[0, 1, 2]).unwrap();
-        let back = transfer(pair(&few, &tetrahedron), &region, &settings, &task).unwrap();
+        let back = transfer(&few, &tetrahedron, &region, &settings, &task).unwrap();
         assert_eq!(back.region.n_vertices(), 4);
         if back.region.is_empty() {
             assert_eq!(back.verdict, Verdict::Refuse);
@@ -145,32 +131,29 @@ fn tiny_meshes_and_tiny_clouds_get_through_every_method() {
 
 #[test]
 fn bad_input_is_named() {
-    let (source, target) = (Object::blob(1.0, 0.2), Object::blob(1.5, 0.6));
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let (task, settings) = (Task::default(), TransferSettings::default());
     let nothing = Region::from_vertices(258, &[]).unwrap();
-    let error = transfer(pair(&source, &target), &nothing, &settings, &task).unwrap_err();
+    let error = transfer(&source, &target, &nothing, &settings, &task).unwrap_err();
     assert!(matches!(error, Error::EmptyRegion { n_vertices: 258 }));
     let stranger = Region::from_vertices(7, &[1]).unwrap();
-    let error = transfer(pair(&source, &target), &stranger, &settings, &task).unwrap_err();
+    let error = transfer(&source, &target, &stranger, &settings, &task).unwrap_err();
     assert!(matches!(error, Error::Length { expected: 258, found: 7, .. }), "{error}");
     let region = tip(&source, 1.0);
-    let other = Object(
+    let other = object(
         shape(&blob(1.0), 20),
         SemanticCloud::new(vec![DVec3::X; 9], vec![1.0; 18], 2, vec![1; 9]).unwrap(),
     );
-    let error = transfer(pair(&source, &other), &region, &settings, &task).unwrap_err();
+    let error = transfer(&source, &other, &region, &settings, &task).unwrap_err();
     assert!(error.to_string().contains("feature dimension"), "{error}");
     let backwards = TransferSettings {
         propagation: PropagationSettings { weight: -1.0, ..PropagationSettings::default() },
         ..settings.clone()
     };
-    let error = transfer(pair(&source, &target), &region, &backwards, &task).unwrap_err();
+    let error = transfer(&source, &target, &region, &backwards, &task).unwrap_err();
     assert!(error.to_string().contains("propagation"), "{error}");
     task.cancel();
-    assert!(matches!(
-        transfer(pair(&source, &target), &region, &settings, &task),
-        Err(Error::Geom(_))
-    ));
+    assert!(matches!(transfer(&source, &target, &region, &settings, &task), Err(Error::Geom(_))));
 }
 
 #[test]

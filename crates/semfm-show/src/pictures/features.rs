@@ -7,8 +7,9 @@
 
 use std::path::Path;
 
-use semfm::fmap::features::{CentredFeatures, JointFeatures};
-use semfm::geom::{SemanticCloud, Task};
+use semfm::fmap::PreparedObject;
+use semfm::fmap::features::JointFeatures;
+use semfm::geom::Task;
 use semfm::output::ObjectAnchors;
 use semfm::views::{Paint, RenderSettings, View, render};
 
@@ -63,8 +64,8 @@ impl TransferFigure<'_> {
 
     fn feature_pictures(&self, side: usize, task: &Task) -> Result<Vec<View>> {
         let (object, Sides { best, other, .. }) = (self.objects()[side], self.sides[side]);
-        let clusters = by_vertex(object, &cluster_colors(&self.anchors[side]))?;
-        let features = by_vertex(object, &self.feature_colors[side])?;
+        let clusters = by_vertex(object, &cluster_colors(&self.anchors[side]));
+        let features = by_vertex(object, &self.feature_colors[side]);
         let (mesh, light) = (object.shape.original(), RenderSettings::default());
         let mut pictures = render(mesh, &Paint::Vertices(&features), &[best, other], &light, task)?;
         pictures.extend(render(mesh, &Paint::Vertices(&clusters), &[best], &light, task)?);
@@ -75,11 +76,10 @@ impl TransferFigure<'_> {
 /// The first three principal directions of the pair's features as colours of the clouds' points, in
 /// one basis.
 pub(super) fn feature_colors(
-    source: &SemanticCloud,
-    target: &SemanticCloud,
+    source: &PreparedObject,
+    target: &PreparedObject,
 ) -> Result<[Vec<[f32; 3]>; 2]> {
-    let (source, target) = (CentredFeatures::new(source)?, CentredFeatures::new(target)?);
-    let joint = JointFeatures::new(&source, &target, 3)?;
+    let joint = JointFeatures::new(source.features(), target.features(), 3)?;
     let colors = |features: faer::MatRef<'_, f64>| {
         let channel = |i: usize, c: usize| {
             let value = if c < features.ncols() { features[(i, c)] } else { 0.0 };

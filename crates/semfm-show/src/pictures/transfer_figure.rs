@@ -3,7 +3,6 @@
 use super::features::feature_colors;
 use super::{SIDE, Sides, paired_viewpoints, position_colors};
 use crate::Result;
-use semfm::geom::PointIndex;
 use semfm::output::{AnchorRanks, ObjectAnchors, anchor_ranks};
 use semfm::{Mesh, PreparedObject, Region, Task, Transfer};
 
@@ -24,8 +23,7 @@ pub struct TransferFigure<'a> {
 }
 
 impl<'a> TransferFigure<'a> {
-    /// Chooses viewpoints and colours. The clusters are made anew: they are a picture's matter, and
-    /// cost some ten milliseconds.
+    /// Chooses viewpoints and colours. The clusters are those that the objects keep.
     ///
     /// # Errors
     /// Whatever clustering or rendering reports.
@@ -47,7 +45,7 @@ impl<'a> TransferFigure<'a> {
         )?;
         let on_source = position_colors(source_mesh.vertices());
         let on_target = source_of.iter().map(|&v| on_source[v as usize]).collect();
-        let feature_colors = feature_colors(&source.cloud, &target.cloud)?;
+        let feature_colors = feature_colors(&source.object, &target.object)?;
         let AnchorRanks { source: on_source_anchors, target: on_target_anchors } =
             anchor_ranks(source, target, transfer, task)?;
         let anchors = [on_source_anchors, on_target_anchors];
@@ -77,8 +75,6 @@ impl<'a> TransferFigure<'a> {
 }
 
 /// What belongs to the cloud point nearest to each vertex of the mesh as read.
-pub(crate) fn by_vertex<T: Copy>(object: &PreparedObject, of_point: &[T]) -> Result<Vec<T>> {
-    let index = PointIndex::new(object.cloud.points())?;
-    let vertices = object.shape.original().vertices();
-    Ok(vertices.iter().map(|&p| of_point[index.nearest(p).0]).collect())
+pub(crate) fn by_vertex<T: Copy>(object: &PreparedObject, of_point: &[T]) -> Vec<T> {
+    object.object.point_of_original_vertex().iter().map(|&j| of_point[j as usize]).collect()
 }
