@@ -28,7 +28,7 @@ const point = async (panel, x, y) => {
   const at = { clientX: box.left + x * box.width, clientY: box.top + y * box.height };
   panel.canvas.dispatchEvent(new PointerEvent("pointermove", { ...at, ...mouse }));
   await frame();
-  return panel.told.textContent;
+  return panel.output.textContent;
 };
 const leave = async panel => {
   panel.canvas.dispatchEvent(new PointerEvent("pointerleave", mouse));
@@ -81,11 +81,11 @@ def test_pointing_at_either_object_lights_its_counterpart(browser, demo):  # noq
     const told = { before: [lit(source), lit(target)], says: [], lit: [] };
     for (const panel of [source, target]) {
       told.says.push(await point(panel, edge(panel), 0.5));
-      told.says.push((panel === source ? target : source).told.textContent);
-      told.lit.push([source.nLit(), target.nLit()], [lit(source), lit(target)]);
+      told.says.push((panel === source ? target : source).output.textContent);
+      told.lit.push([source.nHighlighted(), target.nHighlighted()], [lit(source), lit(target)]);
       await leave(panel);
     }
-    told.after = [lit(source), lit(target), source.told.textContent];
+    told.after = [lit(source), lit(target), source.output.textContent];
     told.n = [source.n, target.n];
     told.gl = source.painter.gl.getError();
     told.loaded = performance.getEntriesByType("resource").map(e => e.name)
@@ -139,8 +139,8 @@ def test_keys_turn_both_objects_and_tell_what_is_in_the_middle(browser, demo):  
     const told = { focus: document.activeElement === source.canvas, start: [source.yaw, target.yaw] };
     await key("ArrowLeft"); await key("ArrowUp"); await key("+");
     told.turned = [source.yaw, target.yaw]; told.zoom = [source.zoom, target.zoom];
-    told.says = source.told.textContent;
-    told.cross = source.stage.classList.contains("keys");
+    told.says = source.output.textContent;
+    told.cross = source.stage.classList.contains("crosshair");
     document.querySelector("input[type=checkbox]").click();
     await key("ArrowLeft");
     told.alone = [source.yaw, target.yaw];
@@ -217,7 +217,7 @@ def test_a_hundred_thousand_vertices_are_no_burden(browser, large):  # noqa: F81
     for (let i = 0; i < 100; i++) source.hover(i);
     told.back = (performance.now() - start) / 100;
     await frame();
-    told.lit = [source.nLit(), target.nLit()];
+    told.lit = [source.nHighlighted(), target.nHighlighted()];
     return told;
     """
     begun = "const begun = performance.now(); await window.semfmReady;"

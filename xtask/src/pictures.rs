@@ -34,10 +34,10 @@ addEventListener("load", async () => {
     const on_source = visible(source);
     let best = null, most = 0;
     for (const vertex of visible(target)) {
-      if (!/weight (1.00|0.9)/.test(target.tell(vertex))) continue;
+      if (!/weight (1.00|0.9)/.test(target.describe(vertex))) continue;
       target.hover(vertex);
-      const matched = Number(/source vertex (\d+)/.exec(target.told.textContent)[1]);
-      const lit = Math.min(source.nLit(), target.nLit());
+      const matched = Number(/source vertex (\d+)/.exec(target.output.textContent)[1]);
+      const lit = Math.min(source.nHighlighted(), target.nHighlighted());
       if (on_source.has(matched) && lit > most) [best, most] = [vertex, lit];
     }
     if (best !== null) target.hover(best);
@@ -73,7 +73,7 @@ pub fn make(workspace: &Workspace) -> Result<()> {
     ])?;
     semfm(&["show", &transfer, "-q", "-o", &page, "--title", "From a mug to a kettle"])?;
 
-    for name in ["transfer", "meaning", "grasps"] {
+    for name in ["transfer", "features", "grasps"] {
         keep(workspace, &at(&format!("transfer/{name}.png")), name)?;
     }
     keep(workspace, &at("views.png"), "views")?;

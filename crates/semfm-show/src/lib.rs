@@ -4,20 +4,22 @@
 //!   [`semfm::output`]), the pictures and the scene for Foxglove.
 //! - [`TransferFigure`], [`write_grasp_picture`] and [`write_sheet`] draw pictures (PNG).
 //! - [`groups_of_paths`] and [`write_page`] make one HTML page with an interactive viewer.
+//! - [`colors`] is the one table of colours, [`html`] the pieces that every page is made of.
 //!
 //! Nothing below this crate draws: a robot build takes `semfm` alone.
 
+pub mod colors;
 mod error;
 #[cfg(feature = "mcap")]
 mod foxglove;
+pub mod html;
 mod page;
 mod pictures;
 mod transfer_files;
 
 pub use error::{Error, Result};
-pub use page::{Group, Layer, Paint, Panel, Picture, groups_of_paths, write_page};
-pub use pictures::{
-    Sides, TransferFigure, paired_viewpoints, position_colors, viewpoints, write_grasp_picture,
-    write_sheet,
+pub use page::{
+    Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors, groups_of_paths, write_page,
 };
+pub use pictures::{TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_sheet};
 pub use transfer_files::write_transfer;

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use crate::{Result, TransferFigure};
 
 /// Writes a transfer into `folder`, which is made if it is not there: the files of
-/// [`output::write_transfer`], then `transfer.png`, `meaning.png` and (feature `mcap`) `transfer.mcap`.
+/// [`output::write_transfer`], then `transfer.png`, `features.png` and (feature `mcap`) `transfer.mcap`.
 /// Each file is written whole or not at all. `about` is put into the report as it is.
 ///
 /// # Errors
@@ -32,7 +32,7 @@ pub fn write_transfer(
     };
     let figure = TransferFigure::new(source, target, region, transfer, task)?;
     figure.write_transfer_picture(&add("transfer.png"), task)?;
-    figure.write_features_picture(&add("meaning.png"), task)?;
+    figure.write_features_picture(&add("features.png"), task)?;
     #[cfg(feature = "mcap")]
     crate::foxglove::write_transfer_scene(&add("transfer.mcap"), &figure, &report, task)?;
     Ok(files)

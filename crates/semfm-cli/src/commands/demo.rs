@@ -90,7 +90,7 @@ impl Demo {
         let outcome = job.finish(&folder, about, Some(&hand), &task, &talkative)?;
         if !common.json {
             talk::say(format_args!("IoU         {overlap:.2} with the true grip"));
-            let pictures = ["transfer.png", "meaning.png", "grasps.png"];
+            let pictures = ["transfer.png", "features.png", "grasps.png"];
             // A refused region is not grasped.
             for picture in pictures.map(|name| folder.join(name)).iter().filter(|p| p.is_file()) {
                 talk::say(format_args!("picture     {}", picture.display()));

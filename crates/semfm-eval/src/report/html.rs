@@ -1,24 +1,10 @@
-//! The few pieces of HTML that the page is made of: escaped text, tables, figures.
+//! The few pieces of HTML that the page is made of: tables, figures, sections.
 
 use std::fmt::Write;
 
-use crate::table::number;
+pub(super) use semfm_show::html::escape;
 
-/// Text as it may stand between tags and in attributes.
-pub(super) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            c => escaped.push(c),
-        }
-    }
-    escaped
-}
+use crate::table::number;
 
 /// One cell of a table's body.
 pub(super) struct Cell {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::write_atomically;
+use semfm_show::colors::SERIES;
 
 use super::html::{Cell, Table, escape, plot};
 use super::plots::{DrawError, error_curves};
@@ -105,7 +106,7 @@ fn figure(results: &MapResults, set: &str) -> std::result::Result<String, DrawEr
         return Ok(String::new());
     }
     let mut legend = String::new();
-    for (s, [r, g, b]) in summaries.iter().zip(error_curves::COLORS.iter().cycle()) {
+    for (s, [r, g, b]) in summaries.iter().zip(SERIES.iter().cycle()) {
         let words = escape(about(&s.method));
         legend += &format!("<li class=\"solid\" style=\"--c:rgb({r} {g} {b})\">{words}</li>");
     }

@@ -6,12 +6,10 @@
 
 mod confidence;
 mod context;
-mod data_uri;
 mod gallery;
 mod html;
 mod maps;
 mod pairs;
-mod palette;
 mod paper;
 mod plots;
 mod scores;
@@ -23,6 +21,9 @@ use std::path::{Path, PathBuf};
 
 use semfm::Task;
 use semfm::geom::io::write_atomically;
+use semfm_show::colors::{
+    EXTRA, MISSED, NamedColor, QUOTED, QUOTED_VLM, RIGHT, SECOND, css_properties,
+};
 
 use crate::dataset::Dataset;
 use crate::results::Results;
@@ -162,15 +163,28 @@ fn shell(title: &str, head: &str, style: &str, sections: &[Section]) -> String {
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
          <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title}</title>\n<style>\n{}{style}</style>\n</head>\n<body>\n\
+         <title>{title}</title>\n<style>\n:root {{ {} }}\n{}{style}</style>\n</head>\n<body>\n\
          <header>\n<h1>{title}</h1>\n{head}<nav aria-label=\"Contents\"><ul>{links}</ul></nav>\n\
          </header>\n<main>\n{bodies}</main>\n\
          <footer>Written by semfm {} from <code>results.json</code>; <code>table.md</code> holds the \
          same numbers as text.</footer>\n<script>\n{}</script>\n</body>\n</html>\n",
+        style_colors(),
         include_str!("style.css"),
         env!("CARGO_PKG_VERSION"),
         include_str!("page.js"),
     )
+}
+
+/// The colours that the plots and pictures have, too.
+fn style_colors() -> String {
+    css_properties(&[
+        NamedColor { name: "right", color: RIGHT },
+        NamedColor { name: "extra", color: EXTRA },
+        NamedColor { name: "missed", color: MISSED },
+        NamedColor { name: "quoted", color: QUOTED },
+        NamedColor { name: "second", color: SECOND },
+        NamedColor { name: "vlm", color: QUOTED_VLM },
+    ])
 }
 
 #[cfg(test)]

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 use semfm::geom::Pinhole;
 use semfm::views::{Paint, RenderSettings, render};
 use semfm::{Mesh, Region, Task};
-use semfm_show::{position_colors, viewpoints};
+use semfm_show::colors::{EXTRA, RIGHT, outcome_colors, position_colors, weight_colors_to};
+use semfm_show::html::jpeg_data_uri;
+use semfm_show::viewpoints;
 
 use super::ReportSettings;
 use super::html::{escape, img};
-use super::{data_uri, palette};
 use crate::dataset::{Dataset, ObjectEntry};
 use crate::prediction::{PairPredictions, Prediction};
 use crate::results::Results;
@@ -161,7 +162,7 @@ impl<'a> Thumbnails<'a> {
     /// The region that was found.
     pub fn region(&self, target: &DrawnObject, answer: &Prediction, alt: &str) -> Option<String> {
         let found = answer.region(target.mesh.n_vertices())?;
-        let colors = palette::by_weight(found.weights(), palette::EXTRA);
+        let colors = weight_colors_to(EXTRA, found.weights());
         target.draw(&colors, Side::Best, alt, &self.task)
     }
 
@@ -174,7 +175,7 @@ impl<'a> Thumbnails<'a> {
         alt: &str,
     ) -> Option<String> {
         let found = answer.region(target.mesh.n_vertices())?;
-        let colors = palette::by_error(&found.mask(), &target.truth.mask());
+        let colors = outcome_colors(&found.mask(), &target.truth.mask());
         target.draw(&colors, side, alt, &self.task)
     }
 
@@ -202,7 +203,7 @@ impl DrawnObject {
         let cameras = [sides.best, sides.other];
         let mut object =
             Self { name: entry.name.clone(), mesh, truth, cameras, place, own: String::new() };
-        let colors = palette::by_weight(object.truth.weights(), palette::RIGHT);
+        let colors = weight_colors_to(RIGHT, object.truth.weights());
         object.own = object.uri(&colors, Side::Best, task).ok_or_else(|| {
             Error::invalid(&entry.name, "a surface that can be drawn", "one that cannot")
         })?;
@@ -224,7 +225,7 @@ impl DrawnObject {
         let settings = RenderSettings { supersampling: 3, ..RenderSettings::default() };
         let views =
             render(&self.mesh, &Paint::Vertices(colors), &[camera], &settings, task).ok()?;
-        data_uri::jpeg(&views.first()?.rgb, camera.width(), camera.height())
+        jpeg_data_uri(&views.first()?.rgb, camera.width(), camera.height())
     }
 }
 

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::FilterType;
 use semfm::Task;
+use semfm_show::html::jpeg_data_uri;
 
 use super::ReportSettings;
 use super::context::Context;
-use super::data_uri;
 use super::html::{escape, img, shown};
 use super::thumbnails::{Side, Thumbnails};
 use crate::Result;
@@ -110,7 +110,7 @@ fn is_kept(c: char) -> bool {
 fn overlay(folder: &Path, view: usize, side: u32) -> Option<String> {
     let picture = image::open(folder.join(format!("answer-T{view}.png"))).ok()?;
     let small = picture.resize(side, side, FilterType::Triangle).to_rgb8();
-    data_uri::jpeg(small.as_raw(), small.width(), small.height())
+    jpeg_data_uri(small.as_raw(), small.width(), small.height())
 }
 
 #[cfg(test)]

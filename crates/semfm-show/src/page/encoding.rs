@@ -1,22 +1,17 @@
-//! Arrays for the page: zlib in base64. `viewer.js` reads them back.
+//! Arrays for the page: zlib in base64. `viewer/decode.js` reads them back.
 
 use std::io::Write;
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use semfm::geom::Mesh;
+use semfm::Mesh;
 use semfm::geom::math::{DVec3, bounds};
-use serde_json::{Value, json};
+use serde::Serialize;
 
-/// Bytes as they are, in base64.
-pub(super) fn base64(bytes: &[u8]) -> String {
-    BASE64_STANDARD.encode(bytes)
-}
+use crate::html::base64;
 
 /// Bytes, compressed.
-pub(super) fn packed(bytes: &[u8]) -> String {
+pub(super) fn encode_bytes(bytes: &[u8]) -> String {
     let mut zlib = ZlibEncoder::new(Vec::new(), Compression::default());
     // A Vec takes everything.
     let done = zlib.write_all(bytes).and_then(|()| zlib.finish());
@@ -25,7 +20,7 @@ pub(super) fn packed(bytes: &[u8]) -> String {
 
 /// Whole numbers: differences to the number before, signs folded into the last bit, in four planes of
 /// bytes. Neighbours in a mesh are near each other, so three of the planes are all but empty.
-pub(super) fn packed_numbers(numbers: impl IntoIterator<Item = u32>) -> String {
+pub(super) fn encode_numbers(numbers: impl IntoIterator<Item = u32>) -> String {
     let mut before = 0u32;
     let folded: Vec<u32> = numbers
         .into_iter()
@@ -35,23 +30,41 @@ pub(super) fn packed_numbers(numbers: impl IntoIterator<Item = u32>) -> String {
             ((difference << 1) ^ (difference >> 31)) as u32
         })
         .collect();
-    let plane = |k: u32| folded.iter().map(move |number| (number >> (8 * k)) as u8);
-    packed(&(0..4).flat_map(plane).collect::<Vec<u8>>())
+    let mut planes = Vec::with_capacity(4 * folded.len());
+    for k in 0..4 {
+        planes.extend(folded.iter().map(|number| (number >> (8 * k)) as u8));
+    }
+    encode_bytes(&planes)
 }
 
 /// Steps that the bounding box has along each axis; the viewer counts from the middle, 2¹⁹.
 const STEPS: f64 = (1 << 20) as f64;
 
-/// `n`, `step`, `positions` and `faces` of a mesh.
-pub(super) fn packed_mesh(mesh: &Mesh) -> Value {
-    let (low, high) = bounds(mesh.vertices()).unwrap_or_default();
-    let step = ((high - low) / STEPS).max(DVec3::splat(f64::MIN_POSITIVE));
-    let along =
-        |k: usize| mesh.vertices().iter().map(move |p| ((p[k] - low[k]) / step[k]).round() as u32);
-    json!({
-        "n": mesh.n_vertices(),
-        "step": step.to_array(),
-        "positions": packed_numbers((0..3).flat_map(along)),
-        "faces": packed_numbers(mesh.faces().as_flattened().iter().copied()),
-    })
+/// A mesh whose coordinates are whole numbers of steps.
+#[derive(Serialize)]
+pub(super) struct EncodedMesh {
+    n: usize,
+    /// Size of a step along each axis.
+    step: [f64; 3],
+    /// Steps from the lower corner of the box: all x, then all y, then all z.
+    positions: String,
+    faces: String,
+}
+
+impl EncodedMesh {
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let (low, high) = bounds(mesh.vertices()).unwrap_or_default();
+        let step = ((high - low) / STEPS).max(DVec3::splat(f64::MIN_POSITIVE));
+        let mut steps = Vec::with_capacity(3 * mesh.n_vertices());
+        for k in 0..3 {
+            let along = mesh.vertices().iter();
+            steps.extend(along.map(|p| ((p[k] - low[k]) / step[k]).round() as u32));
+        }
+        Self {
+            n: mesh.n_vertices(),
+            step: step.to_array(),
+            positions: encode_numbers(steps),
+            faces: encode_numbers(mesh.faces().as_flattened().iter().copied()),
+        }
+    }
 }

@@ -1,25 +1,29 @@
-//! A file of grasps as a group of the page: the best hand at the object, and the best few.
+//! A file of grasps as a group of the page: the best grasp on the object, and the best few.
 
 use std::path::Path;
 
 use parry3d_f64::transformation::try_convex_hull;
-use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
-use semfm::geom::{Mesh, Task};
-use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
+use semfm::{Mesh, Region, Task};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::transfer_folder::read_json;
-use super::{Group, Layer, Paint, Panel};
-use crate::pictures::{SHOWN, hand_color, sides_with_hands};
+use super::group::{Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors};
+use super::json::read_json;
+use super::mesh::file_name;
+use crate::colors::{MARKED, PLAIN, color_bytes, grasp_color};
+use crate::pictures::{N_SHOWN, Viewpoints, WeightedMesh, viewpoints_with_grippers};
 use crate::{Error, Result};
 
-/// The grasps of `path` at `mesh`, which must be the one they were found on; `weights` are those of
+/// The format of the file.
+pub(super) const FORMAT: &str = "semfm.grasps/1";
+
+/// The grasps of `path` on `mesh`, which must be the one they were found on; `weights` are those of
 /// the region, where it is known. Nothing where there is no grasp.
 ///
 /// # Errors
-/// [`Error::Format`] for another file or another mesh.
+/// [`Error::Format`] for another file or another mesh, [`Error::Semfm`] where it cannot be read or
+/// drawn.
 pub(super) fn grasps_group(
     path: &Path,
     mesh: &Mesh,
@@ -27,60 +31,69 @@ pub(super) fn grasps_group(
     task: &Task,
 ) -> Result<Option<Group>> {
     let file: GraspsFile = read_json(path)?;
-    let fault = |place: &str, expected: String, found: String| {
-        Err(Error::Format { path: path.to_owned(), place: place.into(), expected, found })
-    };
-    let hash = mesh.hash().to_string();
-    if let Some(found) = file.mesh["hash"].as_str().filter(|found| *found != hash) {
-        return fault("mesh", format!("the mesh before it, {hash}"), found.into());
-    }
-    if !(file.object_scale > 0.0 && file.object_scale.is_finite()) {
-        return fault("object_scale", "a positive number".into(), file.object_scale.to_string());
-    }
+    file.check(path, mesh)?;
     if file.grasps.is_empty() {
         return Ok(None);
     }
-    let shown = &file.grasps[..file.grasps.len().min(SHOWN)];
     let none = vec![0.0; mesh.n_vertices()];
-    let weights = weights.unwrap_or(&none);
+    let object = WeightedMesh { mesh, weights: weights.unwrap_or(&none) };
+    let shown = &file.grasps[..file.grasps.len().min(N_SHOWN)];
+    let alone = Scene::new(&file, object, &shown[..1])?;
+    // Both are seen from where the best gripper hides least.
+    let viewpoints = viewpoints_with_grippers(object, &alone.mesh, VIEWPOINT_SIDE, task)?;
+    let mut layer =
+        Layer { name: "hands".into(), legend: legend(shown), colors: vec![alone.colors] };
+    let mut panels = vec![file.panel("the best grasp", 1, alone.mesh, viewpoints)];
+    if shown.len() > 1 {
+        let all = Scene::new(&file, object, shown)?;
+        panels.push(file.panel("the best few", shown.len(), all.mesh, viewpoints));
+        layer.colors.push(all.colors);
+    }
+    Ok(Some(Group {
+        title: file_name(path),
+        facts: vec![
+            Fact::new("gripper", &file.gripper.name),
+            Fact::new("metres per unit", file.object_scale),
+        ],
+        panels,
+        layers: vec![layer],
+        source_of: None,
+        pictures: Vec::new(),
+    }))
+}
+
+fn legend(grasps: &[Grasp]) -> Vec<LegendEntry> {
     let mut legend = vec![
-        (Some(color_bytes(PLAIN)), "the object".to_owned()),
-        (Some(color_bytes(MARKED)), "the region".to_owned()),
+        LegendEntry::swatch(color_bytes(PLAIN), "the object"),
+        LegendEntry::swatch(color_bytes(MARKED), "the region"),
     ];
-    legend.extend(shown.iter().enumerate().map(|(rank, grasp)| {
-        let words = format!("{}: {:.0} mm, score {:.2}", rank + 1, 1e3 * grasp.width, grasp.score);
-        (Some(color_bytes(hand_color(rank))), format!("grasp {words}"))
+    legend.extend(grasps.iter().enumerate().map(|(rank, Grasp { width, score, .. })| {
+        let text = format!("grasp {}: {:.0} mm, score {score:.2}", rank + 1, 1e3 * width);
+        LegendEntry::swatch(color_bytes(grasp_color(rank, N_SHOWN)), text)
     }));
-    let scene = |grasps: &[Grasp]| -> Result<(Mesh, Paint)> {
-        let (mut vertices, mut faces) = (mesh.vertices().to_vec(), mesh.faces().to_vec());
+    legend
+}
+
+/// The object with grippers as one mesh. Classes: the object, its region, then one for each grasp.
+struct Scene {
+    mesh: Mesh,
+    colors: VertexColors,
+}
+
+impl Scene {
+    fn new(file: &GraspsFile, object: WeightedMesh<'_>, grasps: &[Grasp]) -> Result<Self> {
+        let mut vertices = object.mesh.vertices().to_vec();
+        let mut faces = object.mesh.faces().to_vec();
+        let weights = object.weights.iter();
         let mut classes: Vec<u8> =
-            weights.iter().map(|&weight| u8::from(weight >= Region::COUNTS)).collect();
+            weights.map(|&weight| u8::from(weight >= Region::COUNTS)).collect();
         for (rank, grasp) in grasps.iter().enumerate() {
-            file.add_hand(grasp, &mut vertices, &mut faces);
+            file.add_gripper(grasp, &mut vertices, &mut faces);
             classes.resize(vertices.len(), rank as u8 + 2);
         }
-        Ok((Mesh::new(vertices, faces)?, Paint::Classes(classes)))
-    };
-    // Both are seen from where the best hand hides least.
-    let (alone, paint) = scene(&shown[..1])?;
-    let sides = sides_with_hands(mesh, &alone, weights, 64, task)?;
-    let panel = |name: &str, n: usize, mesh: Mesh| {
-        let note = format!("{n} of {} grasps", file.grasps.len());
-        Panel { name: name.into(), note, mesh, sides }
-    };
-    let (mut panels, mut paints) = (vec![panel("the best grasp", 1, alone)], vec![paint]);
-    if shown.len() > 1 {
-        let (all, paint) = scene(shown)?;
-        panels.push(panel("the best few", shown.len(), all));
-        paints.push(paint);
+        let mesh = Mesh::new(vertices, faces)?;
+        Ok(Self { mesh, colors: VertexColors::Classes(classes) })
     }
-    let title = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    let facts = vec![
-        ("gripper".to_owned(), file.gripper.name.clone()),
-        ("metres per unit".to_owned(), file.object_scale.to_string()),
-    ];
-    let layers = vec![Layer { name: "hands".into(), legend, paints }];
-    Ok(Some(Group { title, facts, panels, layers, source_of: None, pictures: Vec::new() }))
 }
 
 /// `grasps.json`, what is of interest here.
@@ -95,15 +108,16 @@ struct GraspsFile {
 #[derive(Deserialize)]
 struct Gripper {
     name: String,
-    parts: Vec<Part>,
+    parts: Vec<GripperPart>,
 }
 
 /// A rigid part: corners of its convex pieces.
 #[derive(Deserialize)]
-struct Part {
+struct GripperPart {
     hulls: Vec<Vec<[f64; 3]>>,
 }
 
+/// A rigid motion as a 4 × 4 matrix, rows first.
 type Rows = [[f64; 4]; 4];
 
 #[derive(Deserialize)]
@@ -111,19 +125,40 @@ struct Grasp {
     object_from_tcp: Rows,
     width: f64,
     score: f64,
-    hand: Hand,
+    #[serde(rename = "hand")]
+    part_poses: PartPoses,
 }
 
 /// Poses of the parts in the TCP's frame.
 #[derive(Deserialize)]
-struct Hand {
+struct PartPoses {
     closed: Vec<Rows>,
 }
 
 impl GraspsFile {
-    /// Adds the closed hand, in the units of the mesh.
-    fn add_hand(&self, grasp: &Grasp, vertices: &mut Vec<DVec3>, faces: &mut Vec<[u32; 3]>) {
-        for (part, tcp_from_part) in self.gripper.parts.iter().zip(&grasp.hand.closed) {
+    /// Refuses grasps on another mesh, or of another scale than a positive one.
+    fn check(&self, path: &Path, mesh: &Mesh) -> Result<()> {
+        let hash = mesh.hash().to_string();
+        let other = self.mesh["hash"].as_str().filter(|found| *found != hash);
+        let has_scale = self.object_scale > 0.0 && self.object_scale.is_finite();
+        let (place, expected, found) = match other {
+            Some(found) => ("mesh", format!("the mesh before it, {hash}"), found.to_owned()),
+            None if !has_scale => {
+                ("object_scale", "a positive number".to_owned(), self.object_scale.to_string())
+            }
+            None => return Ok(()),
+        };
+        Err(Error::Format { path: path.to_owned(), place: place.into(), expected, found })
+    }
+
+    fn panel(&self, name: &str, n: usize, mesh: Mesh, viewpoints: Viewpoints) -> Panel {
+        let note = format!("{n} of {} grasps", self.grasps.len());
+        Panel { name: name.into(), note, mesh, viewpoints }
+    }
+
+    /// Adds the closed gripper, in the units of the mesh.
+    fn add_gripper(&self, grasp: &Grasp, vertices: &mut Vec<DVec3>, faces: &mut Vec<[u32; 3]>) {
+        for (part, tcp_from_part) in self.gripper.parts.iter().zip(&grasp.part_poses.closed) {
             for hull in &part.hulls {
                 let corners: Vec<DVec3> = hull.iter().copied().map(DVec3::from_array).collect();
                 // A piece without a hull (fewer than three corners) is not drawn.
@@ -144,7 +179,7 @@ impl GraspsFile {
 
 /// A point moved by a matrix whose rows come first.
 fn moved(rows: &Rows, p: DVec3) -> DVec3 {
-    let row = |k: usize| DVec3::new(rows[k][0], rows[k][1], rows[k][2]);
-    let turn = DMat3::from_cols(row(0), row(1), row(2)).transpose();
-    turn * p + DVec3::new(rows[0][3], rows[1][3], rows[2][3])
+    let [x, y, z] = [0, 1, 2].map(|k| DVec3::new(rows[k][0], rows[k][1], rows[k][2]));
+    let rotation = DMat3::from_cols(x, y, z).transpose();
+    rotation * p + DVec3::new(rows[0][3], rows[1][3], rows[2][3])
 }

@@ -1,30 +1,23 @@
 //! Pictures of results: what was transferred where, the features of the surfaces, grasps.
 
-mod features;
-mod grasps;
+mod canvas;
+mod feature_colors;
+mod features_picture;
+mod grasp_picture;
+mod pair_rotation;
 mod sheet;
 mod stroke_font;
-mod transfer;
 mod transfer_figure;
+mod transfer_picture;
 mod upright;
 mod viewpoints;
 
-use semfm::geom::math::{DVec3, bounds};
-
-pub use grasps::write_grasp_picture;
+pub use grasp_picture::write_grasp_picture;
 pub use sheet::write_sheet;
 pub use transfer_figure::TransferFigure;
-pub use viewpoints::{Sides, paired_viewpoints, viewpoints};
+pub use viewpoints::{Viewpoints, viewpoints};
 
-pub(crate) use features::anchor_color;
-pub(crate) use grasps::{SHOWN, hand_color, sides_with_hands};
-
-/// Side of each picture in pixels.
-const SIDE: u32 = 420;
-/// Positions as colours: x, y, z over the bounding box.
-pub fn position_colors(points: &[DVec3]) -> Vec<[f32; 3]> {
-    let Some((low, high)) = bounds(points) else { return Vec::new() };
-    let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
-    let color = |&p: &DVec3| ((p - low) / extent * 0.8 + 0.15).as_vec3().to_array();
-    points.iter().map(color).collect()
-}
+pub(crate) use grasp_picture::{N_SHOWN, viewpoints_with_grippers};
+pub(crate) use pair_rotation::WeightedMesh;
+pub(crate) use transfer_figure::ObjectFigure;
+pub(crate) use viewpoints::{PairedViewpoints, paired_viewpoints};

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-use semfm::geom::io::write_atomically;
 use semfm::views::View;
 
-use semfm::weight_colors::{color_bytes, weight_colors};
-
-use super::stroke_font;
+use super::canvas::{Canvas, Rect};
+use super::stroke_font::{self, Text};
+use crate::colors::{color_bytes, weight_colors};
 use crate::{Error, Result};
+
+/// Side of each picture in pixels, where we choose it.
+pub(super) const PICTURE_SIDE: u32 = 420;
 
 const INK: [u8; 3] = [29, 36, 48];
 const QUIET: [u8; 3] = [91, 102, 117];
@@ -34,14 +34,15 @@ pub fn write_sheet(path: &Path, pictures: &[View], columns: usize) -> Result<()>
     let columns = columns.clamp(1, pictures.len().max(1));
     let rows: Vec<Row<'_>> =
         pictures.chunks(columns).map(|pictures| Row { title: String::new(), pictures }).collect();
-    let mut pixels = Sheet { columns: &[], rows: &rows, legend: &[] }.drawn()?;
-    let (width, height) = size_of(pictures)?;
+    let mut canvas = Sheet { columns: &[], rows: &rows, legend: &[] }.drawn()?;
+    let size = Size::of_all(pictures)?;
     for i in 0..pictures.len() {
-        let corner = ((i % columns) * width + 8, (i / columns) * height + 8);
-        let foot = (corner.0 as f32, corner.1 as f32 + NUMBER);
-        stroke_font::draw(&mut pixels, foot, NUMBER, QUIET, &format!("{i:03}"));
+        let (left, top) = ((i % columns) * size.width + 8, (i / columns) * size.height + 8);
+        let (text, baseline) = (format!("{i:03}"), top as f32 + NUMBER);
+        Text { text: &text, left: left as f32, baseline, size: NUMBER, color: QUIET }
+            .draw(&mut canvas);
     }
-    pixels.write_png(path)
+    canvas.write_png(path)
 }
 
 /// What a sheet shows.
@@ -63,10 +64,27 @@ pub(super) struct Row<'a> {
 pub(super) enum Entry {
     /// The colours of weights from 0 to 1.
     Weights,
-    /// One colour and what it means.
+    /// One colour and what it stands for.
     Swatch([f32; 3], String),
-    /// Words alone.
-    Words(String),
+    /// Text alone.
+    Note(String),
+}
+
+/// Heights of the parts of a sheet, in pixels, and the size of each picture.
+struct Layout {
+    picture: Size,
+    width: usize,
+    header: usize,
+    strip: usize,
+    legend: usize,
+    entries: Vec<EntryPlace>,
+}
+
+/// Where an entry of the legend stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct EntryPlace {
+    left: f32,
+    line: usize,
 }
 
 impl Sheet<'_> {
@@ -74,63 +92,90 @@ impl Sheet<'_> {
         self.drawn()?.write_png(path)
     }
 
-    fn drawn(&self) -> Result<Pixels> {
-        let all: Vec<&View> = self.rows.iter().flat_map(|row| row.pictures).collect();
-        let (width, height) = size_of(all.iter().copied())?;
-        let n_columns = self.rows.iter().map(|row| row.pictures.len()).max().unwrap_or(1);
-        let total_width = n_columns * width;
-        let header = if self.columns.is_empty() { 0 } else { HEADER };
-        let strip = if self.rows.iter().all(|row| row.title.is_empty()) { 0 } else { STRIP };
-        let entries = self.places_of_entries(total_width as f32);
-        let n_lines = entries.last().map_or(0, |&(_, line)| line + 1);
-        let legend = if n_lines == 0 { 0 } else { n_lines * LEGEND + 20 };
-        let total_height = header + self.rows.len() * (strip + height) + legend;
-        let mut pixels = Pixels::new(total_width, total_height, [u8::MAX; 3]);
-
-        for (column, title) in self.columns.iter().enumerate() {
-            let middle = (column as f32 + 0.5) * width as f32;
-            let left = middle - stroke_font::width(title, LABEL) / 2.0;
-            stroke_font::draw(&mut pixels, (left, header as f32 - 12.0), LABEL, QUIET, title);
-        }
-        let mut top = header;
-        for row in self.rows {
-            if strip > 0 {
-                pixels.fill((0, top), (total_width, 1), LINE);
-                let foot = (MARGIN, top as f32 + 30.0);
-                stroke_font::draw(&mut pixels, foot, TITLE, INK, &row.title);
-            }
-            top += strip;
-            for (column, view) in row.pictures.iter().enumerate() {
-                pixels.put(&view.rgb, width, (column * width, top));
-            }
-            top += height;
-        }
-        if legend > 0 {
-            pixels.fill((0, top), (total_width, 1), LINE);
-        }
-        for (entry, &(left, line)) in self.legend.iter().zip(&entries) {
-            let foot = (top + LEGEND + 2 + line * LEGEND) as f32;
-            entry.draw(&mut pixels, (left, foot));
-        }
-        Ok(pixels)
+    fn drawn(&self) -> Result<Canvas> {
+        let layout = self.layout()?;
+        let rows = self.rows.len() * (layout.strip + layout.picture.height);
+        let height = layout.header + rows + layout.legend;
+        let mut canvas = Canvas::new(layout.width, height, [u8::MAX; 3]);
+        self.draw_titles(&layout, &mut canvas);
+        self.draw_rows(&layout, &mut canvas);
+        self.draw_legend(&layout, &mut canvas);
+        Ok(canvas)
     }
 
-    /// Left edge and line of each entry.
-    fn places_of_entries(&self, width: f32) -> Vec<(f32, usize)> {
-        let (mut left, mut line) = (MARGIN, 0);
+    fn layout(&self) -> Result<Layout> {
+        let picture = Size::of_all(self.rows.iter().flat_map(|row| row.pictures))?;
+        let n_columns = self.rows.iter().map(|row| row.pictures.len()).max().unwrap_or(1);
+        let width = n_columns * picture.width;
+        let entries = self.places_of_entries(width as f32);
+        let n_lines = entries.last().map_or(0, |place| place.line + 1);
+        let is_untitled = self.rows.iter().all(|row| row.title.is_empty());
+        Ok(Layout {
+            picture,
+            width,
+            header: if self.columns.is_empty() { 0 } else { HEADER },
+            strip: if is_untitled { 0 } else { STRIP },
+            legend: if n_lines == 0 { 0 } else { n_lines * LEGEND + 20 },
+            entries,
+        })
+    }
+
+    fn draw_titles(&self, layout: &Layout, canvas: &mut Canvas) {
+        for (column, title) in self.columns.iter().enumerate() {
+            let middle = (column as f32 + 0.5) * layout.picture.width as f32;
+            let left = middle - stroke_font::width(title, LABEL) / 2.0;
+            let baseline = layout.header as f32 - 12.0;
+            Text { text: title, left, baseline, size: LABEL, color: QUIET }.draw(canvas);
+        }
+    }
+
+    fn draw_rows(&self, layout: &Layout, canvas: &mut Canvas) {
+        let mut top = layout.header;
+        for row in self.rows {
+            if layout.strip > 0 {
+                draw_rule(canvas, top, layout.width);
+                let baseline = top as f32 + 30.0;
+                Text { text: &row.title, left: MARGIN, baseline, size: TITLE, color: INK }
+                    .draw(canvas);
+            }
+            top += layout.strip;
+            for (column, view) in row.pictures.iter().enumerate() {
+                canvas.put(&view.rgb, layout.picture.width, column * layout.picture.width, top);
+            }
+            top += layout.picture.height;
+        }
+    }
+
+    fn draw_legend(&self, layout: &Layout, canvas: &mut Canvas) {
+        let top = layout.header + self.rows.len() * (layout.strip + layout.picture.height);
+        if layout.legend > 0 {
+            draw_rule(canvas, top, layout.width);
+        }
+        for (entry, place) in self.legend.iter().zip(&layout.entries) {
+            let baseline = (top + LEGEND + 2 + place.line * LEGEND) as f32;
+            entry.draw(canvas, place.left, baseline);
+        }
+    }
+
+    fn places_of_entries(&self, width: f32) -> Vec<EntryPlace> {
+        let mut next = EntryPlace { left: MARGIN, line: 0 };
         self.legend
             .iter()
             .map(|entry| {
                 let wide = entry.width();
-                if left > MARGIN && left + wide > width - MARGIN {
-                    (left, line) = (MARGIN, line + 1);
+                if next.left > MARGIN && next.left + wide > width - MARGIN {
+                    next = EntryPlace { left: MARGIN, line: next.line + 1 };
                 }
-                let place = (left, line);
-                left += wide + 1.5 * MARGIN;
+                let place = next;
+                next.left += wide + 1.5 * MARGIN;
                 place
             })
             .collect()
     }
+}
+
+fn draw_rule(canvas: &mut Canvas, top: usize, width: usize) {
+    canvas.fill(Rect { left: 0, top, width, height: 1 }, LINE);
 }
 
 /// Pixels of the bar of weights, and of a swatch with the gap behind it.
@@ -138,10 +183,10 @@ const BAR: usize = 150;
 const SWATCH: f32 = 24.0;
 
 impl Entry {
-    fn words(&self) -> &str {
+    fn text(&self) -> &str {
         match self {
             Self::Weights => "0 to 1, counts from the mark on",
-            Self::Swatch(_, words) | Self::Words(words) => words,
+            Self::Swatch(_, text) | Self::Note(text) => text,
         }
     }
 
@@ -149,137 +194,69 @@ impl Entry {
         let mark = match self {
             Self::Weights => stroke_font::width("weight", LABEL) + BAR as f32 + 20.0,
             Self::Swatch(..) => SWATCH,
-            Self::Words(_) => 0.0,
+            Self::Note(_) => 0.0,
         };
-        mark + stroke_font::width(self.words(), LABEL)
+        mark + stroke_font::width(self.text(), LABEL)
     }
 
-    fn draw(&self, pixels: &mut Pixels, (mut left, foot): (f32, f32)) {
+    fn draw(&self, canvas: &mut Canvas, mut left: f32, baseline: f32) {
         match self {
             Self::Weights => {
-                stroke_font::draw(pixels, (left, foot), LABEL, INK, "weight");
+                Text { text: "weight", left, baseline, size: LABEL, color: INK }.draw(canvas);
                 left += stroke_font::width("weight", LABEL) + 10.0;
-                let corner = (left as usize, (foot - LABEL) as usize);
-                let shares: Vec<f64> = (0..BAR).map(|x| x as f64 / (BAR - 1) as f64).collect();
-                for (x, color) in weight_colors(&shares).into_iter().enumerate() {
-                    pixels.fill((corner.0 + x, corner.1), (1, LABEL as usize), color_bytes(color));
-                }
-                let middle = (corner.0 + BAR / 2, corner.1.saturating_sub(3));
-                pixels.fill(middle, (2, LABEL as usize + 6), INK);
+                draw_weight_bar(canvas, left as usize, (baseline - LABEL) as usize);
                 left += BAR as f32 + 10.0;
             }
             Self::Swatch(color, _) => {
-                let side = LABEL as usize;
-                pixels.fill(
-                    (left as usize, (foot - LABEL) as usize),
-                    (side, side),
-                    color_bytes(*color),
-                );
+                let (top, side) = ((baseline - LABEL) as usize, LABEL as usize);
+                let square = Rect { left: left as usize, top, width: side, height: side };
+                canvas.fill(square, color_bytes(*color));
                 left += SWATCH;
             }
-            Self::Words(_) => {}
+            Self::Note(_) => {}
         }
-        stroke_font::draw(pixels, (left, foot), LABEL, INK, self.words());
+        Text { text: self.text(), left, baseline, size: LABEL, color: INK }.draw(canvas);
     }
 }
 
-/// Width and height that all pictures have.
-fn size_of<'a>(pictures: impl IntoIterator<Item = &'a View>) -> Result<(usize, usize)> {
-    let size = |view: &View| (view.camera.width() as usize, view.camera.height() as usize);
-    let mut sizes = pictures.into_iter().map(size);
-    let Some(first) = sizes.next() else {
-        return Err(Error::invalid("pictures of a sheet", "at least one", "none"));
-    };
-    match sizes.find(|&other| other != first) {
-        None => Ok(first),
-        Some(other) => {
-            let expected = format!("{} × {} pixels each", first.0, first.1);
-            Err(Error::invalid("pictures of a sheet", expected, format!("{other:?}")))
-        }
+/// The colours of weights from 0 to 1, with a mark where a vertex begins to count.
+fn draw_weight_bar(canvas: &mut Canvas, left: usize, top: usize) {
+    let shares: Vec<f64> = (0..BAR).map(|x| x as f64 / (BAR - 1) as f64).collect();
+    for (x, color) in weight_colors(&shares).into_iter().enumerate() {
+        let column = Rect { left: left + x, top, width: 1, height: LABEL as usize };
+        canvas.fill(column, color_bytes(color));
     }
+    let (top, height) = (top.saturating_sub(3), LABEL as usize + 6);
+    canvas.fill(Rect { left: left + BAR / 2, top, width: 2, height }, INK);
 }
 
-/// An sRGB image being drawn.
-pub(super) struct Pixels {
-    pub width: usize,
+/// Width and height of a picture.
+#[derive(Clone, Copy, PartialEq)]
+struct Size {
+    width: usize,
     height: usize,
-    rgb: Vec<u8>,
 }
 
-impl Pixels {
-    pub(super) fn new(width: usize, height: usize, color: [u8; 3]) -> Self {
-        Self { width, height, rgb: color.repeat(width * height) }
+impl Size {
+    fn of(view: &View) -> Self {
+        Self { width: view.camera.width() as usize, height: view.camera.height() as usize }
     }
 
-    fn place(&self, x: usize, y: usize) -> usize {
-        3 * (y * self.width + x)
-    }
-
-    #[cfg(test)]
-    pub(super) fn at(&self, x: usize, y: usize) -> [u8; 3] {
-        let at = self.place(x, y);
-        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
-    }
-
-    /// Fills a rectangle; what lies outside is cut off.
-    fn fill(&mut self, (x, y): (usize, usize), (width, height): (usize, usize), color: [u8; 3]) {
-        let right = (x + width).min(self.width);
-        for row in y..(y + height).min(self.height) {
-            let (from, to) = (self.place(x.min(right), row), self.place(right, row));
-            self.rgb[from..to].as_chunks_mut::<3>().0.fill(color);
-        }
-    }
-
-    /// Puts an image of this width at a corner.
-    fn put(&mut self, rgb: &[u8], width: usize, (x, y): (usize, usize)) {
-        for (row, line) in rgb.chunks_exact(3 * width).enumerate() {
-            let start = self.place(x, y + row);
-            self.rgb[start..start + line.len()].copy_from_slice(line);
-        }
-    }
-
-    /// Draws a line through points with round ends, its edge smooth over one pixel.
-    pub(super) fn line(&mut self, points: &[[f32; 2]], thickness: f32, color: [u8; 3]) {
-        let reach = thickness / 2.0 + 1.0;
-        let range = |k: usize, limit: usize| {
-            let values = points.iter().map(|p| p[k]);
-            let low = values.clone().fold(f32::INFINITY, f32::min) - reach;
-            let high = values.fold(f32::NEG_INFINITY, f32::max) + reach;
-            (low.max(0.0) as usize)..((high.max(0.0).ceil() as usize).min(limit))
+    /// The size that all pictures have.
+    fn of_all<'a>(pictures: impl IntoIterator<Item = &'a View>) -> Result<Self> {
+        let mut sizes = pictures.into_iter().map(Self::of);
+        let Some(first) = sizes.next() else {
+            return Err(Error::invalid("pictures of a sheet", "at least one", "none"));
         };
-        for y in range(1, self.height) {
-            for x in range(0, self.width) {
-                let p = [x as f32 + 0.5, y as f32 + 0.5];
-                let distance = points.windows(2).map(|ends| distance(p, ends[0], ends[1]));
-                let distance = distance.fold(f32::INFINITY, f32::min);
-                let cover = (thickness / 2.0 + 0.5 - distance).clamp(0.0, 1.0);
-                let at = self.place(x, y);
-                for (channel, ink) in self.rgb[at..at + 3].iter_mut().zip(color) {
-                    let (under, over) = (f32::from(*channel), f32::from(ink));
-                    *channel = (under + cover * (over - under)).round() as u8;
-                }
+        match sizes.find(|&other| other != first) {
+            None => Ok(first),
+            Some(other) => {
+                let expected = format!("{} × {} pixels each", first.width, first.height);
+                let found = format!("one of {} × {}", other.width, other.height);
+                Err(Error::invalid("pictures of a sheet", expected, found))
             }
         }
     }
-
-    fn write_png(&self, path: &Path) -> Result<()> {
-        let (width, height) = (self.width as u32, self.height as u32);
-        write_atomically(path, |out| {
-            PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive)
-                .write_image(&self.rgb, width, height, ExtendedColorType::Rgb8)
-                .map_err(std::io::Error::other)
-        })?;
-        Ok(())
-    }
-}
-
-/// From a point to the piece of line between two.
-fn distance(p: [f32; 2], a: [f32; 2], b: [f32; 2]) -> f32 {
-    let (along, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-    let length = along[0] * along[0] + along[1] * along[1];
-    let t = (along[0] * to[0] + along[1] * to[1]) / length.max(f32::MIN_POSITIVE);
-    let t = t.clamp(0.0, 1.0);
-    (to[0] - t * along[0]).hypot(to[1] - t * along[1])
 }
 
 #[cfg(test)]
@@ -316,7 +293,7 @@ mod tests {
             assert_eq!(drawn.at(150, top + 50), [20; 3], "row {row}");
         }
         // The second entry does not fit beside the first, and stands below it.
-        assert_eq!(sheet.places_of_entries(200.0)[1], (MARGIN, 1));
+        assert_eq!(sheet.places_of_entries(200.0)[1], EntryPlace { left: MARGIN, line: 1 });
     }
 
     #[test]

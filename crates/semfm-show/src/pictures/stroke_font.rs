@@ -1,11 +1,11 @@
-//! Letters for pictures, drawn as strokes: a font of our own, so that no font file is needed.
+//! Text in pictures, drawn as strokes: a font of our own, so that no font file is needed.
 //!
 //! A glyph is a few strokes on a grid where capitals are 14 units high, small stroke_font 10, and tails
 //! reach 4 below the line. A stroke that starts with `~` is smooth (a quadratic B-spline whose ends
 //! are its first and last point), one that starts with `o` is smooth and closed, any other is made of
 //! straight lines.
 
-use super::sheet::Pixels;
+use super::canvas::Canvas;
 
 /// Height of a capital in grid units.
 const CAPITAL: f32 = 14.0;
@@ -117,57 +117,72 @@ const GLYPHS: [(char, i8, &str); 95] = [
 /// Drawn for a character that the font has not.
 const UNKNOWN: (char, i8, &str) = ('\u{fffd}', 8, "0,0 8,0 8,14 0,14 0,0");
 
-fn glyph(character: char) -> (char, i8, &'static str) {
-    GLYPHS.iter().copied().find(|glyph| glyph.0 == character).unwrap_or(UNKNOWN)
+/// A line of text.
+pub(super) struct Text<'a> {
+    pub text: &'a str,
+    /// Where the first letter begins, in pixels.
+    pub left: f32,
+    /// The line that letters stand on, in pixels from the top.
+    pub baseline: f32,
+    /// Height of a capital in pixels.
+    pub size: f32,
+    pub color: [u8; 3],
+}
+
+/// One letter.
+struct Glyph {
+    /// In grid units.
+    width: f32,
+    strokes: &'static str,
+}
+
+impl Glyph {
+    fn of(character: char) -> Self {
+        let known = GLYPHS.iter().find(|row| row.0 == character);
+        let &(_, width, strokes) = known.unwrap_or(&UNKNOWN);
+        Self { width: f32::from(width), strokes }
+    }
+
+    fn strokes(&self) -> impl Iterator<Item = &'static str> {
+        self.strokes.split(';').filter(|stroke| !stroke.is_empty())
+    }
 }
 
 /// Pixels that a line of text takes in width, with capitals `size` pixels high.
 pub(super) fn width(text: &str, size: f32) -> f32 {
-    let units: f32 = text.chars().map(|c| f32::from(glyph(c).1) + GAP).sum();
+    let units: f32 = text.chars().map(|c| Glyph::of(c).width + GAP).sum();
     (units - GAP).max(0.0) * size / CAPITAL
 }
 
-/// Draws a line of text, its first letter's foot at (`x`, `y`), with capitals `size` pixels high.
-pub(super) fn draw(pixels: &mut Pixels, (x, y): (f32, f32), size: f32, color: [u8; 3], text: &str) {
-    let unit = size / CAPITAL;
-    let mut left = x;
-    for character in text.chars() {
-        let (_, width, strokes) = glyph(character);
-        for stroke in strokes.split(';').filter(|stroke| !stroke.is_empty()) {
-            let line: Vec<[f32; 2]> = polyline(stroke)
-                .into_iter()
-                .map(|[u, v]| [left + u * unit, y - v * unit])
-                .collect();
-            pixels.line(&line, STROKE * unit, color);
+impl Text<'_> {
+    /// Draws the text.
+    pub(super) fn draw(&self, canvas: &mut Canvas) {
+        let unit = self.size / CAPITAL;
+        let mut left = self.left;
+        for character in self.text.chars() {
+            let glyph = Glyph::of(character);
+            for stroke in glyph.strokes() {
+                let line: Vec<[f32; 2]> = polyline(stroke)
+                    .into_iter()
+                    .map(|[u, v]| [left + u * unit, self.baseline - v * unit])
+                    .collect();
+                canvas.line(&line, STROKE * unit, self.color);
+            }
+            left += (glyph.width + GAP) * unit;
         }
-        left += (f32::from(width) + GAP) * unit;
     }
 }
 
 /// Corner points of a stroke on the grid.
 fn polyline(stroke: &str) -> Vec<[f32; 2]> {
-    let number = |text: &str| text.parse().unwrap_or(0.0);
-    let points: Vec<[f32; 2]> = stroke
-        .trim_start_matches(['~', 'o'])
-        .split(' ')
-        .filter_map(|pair| pair.split_once(','))
-        .map(|(u, v)| [number(u), number(v)])
-        .collect();
+    let points = control_points(stroke);
     let n = points.len();
-    let middle = |a: [f32; 2], b: [f32; 2]| [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
     let mut line = Vec::new();
-    let mut bend = |a: [f32; 2], b: [f32; 2], c: [f32; 2]| {
-        line.extend((0..=STEPS).map(|i| {
-            let t = i as f32 / STEPS as f32;
-            let weights = [(1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t];
-            [0, 1].map(|k| weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k])
-        }));
-    };
     match stroke.chars().next() {
         Some('o') => {
             for i in 0..n {
                 let (before, after) = (points[(i + n - 1) % n], points[(i + 1) % n]);
-                bend(middle(before, points[i]), points[i], middle(points[i], after));
+                add_bend(&mut line, middle(before, points[i]), points[i], middle(points[i], after));
             }
             line
         }
@@ -176,12 +191,35 @@ fn polyline(stroke: &str) -> Vec<[f32; 2]> {
                 let first = if i == 1 { points[0] } else { middle(points[i - 1], points[i]) };
                 let last =
                     if i == n - 2 { points[n - 1] } else { middle(points[i], points[i + 1]) };
-                bend(first, points[i], last);
+                add_bend(&mut line, first, points[i], last);
             }
             line
         }
         _ => points,
     }
+}
+
+/// The points that a stroke is written with.
+fn control_points(stroke: &str) -> Vec<[f32; 2]> {
+    stroke
+        .trim_start_matches(['~', 'o'])
+        .split(' ')
+        .filter_map(|pair| pair.split_once(','))
+        .map(|(u, v)| [u, v].map(|number| number.parse().unwrap_or(0.0)))
+        .collect()
+}
+
+fn middle(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
+    [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0]
+}
+
+/// Adds a quadratic Bézier curve: (1 − t)² a + 2 t (1 − t) b + t² c for t from 0 to 1.
+fn add_bend(line: &mut Vec<[f32; 2]>, a: [f32; 2], b: [f32; 2], c: [f32; 2]) {
+    line.extend((0..=STEPS).map(|i| {
+        let t = i as f32 / STEPS as f32;
+        let weights = [(1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t];
+        [0, 1].map(|k| weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k])
+    }));
 }
 
 #[cfg(test)]
@@ -190,9 +228,9 @@ mod tests {
 
     #[test]
     fn every_character_has_one_glyph_inside_its_box() {
-        for (i, &(character, width, strokes)) in GLYPHS.iter().enumerate() {
+        for (i, &(character, width, _)) in GLYPHS.iter().enumerate() {
             assert!(GLYPHS[i + 1..].iter().all(|other| other.0 != character), "{character} twice");
-            for stroke in strokes.split(';').filter(|stroke| !stroke.is_empty()) {
+            for stroke in Glyph::of(character).strokes() {
                 let line = polyline(stroke);
                 assert!(line.len() > 1, "{character}: {stroke}");
                 for [u, v] in line {
@@ -208,10 +246,10 @@ mod tests {
     fn text_covers_what_its_width_says() {
         let size = 14.0;
         let wide = width("Anchor 1", size);
-        let mut pixels = Pixels::new(wide.ceil() as usize + 8, 30, [255; 3]);
-        draw(&mut pixels, (4.0, 22.0), size, [0; 3], "Anchor 1");
+        let mut canvas = Canvas::new(wide.ceil() as usize + 8, 30, [255; 3]);
+        Text { text: "Anchor 1", left: 4.0, baseline: 22.0, size, color: [0; 3] }.draw(&mut canvas);
         let dark: Vec<usize> =
-            (0..pixels.width).filter(|&x| (0..30).any(|y| pixels.at(x, y)[0] < 128)).collect();
+            (0..canvas.width).filter(|&x| (0..30).any(|y| canvas.at(x, y)[0] < 128)).collect();
         assert!(dark[0] <= 5 && (dark[dark.len() - 1] as f32 - 4.0 - wide).abs() < 6.0, "{dark:?}");
     }
 }

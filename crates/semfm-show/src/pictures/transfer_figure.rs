@@ -1,32 +1,42 @@
 //! A finished transfer with everything that its pictures and scenes show of it.
 
-use super::features::feature_colors;
-use super::{SIDE, Sides, paired_viewpoints, position_colors};
-use crate::Result;
-use semfm::output::{AnchorRanks, ObjectAnchors, anchor_ranks};
+use semfm::output::{ObjectAnchors, anchor_ranks};
 use semfm::{Mesh, PreparedObject, Region, Task, Transfer};
 
-/// A transfer, ready to be shown. Pairs are source and target.
+use super::feature_colors::FeatureColors;
+use super::sheet::PICTURE_SIDE;
+use super::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
+use crate::Result;
+use crate::colors::position_colors;
+
+/// A transfer, ready to be drawn.
 pub struct TransferFigure<'a> {
-    pub(crate) source: &'a PreparedObject,
-    pub(crate) target: &'a PreparedObject,
-    pub(crate) region: &'a Region,
     pub(crate) transfer: &'a Transfer,
-    /// From where each object is looked at.
-    pub(crate) sides: [Sides; 2],
+    pub(crate) source: ObjectFigure<'a>,
+    pub(crate) target: ObjectFigure<'a>,
+}
+
+/// One object of a transfer, ready to be drawn.
+pub(crate) struct ObjectFigure<'a> {
+    pub object: &'a PreparedObject,
+    /// Weight of each vertex.
+    pub weights: &'a [f64],
+    /// From where the object is looked at.
+    pub viewpoints: Viewpoints,
     /// Colour of each vertex: the source's by position, the target's that of its match.
-    pub(crate) places: [Vec<[f32; 3]>; 2],
-    /// Colour of each cloud point: three principal components of the pair's features in one basis.
-    pub(crate) feature_colors: [Vec<[f32; 3]>; 2],
+    pub match_colors: Vec<[f32; 3]>,
+    /// Colour of each cloud point by its features.
+    pub feature_colors: Vec<[f32; 3]>,
     /// Where the anchors lie.
-    pub(crate) anchors: [ObjectAnchors; 2],
+    pub anchors: ObjectAnchors,
 }
 
 impl<'a> TransferFigure<'a> {
     /// Chooses viewpoints and colours. The clusters are those that the objects keep.
     ///
     /// # Errors
-    /// Whatever clustering or rendering reports.
+    /// [`Error::Semfm`](crate::Error::Semfm) where clustering or rendering fails, and where the task was
+    /// cancelled.
     pub fn new(
         source: &'a PreparedObject,
         target: &'a PreparedObject,
@@ -36,45 +46,54 @@ impl<'a> TransferFigure<'a> {
     ) -> Result<Self> {
         let source_of = &transfer.point_map.source_of;
         let (source_mesh, target_mesh) = (source.shape.original(), target.shape.original());
-        let sides = paired_viewpoints(
-            (source_mesh, region.weights()),
-            (target_mesh, transfer.weights()),
+        let viewpoints: PairedViewpoints = paired_viewpoints(
+            WeightedMesh { mesh: source_mesh, weights: region.weights() },
+            WeightedMesh { mesh: target_mesh, weights: transfer.weights() },
             source_of,
-            SIDE,
+            PICTURE_SIDE,
             task,
         )?;
         let on_source = position_colors(source_mesh.vertices());
         let on_target = source_of.iter().map(|&v| on_source[v as usize]).collect();
-        let feature_colors = feature_colors(&source.object, &target.object)?;
-        let AnchorRanks { source: on_source_anchors, target: on_target_anchors } =
-            anchor_ranks(source, target, transfer, task)?;
-        let anchors = [on_source_anchors, on_target_anchors];
-        let places = [on_source, on_target];
-        Ok(Self { source, target, region, transfer, sides, places, feature_colors, anchors })
-    }
-
-    pub(crate) fn meshes(&self) -> [&'a Mesh; 2] {
-        [self.source.shape.original(), self.target.shape.original()]
-    }
-
-    pub(crate) fn objects(&self) -> [&'a PreparedObject; 2] {
-        [self.source, self.target]
-    }
-
-    /// Weight of each vertex.
-    pub(crate) fn weights(&self) -> [&'a [f64]; 2] {
-        [self.region.weights(), self.transfer.weights()]
+        let features = FeatureColors::new(&source.object, &target.object)?;
+        let anchors = anchor_ranks(source, target, transfer, task)?;
+        Ok(Self {
+            transfer,
+            source: ObjectFigure {
+                object: source,
+                weights: region.weights(),
+                viewpoints: viewpoints.source,
+                match_colors: on_source,
+                feature_colors: features.source,
+                anchors: anchors.source,
+            },
+            target: ObjectFigure {
+                object: target,
+                weights: transfer.weights(),
+                viewpoints: viewpoints.target,
+                match_colors: on_target,
+                feature_colors: features.target,
+                anchors: anchors.target,
+            },
+        })
     }
 
     /// The verdict in a line: "accept, confidence 0.93".
-    pub(crate) fn answer(&self) -> String {
+    pub(crate) fn verdict_line(&self) -> String {
         let verdict = serde_json::json!(self.transfer.verdict);
         let verdict = verdict.as_str().unwrap_or_default();
         format!("{verdict}, confidence {:.2}", self.transfer.confidence)
     }
 }
 
-/// What belongs to the cloud point nearest to each vertex of the mesh as read.
-pub(crate) fn by_vertex<T: Copy>(object: &PreparedObject, of_point: &[T]) -> Vec<T> {
-    object.object.point_of_original_vertex().iter().map(|&j| of_point[j as usize]).collect()
+impl<'a> ObjectFigure<'a> {
+    pub(crate) fn mesh(&self) -> &'a Mesh {
+        self.object.shape.original()
+    }
+
+    /// What belongs to the cloud point nearest to each vertex of the mesh as read.
+    pub(crate) fn onto_vertices<T: Copy>(&self, of_point: &[T]) -> Vec<T> {
+        let points = self.object.object.point_of_original_vertex();
+        points.iter().map(|&point| of_point[point as usize]).collect()
+    }
 }

@@ -7,7 +7,7 @@ use semfm::views::rig::fibonacci_directions;
 use crate::Result;
 
 /// How well an object must stand. Of 120 real objects one, a wrench with rounded edges, is below.
-const LEAST_STAND: f64 = 0.006;
+const LEAST_STABILITY: f64 = 0.006;
 /// How high above the lowest point the ground reaches, as a share of the height, and how little what
 /// lies on it may be tilted (cosine).
 const GROUND: f64 = 0.04;
@@ -33,6 +33,10 @@ pub(super) struct Upright {
 
 /// The way up in which the object stands best: the file's y or z where they do nearly as well, the
 /// longest principal axis where it does not stand.
+///
+/// # Errors
+/// [`Error::Invalid`](crate::Error::Invalid) for a mesh without vertices,
+/// [`Error::Semfm`](crate::Error::Semfm) for one without principal axes.
 pub(super) fn upright(mesh: &Mesh) -> Result<Upright> {
     let Some((low, high)) = bounds(mesh.vertices()) else {
         return Err(crate::Error::invalid("mesh to be shown", "vertices", "none"));
@@ -43,10 +47,10 @@ pub(super) fn upright(mesh: &Mesh) -> Result<Upright> {
     let facets: Vec<Facet> = facets.collect();
     let flat = flat_sides(&facets).into_iter().map(|normal| (-normal, 1.0));
     let candidates = flat.chain([(DVec3::Y, FILE_AXIS), (DVec3::Z, FILE_AXIS)]);
-    let (up, share) = candidates
-        .map(|(up, bonus)| (up, bonus * stand(&facets, up)))
+    let (up, score) = candidates
+        .map(|(up, bonus)| (up, bonus * stability(&facets, up)))
         .fold((DVec3::Z, 0.0), |best, next| if next.1 > best.1 { next } else { best });
-    let is_sure = share >= LEAST_STAND;
+    let is_sure = score >= LEAST_STABILITY;
     Ok(Upright { up: if is_sure { up } else { principal_axes(mesh)?.row(2) }, is_sure })
 }
 
@@ -73,19 +77,23 @@ fn flat_sides(facets: &[Facet]) -> Vec<DVec3> {
     let bins: Vec<DVec3> = fibonacci_directions(N_BINS).collect();
     let mut sums = vec![DVec3::ZERO; bins.len()];
     for facet in facets {
-        let height = |bin: usize| bins[bin].dot(facet.normal);
-        let nearest = (1..bins.len())
-            .fold(0, |best, bin| if height(bin) > height(best) { bin } else { best });
-        sums[nearest] += facet.normal;
+        sums[nearest_direction(&bins, facet.normal)] += facet.normal;
     }
     sums.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
     sums.into_iter().take(N_FLAT_SIDES).filter_map(DVec3::try_normalize).collect()
 }
 
+/// The direction with the largest product; the first of equals.
+fn nearest_direction(directions: &[DVec3], normal: DVec3) -> usize {
+    (1..directions.len()).fold(0, |best, i| {
+        if directions[i].dot(normal) > directions[best].dot(normal) { i } else { best }
+    })
+}
+
 /// How well an object stands with this side up: the share of the surface that lies flat on the ground,
 /// times how far the ground reaches as a share of the object's width where that is least. The first
 /// alone would stand a bottle on its side, the second alone a mug on its rim.
-fn stand(facets: &[Facet], up: DVec3) -> f64 {
+fn stability(facets: &[Facet], up: DVec3) -> f64 {
     let heights = facets.iter().map(|facet| facet.height(up));
     let low = heights.clone().fold(f64::INFINITY, f64::min);
     let high = heights.fold(f64::NEG_INFINITY, f64::max);
@@ -131,17 +139,18 @@ pub(super) mod tests {
         Mesh::new(vertices, mesh.faces().to_vec()).unwrap()
     }
 
+    fn block(half_extents: DVec3) -> Mesh {
+        let (points, faces) = parry3d_f64::shape::Cuboid::new(half_extents).to_trimesh();
+        Mesh::new(points, faces).unwrap()
+    }
+
     #[test]
     fn a_block_on_its_foot_is_upright_and_a_ball_has_a_way_up() {
-        let corners = |h: DVec3| -> Mesh {
-            let (points, faces) = parry3d_f64::shape::Cuboid::new(h).to_trimesh();
-            Mesh::new(points, faces).unwrap()
-        };
         // The larger foot decides.
-        assert_eq!(upright(&corners(DVec3::new(1.0, 0.2, 1.0))).unwrap().up, DVec3::Y);
-        assert_eq!(upright(&corners(DVec3::new(1.0, 1.0, 0.2))).unwrap().up, DVec3::Z);
+        assert_eq!(upright(&block(DVec3::new(1.0, 0.2, 1.0))).unwrap().up, DVec3::Y);
+        assert_eq!(upright(&block(DVec3::new(1.0, 1.0, 0.2))).unwrap().up, DVec3::Z);
         let tilt = DMat3::from_rotation_x(0.6) * DMat3::from_rotation_y(0.3);
-        let tilted = upright(&turned(&corners(DVec3::new(1.0, 1.0, 0.2)), tilt)).unwrap();
+        let tilted = upright(&turned(&block(DVec3::new(1.0, 1.0, 0.2)), tilt)).unwrap();
         assert!(tilted.is_sure && tilted.up.dot(tilt.z_axis).abs() > 0.999);
         assert!((upright(&zoo::icosphere(3)).unwrap().up.length() - 1.0).abs() < 1e-9);
     }

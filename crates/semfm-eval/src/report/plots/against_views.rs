@@ -4,13 +4,11 @@
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
+use semfm_show::colors::{EXTRA, QUOTED, QUOTED_VLM, RIGHT, SECOND};
 
-use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, inked, svg};
-use crate::report::palette::{EXTRA, QUOTED, RIGHT, SECOND, ink};
+use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, ink, inked, svg};
 use crate::table::number;
 
-/// Colour of the quoted model, as in the style sheet.
-const QUOTED_MODEL: [u8; 3] = [86, 180, 233];
 const SIZE: (u32, u32) = (960, 520);
 /// Labels stand at least so many pixels below each other.
 const APART: i32 = 12;
@@ -119,7 +117,7 @@ where
         let style = ink(color).stroke_width(if color == RIGHT { 3 } else { 2 });
         chart.draw_series(dashes((0.5, value), (6.5, value), dash, gap, style))?;
     }
-    for (points, color) in [(&panel.quoted_model, QUOTED_MODEL), (&panel.model, EXTRA)] {
+    for (points, color) in [(&panel.quoted_model, QUOTED_VLM), (&panel.model, EXTRA)] {
         chart.draw_series(LineSeries::new(points.iter().copied(), ink(color).stroke_width(2)))?;
         if color == EXTRA {
             let mark = |&point: &(f64, f64)| TriangleMarker::new(point, 5, ink(color).filled());

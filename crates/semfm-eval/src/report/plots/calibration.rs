@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use semfm::Verdict;
+use semfm_show::colors::{EXTRA, MISSED, RIGHT};
 
-use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, svg};
+use super::{Area, DrawError, GRID, SOFT_INK, at, dashes, font, ink, svg};
 use crate::calibration::{self, ReliabilityBin};
-use crate::report::palette::{EXTRA, MISSED, RIGHT, ink};
 use crate::table::number;
 
 const SIZE: (u32, u32) = (440, 410);

@@ -1,15 +1,12 @@
 //! Share of pairs below each error: one staircase per method.
 
 use plotters::prelude::*;
+use semfm_show::colors::SERIES;
 
-use super::{DrawError, GRID, SOFT_INK, font, svg};
-use crate::report::palette::ink;
+use super::{DrawError, GRID, SOFT_INK, font, ink, svg};
 use crate::table::number;
 
 const SIZE: (u32, u32) = (620, 380);
-/// In the order of the methods (Okabe & Ito 2008), as the style sheet has them.
-pub(in crate::report) const COLORS: [[u8; 3]; 6] =
-    [[0, 158, 115], [213, 94, 0], [0, 114, 178], [204, 121, 167], [86, 180, 233], [230, 159, 0]];
 
 /// The errors of each method's pairs; `high` ends the axis.
 pub(in crate::report) fn draw(methods: &[Vec<f64>], high: f64) -> Result<String, DrawError> {
@@ -34,7 +31,7 @@ pub(in crate::report) fn draw(methods: &[Vec<f64>], high: f64) -> Result<String,
             .label_style(font(11.0))
             .axis_desc_style(font(12.0))
             .draw()?;
-        for (errors, color) in methods.iter().zip(COLORS.iter().cycle()) {
+        for (errors, color) in methods.iter().zip(SERIES.iter().cycle()) {
             let line = staircase(errors, high);
             chart.draw_series(LineSeries::new(line, ink(*color).stroke_width(2)))?;
         }

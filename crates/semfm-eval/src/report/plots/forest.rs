@@ -2,9 +2,9 @@
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
+use semfm_show::colors::RIGHT;
 
-use super::{DrawError, GRID, SOFT_INK, TEXT_INK, at, font, inked, svg};
-use crate::report::palette::{RIGHT, ink};
+use super::{DrawError, GRID, SOFT_INK, TEXT_INK, at, font, ink, inked, svg};
 use crate::table::number;
 
 const WIDTH: u32 = 900;

@@ -20,6 +20,11 @@ const TEXT_INK: RGBColor = RGBColor(40, 45, 50);
 const SOFT_INK: RGBColor = RGBColor(120, 128, 136);
 const GRID: RGBColor = RGBColor(228, 231, 234);
 
+/// A colour of ours in the library's words.
+pub(super) fn ink([r, g, b]: [u8; 3]) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
 /// An SVG element of this size.
 fn svg(
     size: (u32, u32),

@@ -4,102 +4,137 @@
 const REACH = 9, SLIP = 7;
 // Shape of the canvas, and the share of it that an object fills at the start.
 const ASPECT = 4 / 3, FILL = 0.82;
+// Steps of the keys: radians, pixels and a factor. Radians of a dragged pixel.
+const KEY_TURN = 0.1, KEY_MOVE = 30, KEY_ZOOM = 1.15, DRAG_TURN = 0.008;
+const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const NO_WEBGL = "This browser does not offer WebGL 2, which the three-dimensional view needs. Turn on hardware acceleration, or open this page in another browser.";
 
 class Panel {
+  // `data` as in the page, with positions, faces and the colours of each layer decoded.
   constructor(painter, data) {
-    Object.assign(this, { painter, name: data.name, positions: data.positions, faces: data.faces, keys: data.positions, paints: data.paints });
+    this.painter = painter;
+    this.name = data.name;
+    this.positions = data.positions;
+    this.faces = data.faces;
+    this.layers = data.layers;
+    // The place on the first object that each vertex is matched to: its own, until panels are linked.
+    this.matched = data.positions;
     this.n = this.positions.length / 3;
-    this.colors = this.paints[0].colors;
+    this.colors = this.layers[0].colors;
     this.spot = [0, 0, 0, 0];
     // Rows: right, away from the eye and up at the start; and where the eye stands then.
     [this.right, this.away, this.up] = [0, 3, 6].map(i => data.upright.slice(i, i + 3));
     this.home = { yaw: data.yaw, pitch: data.pitch, zoom: 1, shift: [0, 0] };
-    this.measure();
+    // What the page does when a vertex is pointed at, when none is, and when the panel was turned.
+    this.hover = () => {};
+    this.leave = () => {};
+    this.turned = () => {};
+    this.fit();
     this.build(data);
-    this.hover = () => {}; this.leave = () => {}; this.turned = () => {};
     this.reset();
-    if (!painter.gl) return;
-    this.listen();
-    new IntersectionObserver(seen => { this.visible = seen.some(entry => entry.isIntersecting); this.draw(); },
-      { rootMargin: "200px" }).observe(this.figure);
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    if (painter.gl) this.listen();
   }
 
-  build(data) {
-    const make = name => document.createElement(name);
-    this.figure = make("figure");
-    const stage = this.stage = make("div"), caption = make("figcaption"), name = make("b"), note = make("span");
-    stage.className = "stage";
-    this.told = make("output");
-    name.textContent = data.name; note.textContent = data.note;
-    caption.append(name, note, this.told);
+  build({ name, note }) {
+    this.stage = element("div", null, "stage");
+    this.output = element("output");
     if (this.painter.gl) {
-      this.canvas = make("canvas");
+      this.canvas = element("canvas");
       this.canvas.tabIndex = 0;
       this.canvas.setAttribute("role", "application");
-      this.canvas.setAttribute("aria-label", `${data.name}, ${data.note}, to be turned with the arrow keys`);
-      stage.append(this.canvas);
+      this.canvas.setAttribute("aria-label", `${name}, ${note}, to be turned with the arrow keys`);
+      this.stage.append(this.canvas);
     } else {
-      stage.className = "fault";
-      stage.textContent = "This browser does not offer WebGL 2, which the three-dimensional view needs. Turn on hardware acceleration, or open this page in another browser.";
+      this.stage.className = "fault";
+      this.stage.textContent = NO_WEBGL;
     }
-    this.figure.append(stage, caption);
-    this.say("");
+    const caption = element("figcaption", [element("b", name), element("span", note), this.output]);
+    this.figure = element("figure", [this.stage, caption]);
+    this.write("");
   }
 
-  say(text) {
-    this.told.className = text ? "" : "idle";
-    this.told.textContent = text || (this.painter.gl ? "Point at the object." : "");
+  // Writes a line below the object.
+  write(text) {
+    this.output.className = text ? "" : "idle";
+    this.output.textContent = text || (this.painter.gl ? "Point at the object." : "");
   }
 
-  measure() {
-    const p = this.positions, [low, high] = boundsOf(p, this.faces);
+  // A vertex in words: its number, and what each layer says of it.
+  describe(vertex) {
+    return [`vertex ${vertex}`, ...this.layers.map(layer => layer.describe(vertex))].filter(Boolean).join(", ");
+  }
+
+  // Chooses centre and scale so that the object, as seen at the start, fills most of the canvas; turned,
+  // it may touch the edge.
+  fit() {
+    const [low, high] = boundsOf(this.positions, this.faces);
     this.centre = low.map((x, k) => (x + high[k]) / 2);
     this.radius = Math.hypot(...low.map((x, k) => (high[k] - x) / 2)) || 1;
-    // As seen at the start, the object fills most of the canvas; turned, it may touch the edge.
     Object.assign(this, this.home);
-    const [right, up] = this.axes(), box = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const vertex of this.faces) {
-      const i = 3 * vertex, u = right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2], v = up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2];
-      box[0] = Math.min(box[0], u); box[1] = Math.max(box[1], u);
-      box[2] = Math.min(box[2], v); box[3] = Math.max(box[3], v);
-    }
-    const half = Math.max((box[1] - box[0]) / 2 / ASPECT, (box[3] - box[2]) / 2);
-    this.reach = Math.max(half / FILL, 0.6 * this.radius);
-    const along = axis => axis[0] * this.centre[0] + axis[1] * this.centre[1] + axis[2] * this.centre[2];
-    const [du, dv] = [(box[0] + box[1]) / 2 - along(right), (box[2] + box[3]) / 2 - along(up)];
+    const [right, up] = this.axes();
+    const [left, bottom, rightmost, top] = this.boxAlong(right, up);
+    const half = Math.max((rightmost - left) / 2 / ASPECT, (top - bottom) / 2);
+    this.extent = Math.max(half / FILL, 0.6 * this.radius);
+    const du = (left + rightmost) / 2 - dot(right, this.centre), dv = (bottom + top) / 2 - dot(up, this.centre);
     this.centre = this.centre.map((x, k) => x + du * right[k] + dv * up[k]);
   }
 
-  reset() { Object.assign(this, this.home, { shift: [...this.home.shift] }); this.moved(); }
+  // Least and largest coordinates of the surface along two axes.
+  boxAlong(right, up) {
+    const p = this.positions;
+    let left = Infinity, bottom = Infinity, rightmost = -Infinity, top = -Infinity;
+    for (const vertex of this.faces) {
+      const i = 3 * vertex;
+      const u = right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2];
+      const v = up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2];
+      left = Math.min(left, u); rightmost = Math.max(rightmost, u);
+      bottom = Math.min(bottom, v); top = Math.max(top, v);
+    }
+    return [left, bottom, rightmost, top];
+  }
 
-  moved() { this.ids = null; this.draw(); }
+  reset() {
+    Object.assign(this, this.home, { shift: [...this.home.shift] });
+    this.moved();
+  }
+
+  moved() {
+    this.ids = null;
+    this.draw();
+  }
 
   position(vertex) { return this.positions.subarray(3 * vertex, 3 * vertex + 3); }
 
   show(layer) {
-    this.colors = this.paints[layer].colors;
+    this.colors = this.layers[layer].colors;
     if (this.loaded) this.painter.recolor(this.loaded, this.colors);
     this.draw();
   }
 
-  // Lights what has its key within the radius of a point.
-  light(centre, radius) { this.spot = centre ? [...centre, radius] : [0, 0, 0, 0]; this.draw(); }
+  // Highlights what is matched to places within the radius of a point; without a point, nothing.
+  highlight(centre, radius) {
+    this.spot = centre ? [...centre, radius] : [0, 0, 0, 0];
+    this.draw();
+  }
 
   // How many vertices that are.
-  nLit() {
-    const [x, y, z, r] = this.spot, k = this.keys;
+  nHighlighted() {
+    const [x, y, z, radius] = this.spot;
     let n = 0;
-    for (let i = 0; i < k.length; i += 3) if ((k[i] - x) ** 2 + (k[i + 1] - y) ** 2 + (k[i + 2] - z) ** 2 < r * r) n++;
+    for (let v = 0; v < this.n; v++) if (this.squaredDistance(v, x, y, z) < radius * radius) n++;
     return n;
   }
 
-  // Distance of the nearest key to a point.
-  nearestKey([x, y, z]) {
-    const k = this.keys;
+  // Distance from a point to the nearest place that a vertex is matched to.
+  distanceToMatched([x, y, z]) {
     let least = Infinity;
-    for (let i = 0; i < k.length; i += 3) least = Math.min(least, (k[i] - x) ** 2 + (k[i + 1] - y) ** 2 + (k[i + 2] - z) ** 2);
+    for (let v = 0; v < this.n; v++) least = Math.min(least, this.squaredDistance(v, x, y, z));
     return Math.sqrt(least);
+  }
+
+  squaredDistance(vertex, x, y, z) {
+    const m = this.matched, i = 3 * vertex;
+    return (m[i] - x) ** 2 + (m[i + 1] - y) ** 2 + (m[i + 2] - z) ** 2;
   }
 
   // Image right, image up and towards the eye, in the mesh's frame.
@@ -111,15 +146,15 @@ class Panel {
 
   // Clip space of a point p: scale · axes · (p − centre) + shift, orthographic.
   view() {
-    const aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1), unit = this.zoom / this.reach;
+    const aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1), unit = this.zoom / this.extent;
     const [sx, sy] = aspect > 1 ? [unit / aspect, unit] : [unit, unit * aspect];
     const [right, up, back] = this.axes(), depth = -0.4 / this.radius;
-    const at = row => -(row[0] * this.centre[0] + row[1] * this.centre[1] + row[2] * this.centre[2]);
     const clip = [], turn = [];
     for (let i = 0; i < 3; i++) {
       clip.push(sx * right[i], sy * up[i], depth * back[i], 0);
       turn.push(right[i], up[i], back[i]);
     }
+    const at = axis => -dot(axis, this.centre);
     clip.push(sx * at(right) + this.shift[0], sy * at(up) + this.shift[1], depth * at(back), 1);
     return { clip, turn, spot: this.spot };
   }
@@ -151,20 +186,27 @@ class Panel {
     this.loaded ||= this.painter.load(this);
     const view = this.view();
     this.ids ||= this.painter.pick(this.loaded, view, width, height);
-    let found = 0, least = Infinity;
+    const id = this.nearestId(Math.round(x), height - 1 - Math.round(y), width, height);
+    if (!id) return -1;
+    return this.nearestCorner(id - 1, 2 * x / width - 1, 1 - 2 * y / height, view.clip, width / height);
+  }
+
+  // The number nearest to a pixel of the picture of numbers, 0 where there is none within reach.
+  nearestId(column, row, width, height) {
+    let found = 0, least = REACH * REACH + 1;
     for (let dy = -REACH; dy <= REACH; dy++) for (let dx = -REACH; dx <= REACH; dx++) {
-      const [u, v] = [Math.round(x) + dx, height - 1 - Math.round(y) + dy], off = dx * dx + dy * dy;
-      if (off >= least || off > REACH * REACH || u < 0 || v < 0 || u >= width || v >= height) continue;
+      const u = column + dx, v = row + dy, off = dx * dx + dy * dy;
+      if (off >= least || u < 0 || v < 0 || u >= width || v >= height) continue;
       const id = this.ids[v * width + u];
       if (id) { found = id; least = off; }
     }
-    return found ? this.nearest(found - 1, 2 * x / width - 1, 1 - 2 * y / height, view.clip, width / height) : -1;
+    return found;
   }
 
-  // Of the triangles around a vertex, the corner that is nearest to a place on the screen.
-  nearest(vertex, x, y, m, aspect) {
-    this.fans ||= fans(this.faces, this.n);
-    const { start, triangles } = this.fans, p = this.positions;
+  // Of the triangles around a vertex, the corner that is nearest to a place in clip space.
+  nearestCorner(vertex, x, y, m, aspect) {
+    this.around ||= trianglesAround(this.faces, this.n);
+    const { start, triangles } = this.around, p = this.positions;
     let best = vertex, least = Infinity;
     for (let i = start[vertex]; i < start[vertex + 1]; i++) for (let k = 0; k < 3; k++) {
       const v = this.faces[3 * triangles[i] + k], [a, b, c] = [p[3 * v], p[3 * v + 1], p[3 * v + 2]];
@@ -181,13 +223,15 @@ class Panel {
 
   turn(yaw, pitch) {
     this.yaw += yaw;
-    this.pitch = Math.max(-1.57, Math.min(1.57, this.pitch + pitch));
-    this.turned(this); this.moved();
+    this.pitch = clampPitch(this.pitch + pitch);
+    this.turned(this);
+    this.moved();
   }
 
   enlarge(factor) {
     this.zoom = Math.max(0.2, Math.min(60, this.zoom * factor));
-    this.turned(this); this.moved();
+    this.turned(this);
+    this.moved();
   }
 
   move(dx, dy) {
@@ -196,61 +240,129 @@ class Panel {
     this.moved();
   }
 
+  startAgain() {
+    this.reset();
+    this.turned(this);
+  }
+
   listen() {
-    const canvas = this.canvas, down = new Map();
-    let path = 0;
-    const local = event => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
-    canvas.addEventListener("pointerdown", event => {
-      down.set(event.pointerId, local(event));
-      path = 0;
-      try { canvas.setPointerCapture(event.pointerId); } catch { /* a pointer that is gone already */ }
-    });
-    const up = event => {
-      const tapped = down.delete(event.pointerId) && path < SLIP && event.pointerType !== "mouse";
-      if (tapped && event.type === "pointerup") this.point(...local(event));
-    };
-    canvas.addEventListener("pointerup", up);
-    canvas.addEventListener("pointercancel", up);
-    canvas.addEventListener("pointermove", event => {
-      const here = local(event), before = down.get(event.pointerId);
-      this.stage.classList.remove("keys");
-      if (!before) {
-        // Of many moves between two frames, the last is answered.
-        this.waiting ||= requestAnimationFrame(() => { this.waiting = 0; this.point(...this.pointer); });
-        this.pointer = here;
-        return;
-      }
-      const [dx, dy] = [here[0] - before[0], here[1] - before[1]];
-      path += Math.abs(dx) + Math.abs(dy);
-      if (down.size === 2) {
-        const other = [...down].find(([id]) => id !== event.pointerId)[1];
-        const gap = at => Math.max(1, Math.hypot(at[0] - other[0], at[1] - other[1]));
-        this.enlarge(gap(here) / gap(before));
-        this.move(dx / 2, dy / 2);
-      } else if (event.shiftKey || event.buttons === 4) this.move(dx, dy);
-      else this.turn(-dx * 0.008, dy * 0.008);
-      down.set(event.pointerId, here);
-    });
-    canvas.addEventListener("pointerleave", event => {
-      if (event.pointerType === "mouse") { cancelAnimationFrame(this.waiting); this.waiting = 0; this.leave(); }
-    });
-    canvas.addEventListener("wheel", event => { event.preventDefault(); this.enlarge(Math.exp(-event.deltaY * 0.0012)); }, { passive: false });
-    canvas.addEventListener("dblclick", () => { this.reset(); this.turned(this); });
-    canvas.addEventListener("blur", () => this.stage.classList.remove("keys"));
-    canvas.addEventListener("keydown", event => {
-      const step = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
-      if (step && event.shiftKey) this.move(-30 * step[0], -30 * step[1]);
-      else if (step) this.turn(0.1 * step[0], 0.1 * step[1]);
-      else if (event.key === "+" || event.key === "=") this.enlarge(1.15);
-      else if (event.key === "-") this.enlarge(1 / 1.15);
-      else if (event.key === "Home" || event.key === "0") { this.reset(); this.turned(this); }
-      else return;
+    this.listenToSize();
+    this.listenToPointer();
+    this.listenToWheel();
+    this.listenToKeys();
+  }
+
+  listenToSize() {
+    const look = seen => { this.visible = seen.some(entry => entry.isIntersecting); this.draw(); };
+    new IntersectionObserver(look, { rootMargin: "200px" }).observe(this.figure);
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  listenToPointer() {
+    // Places of the pointers that are down, and pixels that the last one to go down has moved since.
+    this.down = new Map();
+    this.dragged = 0;
+    const on = (name, answer) => this.canvas.addEventListener(name, answer);
+    on("pointerdown", event => this.pointerDown(event));
+    on("pointerup", event => this.pointerUp(event));
+    on("pointercancel", event => this.pointerUp(event));
+    on("pointermove", event => this.pointerMove(event));
+    on("pointerleave", event => { if (event.pointerType === "mouse") this.pointerLeave(); });
+    on("dblclick", () => this.startAgain());
+  }
+
+  // Place of an event on the canvas in CSS pixels.
+  place(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  pointerDown(event) {
+    this.down.set(event.pointerId, this.place(event));
+    this.dragged = 0;
+    try { this.canvas.setPointerCapture(event.pointerId); } catch { /* a pointer that is gone already */ }
+  }
+
+  pointerUp(event) {
+    const tapped = this.down.delete(event.pointerId) && this.dragged < SLIP && event.pointerType !== "mouse";
+    if (tapped && event.type === "pointerup") this.point(...this.place(event));
+  }
+
+  pointerMove(event) {
+    const here = this.place(event), before = this.down.get(event.pointerId);
+    this.stage.classList.remove("crosshair");
+    if (before) this.drag(event, before, here);
+    else this.pointSoon(here);
+  }
+
+  pointerLeave() {
+    cancelAnimationFrame(this.waiting);
+    this.waiting = 0;
+    this.leave();
+  }
+
+  // Of many moves between two frames, the last is answered.
+  pointSoon(here) {
+    this.pointer = here;
+    this.waiting ||= requestAnimationFrame(() => { this.waiting = 0; this.point(...this.pointer); });
+  }
+
+  drag(event, before, here) {
+    const [dx, dy] = [here[0] - before[0], here[1] - before[1]];
+    this.dragged += Math.abs(dx) + Math.abs(dy);
+    if (this.down.size === 2) this.pinch(event.pointerId, before, here);
+    else if (event.shiftKey || event.buttons === 4) this.move(dx, dy);
+    else this.turn(-dx * DRAG_TURN, dy * DRAG_TURN);
+    this.down.set(event.pointerId, here);
+  }
+
+  // One of two fingers moves.
+  pinch(pointerId, before, here) {
+    const other = [...this.down].find(([id]) => id !== pointerId)[1];
+    const gap = at => Math.max(1, Math.hypot(at[0] - other[0], at[1] - other[1]));
+    this.enlarge(gap(here) / gap(before));
+    this.move((here[0] - before[0]) / 2, (here[1] - before[1]) / 2);
+  }
+
+  listenToWheel() {
+    const zoom = event => { event.preventDefault(); this.enlarge(Math.exp(-event.deltaY * 0.0012)); };
+    this.canvas.addEventListener("wheel", zoom, { passive: false });
+  }
+
+  listenToKeys() {
+    this.canvas.addEventListener("blur", () => this.stage.classList.remove("crosshair"));
+    this.canvas.addEventListener("keydown", event => {
+      if (event.ctrlKey || event.metaKey || event.altKey || !this.key(event)) return;
       event.preventDefault();
-      this.stage.classList.add("keys");
-      this.point(canvas.clientWidth / 2, canvas.clientHeight / 2);
+      this.stage.classList.add("crosshair");
+      this.point(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2);
     });
   }
+
+  // Does what a key stands for; false where it stands for nothing.
+  key({ key, shiftKey }) {
+    const step = ARROWS[key];
+    if (step && shiftKey) this.move(-KEY_MOVE * step[0], -KEY_MOVE * step[1]);
+    else if (step) this.turn(KEY_TURN * step[0], KEY_TURN * step[1]);
+    else if (key === "+" || key === "=") this.enlarge(KEY_ZOOM);
+    else if (key === "-") this.enlarge(1 / KEY_ZOOM);
+    else if (key === "Home" || key === "0") this.startAgain();
+    else return false;
+    return true;
+  }
+}
+
+function dot(a, b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Up to a little less than straight from above or below.
+function clampPitch(pitch) { return Math.max(-1.57, Math.min(1.57, pitch)); }
+
+// An element with children (elements or text) and a class.
+function element(name, content, className) {
+  const made = document.createElement(name);
+  if (className) made.className = className;
+  made.append(...[content ?? []].flat());
+  return made;
 }
 
 // Corners of the box around the surface: vertices of no triangle, wherever they lie, do not count.
@@ -265,7 +377,7 @@ function boundsOf(p, faces) {
 }
 
 // Triangles around each vertex: those of v are triangles[start[v] .. start[v + 1]].
-function fans(faces, n) {
+function trianglesAround(faces, n) {
   const start = new Uint32Array(n + 1), triangles = new Uint32Array(faces.length);
   for (let i = 0; i < faces.length; i++) start[faces[i] + 1]++;
   for (let v = 0; v < n; v++) start[v + 1] += start[v];

@@ -1,14 +1,15 @@
-//! Draws a hand closed and open, in front and from the side, as SVG: what a grasp's collision check
-//! sees. `cargo run -p semfm-robot --example draw_gripper -- franka hand.svg`
+//! Draws a gripper closed and open, in front and from the side, as SVG: what a grasp's collision check
+//! sees. `cargo run -p semfm-show --example draw_gripper -- franka gripper.svg`
 #![allow(clippy::print_stderr, missing_docs)]
 
 use std::fmt::Write;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
-use semfm_geom::io::write_atomically;
-use semfm_geom::math::DVec3;
-use semfm_robot::gripper::{Gripper, GripperPart, GripperSettings, Role};
+use semfm::geom::io::write_atomically;
+use semfm::geom::math::DVec3;
+use semfm::robot::gripper::{Gripper, GripperPart, GripperSettings, Role};
+use semfm_show::html::escape;
 
 /// Pixels per metre.
 const SCALE: f64 = 1500.0;
@@ -19,18 +20,18 @@ const ABOVE: f64 = 0.075;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [gripper, picture] = arguments.as_slice() else {
+    let [name, picture] = arguments.as_slice() else {
         eprintln!("usage: draw_gripper franka|robotiq-2f85|robotiq-2f140|HAND.urdf PICTURE.svg");
         std::process::exit(2);
     };
-    let hand = Gripper::open(gripper, &GripperSettings::default())?;
-    hand.notes.iter().for_each(|note| eprintln!("{note}"));
-    let svg = draw(&hand)?;
+    let gripper = Gripper::open(name, &GripperSettings::default())?;
+    gripper.notes.iter().for_each(|note| eprintln!("{note}"));
+    let svg = draw(&gripper)?;
     write_atomically(picture, |file| file.write_all(svg.as_bytes()))?;
     Ok(())
 }
 
-fn draw(hand: &Gripper) -> Result<String, std::fmt::Error> {
+fn draw(gripper: &Gripper) -> Result<String, std::fmt::Error> {
     let [width, height] = PANEL.map(|side| side * SCALE);
     let mut svg = String::new();
     writeln!(
@@ -39,8 +40,8 @@ fn draw(hand: &Gripper) -> Result<String, std::fmt::Error> {
         4.0 * width,
         height
     )?;
-    let (closed, open) = (*hand.opening.start(), *hand.opening.end());
-    writeln!(svg, r##"<text x="14" y="{}">{}</text>"##, height - 14.0, escaped(&hand.name))?;
+    let (closed, open) = (*gripper.opening.start(), *gripper.opening.end());
+    writeln!(svg, r##"<text x="14" y="{}">{}</text>"##, height - 14.0, escape(&gripper.name))?;
     let views = [(closed, true), (open, true), (closed, false), (open, false)];
     for (panel, (opening, front)) in views.into_iter().enumerate() {
         let across = if front { "y" } else { "x" };
@@ -50,18 +51,13 @@ fn draw(hand: &Gripper) -> Result<String, std::fmt::Error> {
             panel as f64 * width,
             opening * 1e3
         )?;
-        for (pose, part) in hand.parts_at(opening) {
+        for (pose, part) in gripper.parts_at(opening) {
             polygon(&mut svg, &pose, part, front)?;
         }
-        pads(&mut svg, hand, opening, front)?;
+        pads(&mut svg, gripper, opening, front)?;
         svg.push_str("</g>\n");
     }
     Ok(svg + "</svg>\n")
-}
-
-/// A name from a file, as text of an XML file.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
 /// A part's silhouette: the hull of its projected corners.
@@ -84,8 +80,8 @@ fn polygon(svg: &mut String, pose: &Pose, part: &GripperPart, front: bool) -> st
 }
 
 /// The pads' faces and the origin.
-fn pads(svg: &mut String, hand: &Gripper, opening: f64, front: bool) -> std::fmt::Result {
-    let [x, z] = hand.pad.map(|side| side / 2.0);
+fn pads(svg: &mut String, gripper: &Gripper, opening: f64, front: bool) -> std::fmt::Result {
+    let [x, z] = gripper.pad.map(|side| side / 2.0);
     for side in [-1.0, 1.0] {
         let y = side * opening / 2.0;
         let [ax, ay] = pixel(DVec3::new(-x, y, -z), front);
@@ -119,20 +115,22 @@ fn corners(shape: &dyn Shape) -> Vec<DVec3> {
 /// The convex outline of points in the plane (Andrew 1979, monotone chain).
 fn outline(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
-        let mut chain: Vec<[f64; 2]> = Vec::new();
-        for p in points {
-            while let [.., a, b] = chain.as_slice()
-                && (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(p);
+    let mut outline = chain(points.iter().copied());
+    outline.extend(chain(points.iter().rev().copied()));
+    outline
+}
+
+/// One side of the outline, without its last point: every turn is to the left.
+fn chain(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let mut chain: Vec<[f64; 2]> = Vec::new();
+    for p in points {
+        while let [.., a, b] = chain.as_slice()
+            && (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) <= 0.0
+        {
+            chain.pop();
         }
-        chain.pop();
-        chain
-    };
-    let mut lower = half(&mut points.iter().copied());
-    lower.extend(half(&mut points.iter().rev().copied()));
-    lower
+        chain.push(p);
+    }
+    chain.pop();
+    chain
 }

@@ -1,0 +1,61 @@
+//! `features.png`: the features of both surfaces, their clusters and anchors.
+//!
+//! One row for each object, source above. Two pictures show the lifted features, their first three
+//! principal directions as red, green and blue, in one basis for both objects: equal colours are equal
+//! features. The third shows the semantic clusters, each anchor in the colour of its partner and the
+//! rest in grey (figure 3 of the paper).
+
+use std::path::Path;
+
+use semfm::Task;
+use semfm::output::ObjectAnchors;
+use semfm::views::{Paint, RenderSettings, View, render};
+
+use super::sheet::{Entry, Row, Sheet};
+use super::{ObjectFigure, TransferFigure, Viewpoints};
+use crate::Result;
+use crate::colors::{anchor_color, cluster_color};
+
+impl TransferFigure<'_> {
+    /// Writes the picture of the features, clusters and anchors.
+    ///
+    /// # Errors
+    /// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails, and where the task was
+    /// cancelled.
+    pub fn write_features_picture(&self, path: &Path, task: &Task) -> Result<()> {
+        let (source, target) = (pictures(&self.source, task)?, pictures(&self.target, task)?);
+        let rows = [
+            Row { title: "source".into(), pictures: &source },
+            Row { title: "target".into(), pictures: &target },
+        ];
+        let anchors = self.transfer.report.anchors.iter().enumerate();
+        let mut legend: Vec<Entry> = anchors
+            .map(|(rank, anchor)| {
+                let text = format!("anchor {}: cosine {:.2}", rank + 1, anchor.anchor.cosine);
+                Entry::Swatch(anchor_color(rank as i64), text)
+            })
+            .collect();
+        legend.push(Entry::Swatch(anchor_color(-1), "other clusters".into()));
+        let text = "features: three principal components, one basis for both objects";
+        legend.push(Entry::Note(text.into()));
+        let columns = ["lifted features", "from another side", "clusters and anchors"];
+        Sheet { columns: &columns, rows: &rows, legend: &legend }.write(path)
+    }
+}
+
+/// The three pictures of one object.
+fn pictures(figure: &ObjectFigure<'_>, task: &Task) -> Result<Vec<View>> {
+    let Viewpoints { best, other, .. } = figure.viewpoints;
+    let (mesh, light) = (figure.mesh(), RenderSettings::default());
+    let features = figure.onto_vertices(&figure.feature_colors);
+    let clusters = figure.onto_vertices(&cluster_colors(&figure.anchors));
+    let mut pictures = render(mesh, &Paint::Vertices(&features), &[best, other], &light, task)?;
+    pictures.extend(render(mesh, &Paint::Vertices(&clusters), &[best], &light, task)?);
+    Ok(pictures)
+}
+
+/// The colour of each cloud point's cluster.
+fn cluster_colors(anchors: &ObjectAnchors) -> Vec<[f32; 3]> {
+    let clusters = anchors.cluster_of_point.iter().zip(&anchors.of_point);
+    clusters.map(|(&cluster, &rank)| cluster_color(cluster, rank)).collect()
+}
