@@ -365,7 +365,9 @@ impl<'a> Job<'a> {
             (Ok(a), Ok(b)) => (a, b),
             (Err(failure), _) | (_, Err(failure)) => return Ok(Err(failure.clone())),
         };
-        let carried = Matching::new(a, b, settings, task)?.transfer(&source.truth)?;
+        let matching = Matching::new(a, b, settings, task)?;
+        matching.anchors(task)?; // the rows list them, whatever the method
+        let carried = matching.transfer(&source.truth)?;
         row.take(&carried, truth, areas)?;
         for (stage, ms) in carried.report.stages_ms.iter() {
             row.stages_ms.insert(stage.into(), ms);

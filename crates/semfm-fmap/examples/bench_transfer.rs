@@ -19,8 +19,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use npyz::NpyFile;
-use semfm_fmap::transfer::{Matching, Method, TransferSettings};
-use semfm_fmap::{PreparedObject, Region, metrics};
+use semfm_fmap::{Matching, Method, PreparedObject, Region, TransferSettings, metrics};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings, Task};
 
@@ -106,7 +105,6 @@ fn main() -> Outcome<()> {
                 let start = Instant::now();
                 let prepared =
                     PreparedObject::new(Arc::clone(&object.shape), Arc::clone(cloud), &task)?;
-                prepared.clusters(&settings.clusters, &task)?;
                 ready.push(prepared);
                 prepare_ms.push(start.elapsed().as_secs_f64() * 1e3);
             }

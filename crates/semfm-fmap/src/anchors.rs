@@ -1,10 +1,10 @@
-//! Semantic anchors: parts of two objects that mean the same (the paper's section IV-D).
+//! Semantic anchors: parts of two objects that correspond (the paper's section IV-D).
 
 use faer::Mat;
 use semfm_geom::SemanticCloud;
 use serde::{Deserialize, Serialize};
 
-use crate::assignment::best_pairs;
+use crate::assignment::{Assigned, best_pairs};
 use crate::clusters::Clusters;
 
 /// A part of the source and the part of the target that it is paired with.
@@ -31,31 +31,41 @@ pub struct Anchors {
     pub cosines: Mat<f64>,
 }
 
+/// A cloud and the clusters of its points.
+#[derive(Clone, Copy, Debug)]
+pub struct ClusteredCloud<'a> {
+    /// The cloud (M points).
+    pub cloud: &'a SemanticCloud,
+    /// One label per point (M).
+    pub clusters: &'a Clusters,
+}
+
+impl ClusteredCloud<'_> {
+    /// Mean embedding of each cluster, scaled to unit length.
+    fn unit_means(self) -> Vec<Vec<f64>> {
+        let mut means = self.clusters.means(self.cloud);
+        for mean in &mut means {
+            let length = mean.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            mean.iter_mut().for_each(|x| *x /= length);
+        }
+        means
+    }
+}
+
 impl Anchors {
     /// The `alpha` one-to-one pairs of clusters with the largest total cosine between their mean
     /// embeddings, by an exact assignment; fewer where there are fewer clusters.
     ///
-    /// The clouds must have features of the same dimension and the clusters be theirs.
-    pub fn select(
-        source: (&SemanticCloud, &Clusters),
-        target: (&SemanticCloud, &Clusters),
-        alpha: usize,
-    ) -> Self {
-        let unit_means = |(cloud, clusters): (&SemanticCloud, &Clusters)| -> Vec<Vec<f64>> {
-            let mut means = clusters.means(cloud);
-            for mean in &mut means {
-                let length = mean.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-                mean.iter_mut().for_each(|x| *x /= length);
-            }
-            means
-        };
-        let (on_source, on_target) = (unit_means(source), unit_means(target));
+    /// S = (s̄ᵢ · s̄ⱼ)/(‖s̄ᵢ‖ ‖s̄ⱼ‖) over the mean embeddings s̄ of the clusters, equation 11. The clouds
+    /// must have features of the same dimension.
+    pub fn select(source: ClusteredCloud<'_>, target: ClusteredCloud<'_>, alpha: usize) -> Self {
+        let (on_source, on_target) = (source.unit_means(), target.unit_means());
         let cosines = Mat::from_fn(on_source.len(), on_target.len(), |i, j| {
             on_source[i].iter().zip(&on_target[j]).map(|(a, b)| a * b).sum()
         });
         let mut pairs: Vec<Anchor> = best_pairs(cosines.as_ref(), alpha)
             .into_iter()
-            .map(|(i, j)| Anchor {
+            .map(|Assigned { row: i, column: j }| Anchor {
                 source: i as u32,
                 target: j as u32,
                 cosine: cosines[(i, j)],
@@ -68,9 +78,9 @@ impl Anchors {
 
     /// The same anchors seen from the target.
     pub fn swapped(&self) -> Self {
-        let swap = |a: &Anchor| Anchor { source: a.target, target: a.source, ..*a };
+        let pairs = self.pairs.iter();
         Self {
-            pairs: self.pairs.iter().map(swap).collect(),
+            pairs: pairs.map(|a| Anchor { source: a.target, target: a.source, ..*a }).collect(),
             cosines: self.cosines.transpose().to_owned(),
         }
     }
@@ -86,6 +96,7 @@ impl Anchors {
     }
 }
 
+/// Sᵢⱼ − max over the rivals in row i and column j.
 fn margin(cosines: &Mat<f64>, i: usize, j: usize) -> f64 {
     let row = (0..cosines.ncols()).filter(|&c| c != j).map(|c| cosines[(i, c)]);
     let column = (0..cosines.nrows()).filter(|&r| r != i).map(|r| cosines[(r, j)]);
@@ -116,8 +127,13 @@ mod tests {
         // Source parts: east, north. Target parts: north, north-east, east.
         let source = cloud(&[[2.0, 0.0], [4.0, 0.0], [0.0, 1.0]]);
         let target = cloud(&[[0.0, 3.0], [1.0, 1.0], [5.0, 0.0]]);
-        let labels = (Clusters::from_labels(&[0, 0, 1]), Clusters::from_labels(&[0, 1, 2]));
-        let anchors = Anchors::select((&source, &labels.0), (&target, &labels.1), 2);
+        let (of_source, of_target) =
+            (Clusters::from_labels(&[0, 0, 1]), Clusters::from_labels(&[0, 1, 2]));
+        let anchors = Anchors::select(
+            ClusteredCloud { cloud: &source, clusters: &of_source },
+            ClusteredCloud { cloud: &target, clusters: &of_target },
+            2,
+        );
         assert_eq!((anchors.source_labels(), anchors.target_labels()), (vec![0, 1], vec![2, 0]));
         let diagonal = 0.5f64.sqrt();
         assert!((anchors.pairs[0].cosine - 1.0).abs() < 1e-12);
@@ -128,7 +144,8 @@ mod tests {
     fn one_part_each_has_no_rival_and_still_goes_through_json() {
         let one = cloud(&[[1.0, 0.0]]);
         let labels = Clusters::from_labels(&[0]);
-        let anchors = Anchors::select((&one, &labels), (&one, &labels), 2);
+        let one = ClusteredCloud { cloud: &one, clusters: &labels };
+        let anchors = Anchors::select(one, one, 2);
         assert_eq!(anchors.pairs.len(), 1);
         let text = serde_json::to_string(&anchors.pairs[0]).unwrap();
         assert!(text.contains("\"margin\":null"), "{text}");

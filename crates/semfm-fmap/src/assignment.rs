@@ -2,6 +2,15 @@
 
 use faer::MatRef;
 
+/// A row of a matrix and the column that it is assigned to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Assigned {
+    /// The row.
+    pub row: usize,
+    /// The column.
+    pub column: usize,
+}
+
 /// The `count` pairs (row, column) of `gain` (rows × columns) with the largest sum, no row and no
 /// column twice, sorted by row; fewer where the matrix has fewer rows or columns.
 ///
@@ -11,7 +20,7 @@ use faer::MatRef;
 /// enough: from `[[.9, .8], [.8, .1]]` it takes .9 + .1 where .8 + .8 is to be had.
 ///
 /// Entries must be finite.
-pub fn best_pairs(gain: MatRef<'_, f64>, count: usize) -> Vec<(usize, usize)> {
+pub fn best_pairs(gain: MatRef<'_, f64>, count: usize) -> Vec<Assigned> {
     let (rows, columns) = (gain.nrows(), gain.ncols());
     let count = count.min(rows).min(columns);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -23,62 +32,77 @@ pub fn best_pairs(gain: MatRef<'_, f64>, count: usize) -> Vec<(usize, usize)> {
     let n = rows + columns - count;
     // Dearer than any number of real pairs can repay.
     let forbidden = (high - low + 1.0) * (n + 1) as f64;
-    let cost = |i: usize, j: usize| match (i < rows, j < columns) {
-        (true, true) => high - gain[(i, j)],
-        (false, false) => forbidden,
-        // A real pair must not lose against staying alone: the count is fixed by the padding.
-        _ => 0.0,
-    };
-    let column_of = assign(n, cost);
-    (0..rows).map(|i| (i, column_of[i])).filter(|&(_, j)| j < columns).collect()
+    let column_of = Padded { gain, high, forbidden }.assign(n);
+    let assigned = (0..rows).map(|row| Assigned { row, column: column_of[row] });
+    assigned.filter(|pair| pair.column < columns).collect()
 }
 
-/// The permutation of least cost: `column_of[row]`, by shortest augmenting paths (Jonker &
-/// Volgenant 1987; O(n³)).
-fn assign(n: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<usize> {
-    const FREE: usize = usize::MAX;
-    let (mut row_price, mut column_price) = (vec![0.0; n], vec![0.0; n]);
-    let mut row_of = vec![FREE; n];
-    for start in 0..n {
-        // Dijkstra over columns from the unassigned row `start`, on reduced costs.
-        let mut distance = vec![f64::INFINITY; n];
-        let mut came_from = vec![FREE; n];
-        let mut done = vec![false; n];
-        let (mut row, mut reached, mut last) = (start, 0.0, FREE);
-        let end = loop {
-            let (mut nearest, mut next) = (f64::INFINITY, FREE);
-            for j in (0..n).filter(|&j| !done[j]) {
-                let through = reached + cost(row, j) - row_price[row] - column_price[j];
-                if through < distance[j] {
-                    (distance[j], came_from[j]) = (through, last);
-                }
-                if distance[j] < nearest {
-                    (nearest, next) = (distance[j], j);
-                }
-            }
-            (done[next], reached) = (true, nearest);
-            if row_of[next] == FREE {
-                break next;
-            }
-            (row, last) = (row_of[next], next);
-        };
-        row_price[start] += reached;
-        for j in (0..n).filter(|&j| done[j] && j != end) {
-            column_price[j] -= reached - distance[j];
-            row_price[row_of[j]] += reached - distance[j];
-        }
-        let mut column = end;
-        while column != FREE {
-            let before = came_from[column];
-            row_of[column] = if before == FREE { start } else { row_of[before] };
-            column = before;
+/// The gains as costs of a square matrix, padded.
+struct Padded<'a> {
+    gain: MatRef<'a, f64>,
+    /// The largest gain.
+    high: f64,
+    /// The cost where padding meets padding.
+    forbidden: f64,
+}
+
+impl Padded<'_> {
+    fn cost(&self, i: usize, j: usize) -> f64 {
+        match (i < self.gain.nrows(), j < self.gain.ncols()) {
+            (true, true) => self.high - self.gain[(i, j)],
+            (false, false) => self.forbidden,
+            // A real pair must not lose against staying alone: the count is fixed by the padding.
+            _ => 0.0,
         }
     }
-    let mut column_of = vec![0; n];
-    for (j, &i) in row_of.iter().enumerate() {
-        column_of[i] = j;
+
+    /// The permutation of least cost: `column_of[row]`, by shortest augmenting paths (Jonker &
+    /// Volgenant 1987; O(n³)).
+    fn assign(&self, n: usize) -> Vec<usize> {
+        const FREE: usize = usize::MAX;
+        let (mut row_price, mut column_price) = (vec![0.0; n], vec![0.0; n]);
+        let mut row_of = vec![FREE; n];
+        for start in 0..n {
+            // Dijkstra over columns from the unassigned row `start`, on reduced costs.
+            let mut distance = vec![f64::INFINITY; n];
+            let mut came_from = vec![FREE; n];
+            let mut done = vec![false; n];
+            let (mut row, mut reached, mut last) = (start, 0.0, FREE);
+            let end = loop {
+                let (mut nearest, mut next) = (f64::INFINITY, FREE);
+                for j in (0..n).filter(|&j| !done[j]) {
+                    let through = reached + self.cost(row, j) - row_price[row] - column_price[j];
+                    if through < distance[j] {
+                        (distance[j], came_from[j]) = (through, last);
+                    }
+                    if distance[j] < nearest {
+                        (nearest, next) = (distance[j], j);
+                    }
+                }
+                (done[next], reached) = (true, nearest);
+                if row_of[next] == FREE {
+                    break next;
+                }
+                (row, last) = (row_of[next], next);
+            };
+            row_price[start] += reached;
+            for j in (0..n).filter(|&j| done[j] && j != end) {
+                column_price[j] -= reached - distance[j];
+                row_price[row_of[j]] += reached - distance[j];
+            }
+            let mut column = end;
+            while column != FREE {
+                let before = came_from[column];
+                row_of[column] = if before == FREE { start } else { row_of[before] };
+                column = before;
+            }
+        }
+        let mut column_of = vec![0; n];
+        for (j, &i) in row_of.iter().enumerate() {
+            column_of[i] = j;
+        }
+        column_of
     }
-    column_of
 }
 
 #[cfg(test)]
@@ -103,8 +127,9 @@ mod tests {
     #[test]
     fn a_greedy_pick_is_beaten() {
         let gain = mat![[0.9, 0.8], [0.8, 0.1]];
-        assert_eq!(best_pairs(gain.as_ref(), 2), [(0, 1), (1, 0)]);
-        assert_eq!(best_pairs(gain.as_ref(), 1), [(0, 0)]);
+        let [first, second] = [(0, 1), (1, 0)].map(|(row, column)| Assigned { row, column });
+        assert_eq!(best_pairs(gain.as_ref(), 2), [first, second]);
+        assert_eq!(best_pairs(gain.as_ref(), 1), [Assigned { row: 0, column: 0 }]);
         assert_eq!(best_pairs(gain.as_ref(), 7).len(), 2);
         assert!(best_pairs(gain.as_ref(), 0).is_empty());
     }
@@ -121,11 +146,11 @@ mod tests {
             let count = count.min(rows).min(columns);
             let pairs = best_pairs(gain.as_ref(), count);
             prop_assert_eq!(pairs.len(), count);
-            let mut seen: Vec<usize> = pairs.iter().map(|p| p.1).collect();
+            let mut seen: Vec<usize> = pairs.iter().map(|p| p.column).collect();
             seen.sort_unstable();
             seen.dedup();
             prop_assert_eq!(seen.len(), count);
-            let total: f64 = pairs.iter().map(|&(i, j)| gain[(i, j)]).sum();
+            let total: f64 = pairs.iter().map(|p| gain[(p.row, p.column)]).sum();
             let best = brute_force(gain.as_ref(), count, 0, 0);
             prop_assert!((total - best).abs() < 1e-12, "{} against {}", total, best);
         }

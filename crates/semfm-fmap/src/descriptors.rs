@@ -15,20 +15,29 @@ pub enum DescriptorNorm {
     Vertices,
 }
 
+/// How indicators become descriptors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Indicators {
+    /// Heat time t, on area 1.
+    pub heat_time: f64,
+    /// What they are scaled to.
+    pub norm: DescriptorNorm,
+    /// Coefficients k that are returned.
+    pub k: usize,
+}
+
 /// Spectral coefficients (k × n_functions) of the indicator functions of some labels, diffused by
-/// heat for a time `t` (relative to area 1) and scaled to unit norm.
+/// heat and scaled to unit norm.
 ///
 /// `labels` (n) holds one label per vertex; column c of the answer belongs to `chosen[c]`. On the
 /// truncated basis exp(−tΔ) is exactly exp(−tλᵢ) on the coefficients, so no linear system is
-/// solved. All of the basis takes part in the diffusion and in the norm; the first `k` coefficients
-/// are returned. A label that no vertex bears gives a column of zeros.
+/// solved. All of the basis takes part in the diffusion and in the norm. A label that no vertex
+/// has gives a column of zeros.
 pub fn diffused_indicators(
     basis: &Eigenbasis,
     labels: &[u32],
     chosen: &[u32],
-    t: f64,
-    norm: DescriptorNorm,
-    k: usize,
+    &Indicators { heat_time: t, norm, k }: &Indicators,
 ) -> Mat<f64> {
     let mut out = Mat::zeros(k, chosen.len());
     for (c, &label) in chosen.iter().enumerate() {
@@ -81,13 +90,13 @@ mod tests {
         let labels: Vec<u32> =
             shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
         let basis = shape.basis();
-        let surface =
-            diffused_indicators(basis, &labels, &[1, 0, 7], 0.005, DescriptorNorm::Surface, 30);
+        let on_surface = Indicators { heat_time: 0.005, norm: DescriptorNorm::Surface, k: 30 };
+        let surface = diffused_indicators(basis, &labels, &[1, 0, 7], &on_surface);
         assert!((surface.col(0).squared_norm_l2() - 1.0).abs() < 1e-12);
         assert!((surface.col(1).squared_norm_l2() - 1.0).abs() < 1e-12);
-        assert_eq!(surface.col(2).norm_l2(), 0.0, "nobody bears label 7");
-        let vertices =
-            diffused_indicators(basis, &labels, &[1], 0.005, DescriptorNorm::Vertices, 30);
+        assert_eq!(surface.col(2).norm_l2(), 0.0, "no vertex has label 7");
+        let on_vertices = Indicators { norm: DescriptorNorm::Vertices, ..on_surface };
+        let vertices = diffused_indicators(basis, &labels, &[1], &on_vertices);
         let coefficients: Vec<f64> = vertices.col(0).iter().copied().collect();
         let sum: f64 = basis.reconstruct(&coefficients).iter().map(|f| f * f).sum();
         assert!((sum - 1.0).abs() < 1e-12);
@@ -98,9 +107,9 @@ mod tests {
         let shape = shape(&blob(1.0), 30);
         let labels: Vec<u32> =
             shape.mesh().vertices().iter().map(|p| u32::from(p.x > 0.3)).collect();
-        let roughness = |t| {
-            let d =
-                diffused_indicators(shape.basis(), &labels, &[1], t, DescriptorNorm::Surface, 30);
+        let roughness = |heat_time| {
+            let indicators = Indicators { heat_time, norm: DescriptorNorm::Surface, k: 30 };
+            let d = diffused_indicators(shape.basis(), &labels, &[1], &indicators);
             d.col(0).iter().zip(&shape.basis().values).map(|(a, l)| l * a * a).sum::<f64>()
         };
         assert!(roughness(0.05) < 0.5 * roughness(0.0));

@@ -7,6 +7,7 @@ use faer::sparse::{SparseColMat, Triplet};
 use semfm_geom::PointIndex;
 use semfm_geom::math::DVec3;
 
+use crate::union_find::UnionFind;
 use crate::{Error, Result};
 
 /// An edge never weighs less: a part whose features resemble no neighbour's would otherwise fall off
@@ -76,7 +77,7 @@ fn neighbour_edges(points: &[DVec3], neighbours: usize) -> Result<Vec<(u32, u32)
     }
     edges.sort_unstable();
     edges.dedup();
-    let mut pieces = Pieces::new(points.len());
+    let mut pieces = UnionFind::new(points.len());
     let joined = edges.iter().filter(|&&(i, j)| pieces.join(i, j)).count();
     if joined + 1 < points.len() {
         let bridges: Vec<_> =
@@ -115,30 +116,6 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
-/// Which points hang together: a union–find forest.
-pub(crate) struct Pieces(Vec<u32>);
-
-impl Pieces {
-    pub fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    pub fn of(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-
-    /// Joins two points' pieces; false where they were one already.
-    pub fn join(&mut self, i: u32, j: u32) -> bool {
-        let (a, b) = (self.of(i), self.of(j));
-        self.0[a.max(b) as usize] = a.min(b);
-        a != b
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,11 +126,11 @@ mod tests {
         let points: Vec<DVec3> =
             (0..60).map(|i| DVec3::new(f64::from(i) + far(i), f64::from(i % 7), 0.0)).collect();
         let edges = neighbour_edges(&points, 4).unwrap();
-        let mut pieces = Pieces::new(60);
+        let mut pieces = UnionFind::new(60);
         edges.iter().for_each(|&(i, j)| {
             pieces.join(i, j);
         });
-        assert!((0..60).all(|i| pieces.of(i) == 0));
+        assert!((0..60).all(|i| pieces.root(i) == 0));
     }
 
     #[test]

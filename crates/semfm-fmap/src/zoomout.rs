@@ -1,4 +1,4 @@
-//! ZoomOut: from a small functional map to a large one, by turns of point map and projection.
+//! ZoomOut: from a small functional map to a large one, alternating point map and projection.
 //!
 //! Melzi et al., "ZoomOut: Spectral upsampling for efficient shape correspondence", 2019. Three
 //! additions, each optional: the search may run on samples only (their section 5), on the basis
@@ -30,6 +30,22 @@ pub struct MapSide<'a> {
     pub samples: &'a [u32],
 }
 
+impl<'a> MapSide<'a> {
+    /// A shape for a purely spectral search on all vertices.
+    pub fn spectral(basis: &'a Eigenbasis) -> Self {
+        Self { basis, features: None, samples: &[] }
+    }
+}
+
+/// Matches of both sides' samples.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Matches {
+    /// A source vertex for each of the target's samples.
+    pub source_of: Vec<u32>,
+    /// A target vertex for each of the source's samples.
+    pub target_of: Vec<u32>,
+}
+
 /// How the map grows.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ZoomOutSettings {
@@ -56,7 +72,7 @@ impl Default for ZoomOutSettings {
 ///
 /// # Errors
 /// [`Error::BasisTooSmall`], [`Error::OutOfRange`] for a step of 0 or a map that is not square,
-/// cancellation.
+/// [`Error::LinearAlgebra`] where the projection is singular, [`Error::Geom`] on cancellation.
 pub fn zoomout(
     map: FunctionalMap,
     source: &MapSide<'_>,
@@ -86,7 +102,7 @@ pub fn zoomout(
         } else {
             let on_target = rows_of(target.basis.first(k), target.samples);
             let on_source = rows_of(source.basis.first(k), &matches);
-            least_squares(&[(on_target.as_ref(), on_source.as_ref())])?
+            least_squares(&[Equations { left: on_target, right: on_source }])?
         };
     }
     Ok(map)
@@ -94,33 +110,36 @@ pub fn zoomout(
 
 /// Grows a map from matches of both sides' samples, using both directions in every turn.
 ///
-/// `source_of` names a source vertex for each of the target's samples, `target_of` a target vertex
-/// for each of the source's. In each turn C solves
+/// In each turn C solves
 /// \[Φ_target\[samples\]; Φ_target\[target_of\]\] C = \[Φ_source\[source_of\]; Φ_source\[samples\]\],
 /// then both sets of matches are searched again with it.
 ///
 /// # Errors
 /// As [`zoomout`]; [`Error::Length`] where matches and samples differ in count.
 pub fn zoomout_bidirectional(
-    source_of: Vec<u32>,
-    target_of: Vec<u32>,
+    matches: Matches,
     source: &MapSide<'_>,
     target: &MapSide<'_>,
     settings: &ZoomOutSettings,
     task: &Task,
 ) -> Result<FunctionalMap> {
     check(settings, source, target)?;
+    let Matches { mut source_of, mut target_of } = matches;
     Error::length("matches of the target's samples", target.samples.len(), source_of.len())?;
     Error::length("matches of the source's samples", source.samples.len(), target_of.len())?;
-    let (mut source_of, mut target_of) = (source_of, target_of);
     let mut k = settings.k_start.min(settings.k_final);
     loop {
         task.step("zoomout", k, settings.k_final)?;
         let (on_source, on_target) = (source.basis.first(k), target.basis.first(k));
-        let map = least_squares(&[
-            (rows_of(on_target, target.samples).as_ref(), rows_of(on_source, &source_of).as_ref()),
-            (rows_of(on_target, &target_of).as_ref(), rows_of(on_source, source.samples).as_ref()),
-        ])?;
+        let forth = Equations {
+            left: rows_of(on_target, target.samples),
+            right: rows_of(on_source, &source_of),
+        };
+        let back = Equations {
+            left: rows_of(on_target, &target_of),
+            right: rows_of(on_source, source.samples),
+        };
+        let map = least_squares(&[forth, back])?;
         if k >= settings.k_final {
             return Ok(map);
         }
@@ -194,15 +213,25 @@ fn with_features<'a>(
     if rows.is_empty() { both } else { both.chosen(rows) }
 }
 
-/// C of least Σ ‖Aᵢ C − Bᵢ‖² + ridge ‖C‖² over stacked blocks (Aᵢ, Bᵢ).
-fn least_squares(blocks: &[(MatRef<'_, f64>, MatRef<'_, f64>)]) -> Result<FunctionalMap> {
-    let (k_target, k_source) = (blocks[0].0.ncols(), blocks[0].1.ncols());
+/// Equations A C = B, one for each row.
+struct Equations {
+    /// A (rows × k_target).
+    left: Mat<f64>,
+    /// B (rows × k_source).
+    right: Mat<f64>,
+}
+
+/// C of least Σ ‖Aᵢ C − Bᵢ‖² + ρ ‖C‖² over some blocks of equations, ρ = [`RIDGE`] · rows:
+///
+/// (Σ Aᵢᵀ Aᵢ + ρ I) C = Σ Aᵢᵀ Bᵢ
+fn least_squares(blocks: &[Equations]) -> Result<FunctionalMap> {
+    let (k_target, k_source) = (blocks[0].left.ncols(), blocks[0].right.ncols());
     let (mut gram, mut right) =
         (Mat::<f64>::zeros(k_target, k_target), Mat::<f64>::zeros(k_target, k_source));
     let mut rows = 0;
-    for (a, b) in blocks {
-        matmul(gram.as_mut(), Accum::Add, a.transpose(), *a, 1.0, Par::Seq);
-        matmul(right.as_mut(), Accum::Add, a.transpose(), *b, 1.0, Par::Seq);
+    for Equations { left: a, right: b } in blocks {
+        matmul(gram.as_mut(), Accum::Add, a.transpose(), a.as_ref(), 1.0, Par::Seq);
+        matmul(right.as_mut(), Accum::Add, a.transpose(), b.as_ref(), 1.0, Par::Seq);
         rows += a.nrows();
     }
     (0..k_target).for_each(|i| gram[(i, i)] += RIDGE * rows as f64);
@@ -270,8 +299,7 @@ mod tests {
             MapSide { basis: shape.basis(), features: Some(positions.as_ref()), samples: &samples };
         let settings = ZoomOutSettings { k_start: 10, k_final: 30, step: 5, feature_weight: 1.0 };
         let map = zoomout_bidirectional(
-            matches.clone(),
-            matches,
+            Matches { source_of: matches.clone(), target_of: matches },
             &side,
             &side,
             &settings,

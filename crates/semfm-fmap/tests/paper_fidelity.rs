@@ -9,9 +9,8 @@ use std::path::PathBuf;
 use faer::{Mat, MatRef};
 use npyz::NpyFile;
 use semfm_fmap::clusters::Clusters;
-use semfm_fmap::transfer::semfm::anchor_fit;
 use semfm_fmap::zoomout::{MapSide, point_map, zoomout};
-use semfm_fmap::{Anchors, Method, TransferSettings};
+use semfm_fmap::{Anchors, ClusteredCloud, LabelledBasis, Method, TransferSettings, anchor_fit};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Eigenbasis, PointIndex, SemanticCloud, Task};
 
@@ -87,12 +86,12 @@ fn assert_close(found: MatRef<'_, f64>, expected: &Mat<f64>, what: &str) {
 fn check_rule(rule: &str, from: &Object, to: &Object, anchors: &Anchors) -> Vec<u32> {
     let settings = TransferSettings::of(Method::Semfm);
     let task = Task::default();
-    let sides = ((&from.basis, &from.vertex_labels[..]), (&to.basis, &to.vertex_labels[..]));
-    let fit = anchor_fit(sides.0, sides.1, anchors, &settings, &task).unwrap();
+    let on_source = LabelledBasis { basis: &from.basis, labels: &from.vertex_labels };
+    let on_target = LabelledBasis { basis: &to.basis, labels: &to.vertex_labels };
+    let fit = anchor_fit(on_source, on_target, anchors, &settings, &task).unwrap();
     assert_eq!((fit.report.rank, fit.report.minimum_norm), (2, true));
     assert_close(fit.map.matrix(), &floats(&format!("{rule}_C_start")), "C before ZoomOut");
-    let side = |object| MapSide { basis: object, features: None, samples: &[] };
-    let (from, to) = (side(&from.basis), side(&to.basis));
+    let (from, to) = (MapSide::spectral(&from.basis), MapSide::spectral(&to.basis));
     let map = zoomout(fit.map, &from, &to, &settings.zoomout, &task).unwrap();
     assert_close(map.matrix(), &floats(&format!("{rule}_C_final")), "C after ZoomOut");
     let map = point_map(&map, &from, &to, 0.0).source_of;
@@ -103,8 +102,11 @@ fn check_rule(rule: &str, from: &Object, to: &Object, anchors: &Anchors) -> Vec<
 #[test]
 fn anchors_maps_and_regions_are_the_references_under_both_rules() {
     let (source, target) = (object("source"), object("target"));
-    let anchors =
-        Anchors::select((&source.cloud, &source.clusters), (&target.cloud, &target.clusters), 2);
+    let anchors = Anchors::select(
+        ClusteredCloud { cloud: &source.cloud, clusters: &source.clusters },
+        ClusteredCloud { cloud: &target.cloud, clusters: &target.clusters },
+        2,
+    );
     assert_close(anchors.cosines.as_ref(), &floats("preimage_cosines"), "cosines");
     let mut pairs: Vec<u32> = anchors.pairs.iter().flat_map(|a| [a.source, a.target]).collect();
     if pairs[0] > pairs[2] {

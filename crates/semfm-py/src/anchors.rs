@@ -162,7 +162,9 @@ impl Anchors {
             return Err(errors::invalid(py, "target_cloud", &expected, &found));
         }
         let anchors = run(py, None, move |_| {
-            Ok(fmap::Anchors::select((&clouds.0, &cuts.0), (&clouds.1, &cuts.1), alpha))
+            let source = fmap::ClusteredCloud { cloud: &clouds.0, clusters: &cuts.0 };
+            let target = fmap::ClusteredCloud { cloud: &clouds.1, clusters: &cuts.1 };
+            Ok(fmap::Anchors::select(source, target, alpha))
         })?;
         Ok(Self { held: Held::new(anchors) })
     }

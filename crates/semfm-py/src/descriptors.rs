@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use pyo3::prelude::*;
-use semfm::fmap::descriptors::{DescriptorNorm, diffused_indicators as indicators};
+use semfm::fmap::descriptors::{DescriptorNorm, Indicators, diffused_indicators as indicate};
 use semfm::geom;
 use semfm::geom::descriptors::{self, HksSettings, WksSettings};
 
@@ -110,8 +110,8 @@ pub fn diffused_indicators<'py>(
         return Err(errors::invalid(py, "t", "a time of at least 0", &t.to_string()));
     }
     let result = run(py, None, move |_| {
-        let k = basis.k();
-        Ok(indicators(&basis, &labels, &chosen, t, norm, k))
+        let indicators = Indicators { heat_time: t, norm, k: basis.k() };
+        Ok(indicate(&basis, &labels, &chosen, &indicators))
     })?;
     lend::owned_matrix(py, result.as_ref())
 }

@@ -146,9 +146,11 @@ impl FunctionalMap {
                 mesh.map(OrientedSurface::new).transpose()
             };
             let surfaces = (surface(&meshes.0)?, surface(&meshes.1)?);
-            let source = FitSide { basis: &source, surface: surfaces.0.as_ref() };
-            let target = FitSide { basis: &target, surface: surfaces.1.as_ref() };
-            Ok(fit((a.as_ref(), b.as_ref()), source, target, &settings, task)?.map)
+            let source =
+                FitSide { surface: surfaces.0.as_ref(), ..FitSide::new(&source, a.as_ref()) };
+            let target =
+                FitSide { surface: surfaces.1.as_ref(), ..FitSide::new(&target, b.as_ref()) };
+            Ok(fit(source, target, &settings, task)?.map)
         })?;
         Ok(Self { held: Held::new(map) })
     }

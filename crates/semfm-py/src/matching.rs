@@ -95,8 +95,10 @@ impl Matching {
 
     /// Anchors: the paired parts of the two objects.
     #[getter]
-    fn anchors(&self) -> Anchors {
-        Anchors { held: Held::new(self.pair.anchors().clone()) }
+    fn anchors(&self, py: Python<'_>) -> PyResult<Anchors> {
+        let pair = Arc::clone(&self.pair);
+        let anchors = run(py, None, move |task| Ok(pair.anchors(task)?.clone()))?;
+        Ok(Anchors { held: Held::new(anchors) })
     }
 
     /// FunctionalMap, optional: C between the working shapes; None for methods without a map.
@@ -140,6 +142,7 @@ impl Matching {
         task: &semfm::Task,
     ) -> semfm::Result<Self> {
         let pair = Matched::new(&source.held.object, &target.held.object, settings, task)?;
+        pair.anchors(task)?; // its reports list them, as those of the short call
         Ok(Self { pair: Arc::new(pair), source, target })
     }
 

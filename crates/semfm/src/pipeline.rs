@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use semfm_fmap::{Method, Region, Transfer, TransferSettings};
+use semfm_fmap::{Lifting, Method, Region, Transfer, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeCache, ShapeSettings, Task};
@@ -42,8 +42,10 @@ impl PipelineSettings {
     /// A method's own constants. `semfm` has its own lifting, as the paper has it; every other
     /// method uses ours.
     pub fn of(method: Method) -> Self {
-        let lift =
-            if method == Method::Semfm { LiftSettings::paper() } else { LiftSettings::default() };
+        let lift = match method.info().features.lifting {
+            Lifting::Unproject => LiftSettings::paper(),
+            _ => LiftSettings::default(),
+        };
         let transfer = TransferSettings::of(method);
         Self { shape: ShapeSettings::default(), lift, transfer, cache: ShapeCache::off() }
     }

@@ -92,6 +92,10 @@ struct MatchingOptions {
     /// How a map carries the region: preimage, or image as in the paper's text
     #[arg(long, default_value_t = Rule::Preimage)]
     rule: Rule,
+    /// Compute a second opinion beside `nearest` and `sinkhorn`, as costly as `fused`: their
+    /// confidence is then the agreement with it (other methods have theirs in any case)
+    #[arg(long)]
+    second_opinion: bool,
     /// Seed of everything drawn by chance
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
@@ -113,6 +117,7 @@ impl MatchingOptions {
             settings.lift = PipelineSettings::of(method).lift;
         }
         settings.transfer.rule = self.rule;
+        settings.transfer.second_opinion |= self.second_opinion;
         if let Some(n) = self.working_vertices {
             settings.shape.working_vertices = n;
         }
@@ -161,9 +166,8 @@ impl Carry {
                 (load::embeddings(a, &source.mesh)?, load::embeddings(b, &target.mesh)?)
             } else {
                 let model = meaning.encoder.as_deref().context("--encoder is missing")?;
-                let default_rolls = if self.matching.method == Method::Semfm { 1 } else { 4 };
                 let scratch = tempfile::tempdir().context("a folder for embeddings")?;
-                let rolls = meaning.rolls.unwrap_or(default_rolls);
+                let rolls = meaning.rolls.unwrap_or(self.matching.method.info().features.rolls);
                 let encoder = Encoder::new(model, rolls, !self.matching.no_cache, scratch.path())?;
                 // Colour on one side alone misleads the encoder.
                 let colored = !source.appearance.is_plain() && !target.appearance.is_plain();

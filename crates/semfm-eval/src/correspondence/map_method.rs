@@ -159,9 +159,10 @@ fn map_of_descriptors(
     let a = descriptors(&source, &on_source)?;
     let b = descriptors(&target, &on_target)?;
     let k = a.nrows().min(b.nrows());
-    let source = FitSide { basis: &source, surface: source_surface.as_ref() };
-    let target = FitSide { basis: &target, surface: target_surface.as_ref() };
-    Ok(fit((a.subrows(0, k), b.subrows(0, k)), source, target, settings, task)?.map)
+    let (a, b) = (a.subrows(0, k), b.subrows(0, k));
+    let source = FitSide { surface: source_surface.as_ref(), ..FitSide::new(&source, a) };
+    let target = FitSide { surface: target_surface.as_ref(), ..FitSide::new(&target, b) };
+    Ok(fit(source, target, settings, task)?.map)
 }
 
 /// The oriented surface, where the fit weighs orientation.

@@ -20,12 +20,12 @@ use crate::{Error, Result};
 /// Directions of the descriptors whose squares sum to less than this share of all are left out of
 /// the operators: less than rounding makes of the normal equations.
 const NEGLIGIBLE: f64 = 1e-14;
-/// Added to the normal equations, which may still be singular at μ → 0.
-const FLOOR: f64 = 1e-9;
+/// δ, added to the normal equations, which may still be singular at μ → 0.
+const SHIFT: f64 = 1e-9;
 
 /// The quadratic energy of a functional map (k_target × k_source).
 pub(super) struct Energy {
-    /// What C is multiplied by from the right: A Aᵀ + Σ S Sᵀ + floor (k_source × k_source).
+    /// What C is multiplied by from the right: A Aᵀ + Σ S Sᵀ + δ I (k_source × k_source).
     pub on_source: Mat<f64>,
     /// What C is multiplied by from the left: Σ Tᵀ T (k_target × k_target).
     on_target: Mat<f64>,
@@ -48,7 +48,7 @@ impl Energy {
         let (k_target, k_source) = (b.nrows(), a.nrows());
         let mut on_source = a * a.transpose();
         let unit = (0..k_source).map(|i| on_source[(i, i)]).sum::<f64>() / k_source as f64;
-        (0..k_source).for_each(|i| on_source[(i, i)] += FLOOR);
+        (0..k_source).for_each(|i| on_source[(i, i)] += SHIFT);
         Self {
             on_source,
             on_target: Mat::zeros(k_target, k_target),
@@ -64,15 +64,12 @@ impl Energy {
     /// Adds μ ‖C Λ_source − Λ_target C‖², scaled by the mean of A Aᵀ's diagonal.
     pub fn commute_with_laplacian(&mut self, mu: f64, source: &Eigenbasis, target: &Eigenbasis) {
         let (k_target, k_source) = (self.mask.nrows(), self.mask.ncols());
-        let gap = |i: usize, j: usize| (target.values[i] - source.values[j]).powi(2);
-        let mut largest = f64::MIN_POSITIVE;
-        for j in 0..k_source {
-            for i in 0..k_target {
-                largest = largest.max(gap(i, j));
-            }
-        }
+        // (λ_target,i − λ_source,j)²
+        let gaps =
+            Mat::from_fn(k_target, k_source, |i, j| (target.values[i] - source.values[j]).powi(2));
+        let largest = gaps.norm_max().max(f64::MIN_POSITIVE);
         let scale = mu * self.unit / largest;
-        self.mask = Mat::from_fn(k_target, k_source, |i, j| scale * gap(i, j));
+        self.mask = Mat::from_fn(k_target, k_source, |i, j| scale * gaps[(i, j)]);
     }
 
     /// Adds ν Σ ‖C S_d − T_d C‖² for the multiplications by descriptors.
@@ -103,7 +100,7 @@ impl Energy {
         t
     }
 
-    /// Half the gradient's linear part: C ↦ C (A Aᵀ + floor) + mask ∘ C + Σ (R Sᵀ − Tᵀ R) with
+    /// Half the gradient's linear part: C ↦ C (A Aᵀ + δ I) + mask ∘ C + Σ (R Sᵀ − Tᵀ R) with
     /// R = C S − T C, where Tᵀ C S = T C Sᵀ.
     pub fn apply(&self, c: &Mat<f64>) -> Mat<f64> {
         let (k_target, k_source, r) = (c.nrows(), c.ncols(), self.of_target.len());
@@ -132,12 +129,9 @@ impl Energy {
     pub fn row_blocks(&self, rotation: MatRef<'_, f64>) -> Vec<Mat<f64>> {
         let (k_target, k_source, r) = (rotation.nrows(), self.mask.ncols(), self.of_target.len());
         let v = rotation;
-        let diagonal = |matrix: MatRef<'_, f64>| -> Vec<f64> {
-            let turned = matrix * v;
-            (0..k_target).map(|i| v.col(i).transpose() * turned.col(i)).collect()
-        };
-        let on_target = diagonal(self.on_target.as_ref());
-        let of_target: Vec<Vec<f64>> = self.of_target.iter().map(diagonal).collect();
+        let on_target = rotated_diagonal(self.on_target.as_ref(), v);
+        let of_target: Vec<Vec<f64>> =
+            self.of_target.iter().map(|matrix| rotated_diagonal(matrix, v)).collect();
         let squares = Mat::from_fn(k_target, k_target, |i, j| v[(j, i)].powi(2));
         let mask = squares * &self.mask; // (k_target × k_source)
         let weights = Mat::from_fn(r, k_target, |d, i| -2.0 * of_target[d][i]);
@@ -146,38 +140,59 @@ impl Energy {
             self.of_source[(at % k_source, d + r * (at / k_source))]
         });
         let mixed = entries * weights; // (k_source² × k_target)
-        let block = |i: usize| {
+        let blocks = (0..k_target).map(|i| {
             let mut block = self.on_source.clone();
             for (l, mixed) in mixed.col_as_slice(i).chunks_exact(k_source).enumerate() {
                 block.col_as_slice_mut(l).iter_mut().zip(mixed).for_each(|(x, m)| *x += m);
                 block[(l, l)] += on_target[i] + mask[(i, l)];
             }
             block
-        };
-        (0..k_target).map(block).collect()
+        });
+        blocks.collect()
     }
 }
 
-/// Descriptors of both sides (k × p each), mixed alike and cut to the directions that count (r ≤ p).
-pub(super) fn principal(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<(Mat<f64>, Mat<f64>)> {
-    let (k_source, k_target) = (a.nrows(), b.nrows());
-    let mut both = Mat::zeros(k_source + k_target, a.ncols());
-    both.as_mut().subrows_mut(0, k_source).copy_from(a);
-    both.as_mut().subrows_mut(k_source, k_target).copy_from(b);
-    let failed = |_| Error::LinearAlgebra("the singular values of the descriptors of both sides");
-    let svd = both.thin_svd().map_err(failed)?;
-    let squares: Vec<f64> = svd.S().column_vector().iter().map(|s| s * s).collect();
-    let total: f64 = squares.iter().sum();
-    let mut r = squares.len();
-    let mut left_out = 0.0;
-    while r > 0 && left_out + squares[r - 1] <= NEGLIGIBLE * total {
-        left_out += squares[r - 1];
-        r -= 1;
-    }
-    let column = |i: usize, d: usize| svd.U()[(i, d)] * squares[d].sqrt();
-    let on_source = Mat::from_fn(k_source, r, column);
-    Ok((on_source, Mat::from_fn(k_target, r, |i, d| column(k_source + i, d))))
+/// The diagonal of Vᵀ M V.
+fn rotated_diagonal(matrix: MatRef<'_, f64>, v: MatRef<'_, f64>) -> Vec<f64> {
+    let turned = matrix * v;
+    (0..v.ncols()).map(|i| v.col(i).transpose() * turned.col(i)).collect()
 }
+
+/// Descriptors of both sides, mixed alike and cut to the directions that count.
+pub(super) struct Directions {
+    /// Coefficients on the source (k_source × r).
+    pub source: Mat<f64>,
+    /// Coefficients on the target (k_target × r).
+    pub target: Mat<f64>,
+}
+
+impl Directions {
+    /// The principal directions of the descriptors `a` and `b` (k × p each, r ≤ p): U Σ of both
+    /// sides below each other.
+    pub fn principal(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Self> {
+        let (k_source, k_target) = (a.nrows(), b.nrows());
+        let mut both = Mat::zeros(k_source + k_target, a.ncols());
+        both.as_mut().subrows_mut(0, k_source).copy_from(a);
+        both.as_mut().subrows_mut(k_source, k_target).copy_from(b);
+        let svd = both.thin_svd().map_err(|_| FAILED)?;
+        let squares: Vec<f64> = svd.S().column_vector().iter().map(|s| s * s).collect();
+        let total: f64 = squares.iter().sum();
+        let mut r = squares.len();
+        let mut left_out = 0.0;
+        while r > 0 && left_out + squares[r - 1] <= NEGLIGIBLE * total {
+            left_out += squares[r - 1];
+            r -= 1;
+        }
+        let columns =
+            Mat::from_fn(k_source + k_target, r, |i, d| svd.U()[(i, d)] * squares[d].sqrt());
+        Ok(Self {
+            source: columns.subrows(0, k_source).to_owned(),
+            target: columns.subrows(k_source, k_target).to_owned(),
+        })
+    }
+}
+
+const FAILED: Error = Error::LinearAlgebra("the singular values of the descriptors of both sides");
 
 /// Φᵀ M diag(f) Φ for the functions f with these coefficients (k × r).
 pub(super) fn multiplications(coefficients: MatRef<'_, f64>, basis: &Eigenbasis) -> Operators {

@@ -4,7 +4,7 @@
 //! functions commute, and cut to a finite basis they still nearly do: the basis found here behaves
 //! like delta functions at k places.
 
-use faer::{Mat, Side};
+use faer::{Mat, MatRef, Side};
 
 use super::operators::Operators;
 use crate::{Error, Result};
@@ -21,17 +21,12 @@ type Entry = [f64; N_MATRICES];
 /// Orthogonal V (k × k), so that the Vᵀ T_d V are nearly diagonal.
 pub(super) fn nearly_diagonal(operators: &Operators) -> Result<Mat<f64>> {
     let k = operators.k();
-    let spread = |d: usize| {
-        let matrix = operators.of(d);
-        let mean = (0..k).map(|i| matrix[(i, i)]).sum::<f64>() / k as f64;
-        matrix.squared_norm_l2() - k as f64 * mean * mean
-    };
-    let mut order: Vec<(usize, f64)> = (0..operators.len()).map(|d| (d, spread(d))).collect();
+    let mut order: Vec<(usize, f64)> =
+        (0..operators.len()).map(|d| (d, square_off_identity(operators.of(d)))).collect();
     order.sort_by(|a, b| b.1.total_cmp(&a.1)); // stable: ties keep their order
     order.truncate(N_MATRICES);
     let Some(&(largest, _)) = order.first() else { return Ok(Mat::identity(k, k)) };
-    let failed = |_| Error::LinearAlgebra("the eigenvectors of a descriptor's multiplication");
-    let eigen = operators.of(largest).self_adjoint_eigen(Side::Lower).map_err(failed)?;
+    let eigen = operators.of(largest).self_adjoint_eigen(Side::Lower).map_err(|_| FAILED)?;
     let start = eigen.U();
     let turned: Vec<Mat<f64>> =
         order.iter().map(|&(d, _)| start.transpose() * operators.of(d) * start).collect();
@@ -50,6 +45,15 @@ pub(super) fn nearly_diagonal(operators: &Operators) -> Result<Mat<f64>> {
         }
     }
     Ok(Mat::from_fn(k, k, |i, j| rotation.columns[j][i]))
+}
+
+const FAILED: Error = Error::LinearAlgebra("the eigenvectors of a descriptor's multiplication");
+
+/// ‖M − (tr M/k) I‖² = ‖M‖² − (tr M)²/k
+fn square_off_identity(matrix: MatRef<'_, f64>) -> f64 {
+    let k = matrix.nrows();
+    let mean = (0..k).map(|i| matrix[(i, i)]).sum::<f64>() / k as f64;
+    matrix.squared_norm_l2() - k as f64 * mean * mean
 }
 
 struct Rotation {

@@ -6,11 +6,11 @@ mod operators;
 mod orientation;
 mod solve;
 
-use faer::MatRef;
+use faer::{Mat, MatRef};
 use semfm_geom::{Eigenbasis, Task};
 use serde::{Deserialize, Serialize};
 
-use self::energy::{Energy, multiplications, principal};
+use self::energy::{Directions, Energy, multiplications};
 pub use self::orientation::OrientedSurface;
 use self::orientation::turns;
 use crate::functional_map::check_size;
@@ -34,18 +34,21 @@ pub struct FitSettings {
     pub reversing: bool,
 }
 
-/// One shape as a fit sees it; an eigenbasis alone will do where the orientation does not matter.
+/// One shape and what is known of it, as a fit reads them.
 #[derive(Clone, Copy, Debug)]
 pub struct FitSide<'a> {
-    /// Its eigenbasis (n × k).
+    /// Its eigenbasis (n × k_basis).
     pub basis: &'a Eigenbasis,
-    /// The triangles on its n vertices.
+    /// The descriptors as coefficients in the basis (k × p).
+    pub descriptors: MatRef<'a, f64>,
+    /// The triangles on its n vertices; needed where the orientation matters.
     pub surface: Option<&'a OrientedSurface>,
 }
 
-impl<'a> From<&'a Eigenbasis> for FitSide<'a> {
-    fn from(basis: &'a Eigenbasis) -> Self {
-        Self { basis, surface: None }
+impl<'a> FitSide<'a> {
+    /// A shape whose orientation does not matter.
+    pub fn new(basis: &'a Eigenbasis, descriptors: MatRef<'a, f64>) -> Self {
+        Self { basis, descriptors, surface: None }
     }
 }
 
@@ -75,8 +78,8 @@ pub struct FitReport {
     pub iterations: usize,
 }
 
-/// Finds C (k × k) of least ‖C A − B‖² (+ regularisers) for the descriptors A, B (k × p), given as
-/// coefficients in the two bases.
+/// Finds C (k × k) of least ‖C A − B‖² (+ regularisers) for the descriptors A of the source and B of
+/// the target (k × p each).
 ///
 /// Without a regulariser and with fewer descriptors than eigenfunctions the problem has many
 /// solutions; the answer is then the minimum-norm one, B A⁺, which is what the paper's equation
@@ -86,78 +89,21 @@ pub struct FitReport {
 /// # Errors
 /// [`Error::Length`] where A and B differ in shape or a surface is not that of its basis,
 /// [`Error::BasisTooSmall`], [`Error::OutOfRange`] for negative weights, for an orientation without
-/// surfaces and for surfaces wound against each other, [`Error::LinearAlgebra`], cancellation.
-pub fn fit<'a>(
-    (a, b): (MatRef<'_, f64>, MatRef<'_, f64>),
-    source: impl Into<FitSide<'a>>,
-    target: impl Into<FitSide<'a>>,
+/// surfaces and for surfaces wound against each other, [`Error::LinearAlgebra`], [`Error::Geom`] on
+/// cancellation.
+pub fn fit(
+    source: FitSide<'_>,
+    target: FitSide<'_>,
     settings: &FitSettings,
     task: &Task,
 ) -> Result<Fit> {
-    let (on_source, on_target) = (source.into(), target.into());
-    let (source, target) = (on_source.basis, on_target.basis);
     semfm_geom::algebra::keep_sequential();
-    Error::length("descriptors of the target", a.ncols(), b.ncols())?;
-    Error::length("coefficients per descriptor of the target", a.nrows(), b.nrows())?;
-    check_size("the descriptors", a.nrows(), source, target)?;
-    if a.nrows() == 0 {
-        return Error::out_of_range("coefficients per descriptor", "at least 1", 0);
-    }
-    let weights = [settings.laplacian, settings.descriptors, settings.orientation];
-    if !weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite()) {
-        let found = weights.map(|weight| weight.to_string()).join(", ");
-        return Error::out_of_range("fit weights", "finite numbers of at least 0", found);
-    }
-    let surfaces = match (on_source.surface, on_target.surface) {
-        _ if settings.orientation == 0.0 => None,
-        (Some(s), Some(t)) => {
-            orientation::check((source, s), (target, t))?;
-            Some((s, t))
-        }
-        _ => {
-            let expected = "0 where a side has no triangles";
-            return Error::out_of_range("weight of orientation", expected, settings.orientation);
-        }
-    };
-    let failed = |_| Error::LinearAlgebra("the singular values of the descriptors");
-    let bare = weights == [0.0; 3];
-    let (matrix, rank, iterations) = if bare {
-        let singular = a.thin_svd().map_err(failed)?;
-        let values: Vec<f64> = singular.S().column_vector().iter().copied().collect();
-        let (rank, least) = rank(&values);
-        // C = B A⁺ = B V Σ⁺ Uᵀ
-        let mut coefficients = b * singular.V(); // (k × rank)
-        for (j, &s) in values.iter().enumerate() {
-            let scale = if s > least { s.recip() } else { 0.0 };
-            coefficients.col_mut(j).iter_mut().for_each(|x| *x *= scale);
-        }
-        (coefficients * singular.U().transpose(), rank, 0)
-    } else {
-        let (rank, _) = rank(&a.singular_values().map_err(failed)?);
-        let mut energy = Energy::new(a, b);
-        if settings.laplacian > 0.0 {
-            energy.commute_with_laplacian(settings.laplacian, source, target);
-        }
-        let (matrix, iterations) = if weights[1..] == [0.0; 2] {
-            (solve::by_rows(&energy)?, 0)
-        } else {
-            let (a, b) = principal(a, b)?;
-            let (a, b) = (a.as_ref(), b.as_ref());
-            if settings.descriptors > 0.0 {
-                let (s, t) = (multiplications(a, source), multiplications(b, target));
-                energy.commute_with_multiplications(settings.descriptors, s, t);
-            }
-            if let Some((s, t)) = surfaces {
-                let (s, mut t) = (turns(a, source, s), turns(b, target, t));
-                if settings.reversing {
-                    t.scale(-1.0);
-                }
-                energy.commute_with(settings.orientation, s, t);
-            }
-            solve::conjugate_gradients(&energy, task)?
-        };
-        (matrix, rank, iterations)
-    };
+    check(&source, &target, settings)?;
+    let (a, b) = (source.descriptors, target.descriptors);
+    let bare = settings.weights() == [0.0; 3];
+    let solution =
+        if bare { minimum_norm(a, b)? } else { regularised(&source, &target, settings, task)? };
+    let Solution { matrix, rank, iterations } = solution;
     let misfit = (&matrix * a - b).norm_l2() / b.norm_l2().max(f64::MIN_POSITIVE);
     let report = FitReport {
         k: a.nrows(),
@@ -170,10 +116,122 @@ pub fn fit<'a>(
     Ok(Fit { map: FunctionalMap::new(matrix), report })
 }
 
-/// How many singular values count, and what they must exceed for that.
-fn rank(values: &[f64]) -> (usize, f64) {
-    let least = RANK_CUTOFF * values.iter().fold(0.0f64, |m, &s| m.max(s));
-    (values.iter().filter(|&&s| s > least).count(), least)
+impl FitSettings {
+    /// μ, ν and ω.
+    fn weights(&self) -> [f64; 3] {
+        [self.laplacian, self.descriptors, self.orientation]
+    }
+}
+
+/// C before it is wrapped.
+struct Solution {
+    /// C (k_target × k_source).
+    matrix: Mat<f64>,
+    /// Rank of the source's descriptors.
+    rank: usize,
+    /// Conjugate-gradient iterations.
+    iterations: usize,
+}
+
+fn check(source: &FitSide<'_>, target: &FitSide<'_>, settings: &FitSettings) -> Result<()> {
+    let (a, b) = (source.descriptors, target.descriptors);
+    Error::length("descriptors of the target", a.ncols(), b.ncols())?;
+    Error::length("coefficients per descriptor of the target", a.nrows(), b.nrows())?;
+    check_size("the descriptors", a.nrows(), source.basis, target.basis)?;
+    if a.nrows() == 0 {
+        return Error::out_of_range("coefficients per descriptor", "at least 1", 0);
+    }
+    let weights = settings.weights();
+    if !weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite()) {
+        let found = weights.map(|weight| weight.to_string()).join(", ");
+        return Error::out_of_range("fit weights", "finite numbers of at least 0", found);
+    }
+    Ok(())
+}
+
+/// C = B A⁺ = B V Σ⁺ Uᵀ with A = U Σ Vᵀ
+fn minimum_norm(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Solution> {
+    let singular = a.thin_svd().map_err(|_| SINGULAR_VALUES)?;
+    let values: Vec<f64> = singular.S().column_vector().iter().copied().collect();
+    let least = least_counted(&values);
+    let mut coefficients = b * singular.V(); // (k × rank)
+    for (j, &s) in values.iter().enumerate() {
+        let scale = if s > least { s.recip() } else { 0.0 };
+        coefficients.col_mut(j).iter_mut().for_each(|x| *x *= scale);
+    }
+    let matrix = coefficients * singular.U().transpose();
+    Ok(Solution { matrix, rank: count_above(&values, least), iterations: 0 })
+}
+
+/// C of least energy, with every regulariser that has a weight.
+fn regularised(
+    source: &FitSide<'_>,
+    target: &FitSide<'_>,
+    settings: &FitSettings,
+    task: &Task,
+) -> Result<Solution> {
+    let surfaces = surfaces(source, target, settings)?;
+    let (a, b) = (source.descriptors, target.descriptors);
+    let values = a.singular_values().map_err(|_| SINGULAR_VALUES)?;
+    let rank = count_above(&values, least_counted(&values));
+    let mut energy = Energy::new(a, b);
+    if settings.laplacian > 0.0 {
+        energy.commute_with_laplacian(settings.laplacian, source.basis, target.basis);
+    }
+    if settings.descriptors == 0.0 && settings.orientation == 0.0 {
+        return Ok(Solution { matrix: solve::by_rows(&energy)?, rank, iterations: 0 });
+    }
+    let directions = Directions::principal(a, b)?;
+    let (a, b) = (directions.source.as_ref(), directions.target.as_ref());
+    if settings.descriptors > 0.0 {
+        let (s, t) = (multiplications(a, source.basis), multiplications(b, target.basis));
+        energy.commute_with_multiplications(settings.descriptors, s, t);
+    }
+    if let Some(Surfaces { source: on_source, target: on_target }) = surfaces {
+        let (s, mut t) = (turns(a, source.basis, on_source), turns(b, target.basis, on_target));
+        if settings.reversing {
+            t.scale(-1.0);
+        }
+        energy.commute_with(settings.orientation, s, t);
+    }
+    let solved = solve::conjugate_gradients(&energy, task)?;
+    Ok(Solution { matrix: solved.matrix, rank, iterations: solved.iterations })
+}
+
+/// The triangles of both sides, where the orientation matters.
+struct Surfaces<'a> {
+    source: &'a OrientedSurface,
+    target: &'a OrientedSurface,
+}
+
+fn surfaces<'a>(
+    source: &FitSide<'a>,
+    target: &FitSide<'a>,
+    settings: &FitSettings,
+) -> Result<Option<Surfaces<'a>>> {
+    if settings.orientation == 0.0 {
+        return Ok(None);
+    }
+    let (Some(on_source), Some(on_target)) = (source.surface, target.surface) else {
+        let expected = "0 where a side has no triangles";
+        return Error::out_of_range("weight of orientation", expected, settings.orientation);
+    };
+    let (n_source, n_target) = (source.basis.n_vertices(), target.basis.n_vertices());
+    Error::length("vertices of the source's surface", n_source, on_source.n_vertices())?;
+    Error::length("vertices of the target's surface", n_target, on_target.n_vertices())?;
+    on_source.check_winding(on_target)?;
+    Ok(Some(Surfaces { source: on_source, target: on_target }))
+}
+
+const SINGULAR_VALUES: Error = Error::LinearAlgebra("the singular values of the descriptors");
+
+/// What a singular value must exceed to count.
+fn least_counted(values: &[f64]) -> f64 {
+    RANK_CUTOFF * values.iter().fold(0.0f64, |m, &s| m.max(s))
+}
+
+fn count_above(values: &[f64], least: f64) -> usize {
+    values.iter().filter(|&&s| s > least).count()
 }
 
 #[cfg(test)]
@@ -181,8 +239,8 @@ mod tests {
     use super::*;
     use crate::fit::solve::CG_LIMIT;
     use crate::test_objects::{blob, shape};
+    use faer::Side;
     use faer::linalg::solvers::Solve;
-    use faer::{Mat, Side};
     use semfm_geom::Shape;
 
     /// Two descriptors on the same shape, of rank 2 in a basis of 12.
@@ -198,9 +256,13 @@ mod tests {
         let basis = shape.basis();
         let a = two_bumps(basis);
         let b = Mat::from_fn(12, 2, |i, j| a[(i, 1 - j)]);
-        let fit =
-            fit((a.as_ref(), b.as_ref()), basis, basis, &FitSettings::default(), &Task::default())
-                .unwrap();
+        let fit = fit(
+            FitSide::new(basis, a.as_ref()),
+            FitSide::new(basis, b.as_ref()),
+            &FitSettings::default(),
+            &Task::default(),
+        )
+        .unwrap();
         assert!(fit.report.minimum_norm && fit.report.rank == 2 && fit.report.residual < 1e-12);
         // Minimum norm: C lives on the span of A, so C (I − A A⁺) = 0.
         let c = fit.map.matrix();
@@ -219,8 +281,8 @@ mod tests {
             FitSettings { laplacian: 1e-3, ..Default::default() },
             FitSettings { laplacian: 1e-3, descriptors: 1e-2, ..Default::default() },
         ] {
-            let fit =
-                fit((a.as_ref(), a.as_ref()), basis, basis, &settings, &Task::default()).unwrap();
+            let side = FitSide::new(basis, a.as_ref());
+            let fit = fit(side, side, &settings, &Task::default()).unwrap();
             let c = fit.map.matrix();
             let off: f64 = (0..12).map(|i| (c[(i, i)] - 1.0).abs()).fold(0.0, f64::max);
             assert!(off < 0.05, "diagonal is off by {off} with {settings:?}");
@@ -234,8 +296,10 @@ mod tests {
 
     /// Entry by entry from the definitions, descriptor by descriptor, solved as one dense system.
     fn dense_reference(
-        (a, b): (&Mat<f64>, &Mat<f64>),
-        (source, target): (&Shape, &Shape),
+        a: &Mat<f64>,
+        b: &Mat<f64>,
+        source: &Shape,
+        target: &Shape,
         settings: &FitSettings,
     ) -> Mat<f64> {
         let (k, p) = (a.nrows(), a.ncols());
@@ -304,8 +368,6 @@ mod tests {
     fn the_map_is_that_of_the_dense_normal_equations() {
         let (source, target) = (shape(&blob(1.0), 9), shape(&blob(1.6), 9));
         let surfaces = [&source, &target].map(|s| OrientedSurface::new(s.mesh()).unwrap());
-        let sides = [(&source, &surfaces[0]), (&target, &surfaces[1])]
-            .map(|(shape, surface)| FitSide { basis: shape.basis(), surface: Some(surface) });
         for p in [2, 5, 30] {
             let a = Mat::from_fn(9, p, |i, j| ((3 * i + 7 * j * j) as f64).sin());
             let b = Mat::from_fn(9, p, |i, j| a[(i, j)] * 1.1 + 0.1 * ((i * j) as f64).cos());
@@ -313,9 +375,16 @@ mod tests {
                 [(0.0, 0.0, false), (0.3, 0.0, false), (0.0, 0.2, false), (0.5, 0.2, true)]
             {
                 let settings = FitSettings { laplacian: 0.01, descriptors, orientation, reversing };
-                let pair = (a.as_ref(), b.as_ref());
-                let found = fit(pair, sides[0], sides[1], &settings, &Task::default()).unwrap();
-                let expected = dense_reference((&a, &b), (&source, &target), &settings);
+                let on_source = FitSide {
+                    surface: Some(&surfaces[0]),
+                    ..FitSide::new(source.basis(), a.as_ref())
+                };
+                let on_target = FitSide {
+                    surface: Some(&surfaces[1]),
+                    ..FitSide::new(target.basis(), b.as_ref())
+                };
+                let found = fit(on_source, on_target, &settings, &Task::default()).unwrap();
+                let expected = dense_reference(&a, &b, &source, &target, &settings);
                 let apart = (found.map.matrix() - &expected).norm_l2() / expected.norm_l2();
                 assert!(apart < 1e-8, "{p} descriptors, {settings:?}: {apart:.1e}");
                 let direct = descriptors == 0.0 && orientation == 0.0;
@@ -329,21 +398,21 @@ mod tests {
         let shape = shape(&blob(1.0), 12);
         let basis = shape.basis();
         let a = two_bumps(basis);
-        let pair = (a.as_ref(), a.as_ref());
+        let side = FitSide::new(basis, a.as_ref());
         for settings in [
             FitSettings { orientation: 1.0, ..Default::default() },
             FitSettings { descriptors: -1.0, ..Default::default() },
             FitSettings { laplacian: f64::NAN, ..Default::default() },
         ] {
-            let error = fit(pair, basis, basis, &settings, &Task::default()).unwrap_err();
+            let error = fit(side, side, &settings, &Task::default()).unwrap_err();
             assert!(matches!(error, Error::OutOfRange { .. }), "{error}");
         }
         // A surface of other vertices is not that of the basis.
         let ball = semfm_geom::zoo::icosphere(1);
         let surface = OrientedSurface::new(&ball).unwrap();
-        let side = FitSide { basis, surface: Some(&surface) };
+        let side = FitSide { surface: Some(&surface), ..side };
         let settings = FitSettings { orientation: 1.0, ..Default::default() };
-        let error = fit(pair, side, side, &settings, &Task::default()).unwrap_err();
+        let error = fit(side, side, &settings, &Task::default()).unwrap_err();
         assert!(matches!(error, Error::Length { .. }), "{error}");
     }
 }

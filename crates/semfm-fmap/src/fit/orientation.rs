@@ -44,15 +44,11 @@ impl OrientedSurface {
     /// # Errors
     /// [`Error::NotOriented`] where more of them disagree.
     pub fn new(mesh: &Mesh) -> Result<Self> {
-        // Both ends, the lower first, and the direction in the last bit; and the triangle.
-        let side = |[from, to]: [u32; 2]| {
-            (u64::from(from.min(to)) << 33) | (u64::from(from.max(to)) << 1) | u64::from(from < to)
-        };
         let mut sides: Vec<(u64, u32)> = Vec::with_capacity(3 * mesh.n_faces());
         for (face, &[a, b, c]) in (0..).zip(mesh.faces()) {
             // A triangle that names a vertex twice covers nothing.
             if a != b && b != c && c != a {
-                sides.extend([[a, b], [b, c], [c, a]].map(|ends| (side(ends), face)));
+                sides.extend([[a, b], [b, c], [c, a]].map(|ends| (directed_edge(ends), face)));
             }
         }
         sides.sort_unstable();
@@ -105,6 +101,23 @@ impl OrientedSurface {
     pub fn outward(&self) -> Option<bool> {
         self.outward
     }
+
+    /// Refuses a target's surface that is wound the other way.
+    pub(super) fn check_winding(&self, target: &Self) -> Result<()> {
+        match (self.outward, target.outward) {
+            (Some(source), Some(target)) if source != target => Error::out_of_range(
+                "winding of the two surfaces",
+                "counterclockwise as seen from outside, or clockwise on both",
+                "one of each",
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// An edge as a number: both ends, the lower first, and the direction in the last bit.
+fn directed_edge([from, to]: [u32; 2]) -> u64 {
+    (u64::from(from.min(to)) << 33) | (u64::from(from.max(to)) << 1) | u64::from(from < to)
 }
 
 /// ∫ f dφⱼ ∧ dφᵢ (k × k) for the functions f with these coefficients (k × r).
@@ -137,23 +150,6 @@ pub(super) fn turns(
             }
         }
     })
-}
-
-/// Refuses surfaces that do not belong to the bases or are wound against each other.
-pub(super) fn check(
-    (source, on_source): (&Eigenbasis, &OrientedSurface),
-    (target, on_target): (&Eigenbasis, &OrientedSurface),
-) -> Result<()> {
-    Error::length("vertices of the source's surface", source.n_vertices(), on_source.n_vertices())?;
-    Error::length("vertices of the target's surface", target.n_vertices(), on_target.n_vertices())?;
-    match (on_source.outward, on_target.outward) {
-        (Some(source), Some(target)) if source != target => Error::out_of_range(
-            "winding of the two surfaces",
-            "counterclockwise as seen from outside, or clockwise on both",
-            "one of each",
-        ),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]
@@ -252,8 +248,7 @@ mod tests {
         let faces = ball.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
         let inside_out = Mesh::new(ball.vertices().to_vec(), faces).unwrap();
         let (out, inside) = (OrientedSurface::new(&ball), OrientedSurface::new(&inside_out));
-        let basis = shape(&ball, 4).basis().clone();
-        assert!(check((&basis, &out.unwrap()), (&basis, &inside.unwrap())).is_err());
+        assert!(out.unwrap().check_winding(&inside.unwrap()).is_err());
     }
 
     /// A lumpy closed surface that the mirror y → −y maps onto itself, and where each vertex goes.
@@ -278,16 +273,30 @@ mod tests {
         (Mesh::new(vertices.clone(), ball.faces().to_vec()).unwrap(), partner)
     }
 
-    fn by_signatures(source: FitSide<'_>, target: FitSide<'_>, reversing: bool) -> FunctionalMap {
-        let describe = |basis: &Eigenbasis| {
-            let signature = wks(basis, &WksSettings::default()).unwrap();
-            normalised_coefficients(basis, signature.as_ref(), basis.k())
-        };
-        let (a, b) = (describe(source.basis), describe(target.basis));
+    fn signature(basis: &Eigenbasis) -> Mat<f64> {
+        let signature = wks(basis, &WksSettings::default()).unwrap();
+        normalised_coefficients(basis, signature.as_ref(), basis.k())
+    }
+
+    /// A shape with its triangles; its descriptors come later.
+    struct Oriented<'a> {
+        basis: &'a Eigenbasis,
+        surface: &'a OrientedSurface,
+    }
+
+    fn by_signatures(
+        source: &Oriented<'_>,
+        target: &Oriented<'_>,
+        reversing: bool,
+    ) -> FunctionalMap {
+        let (a, b) = (signature(source.basis), signature(target.basis));
         let settings =
             FitSettings { laplacian: 0.01, descriptors: 1.0, orientation: 1.0, reversing };
-        let pair = (a.as_ref(), b.as_ref());
-        fit(pair, source, target, &settings, &Task::default()).unwrap().map
+        let source =
+            FitSide { surface: Some(source.surface), ..FitSide::new(source.basis, a.as_ref()) };
+        let target =
+            FitSide { surface: Some(target.surface), ..FitSide::new(target.basis, b.as_ref()) };
+        fit(source, target, &settings, &Task::default()).unwrap().map
     }
 
     /// ‖C − truth‖ / ‖truth‖ for the map of a vertex permutation.
@@ -307,11 +316,11 @@ mod tests {
         let (mesh, partner) = mirror_symmetric();
         let shape = shape(&mesh, 20);
         let surface = OrientedSurface::new(shape.mesh()).unwrap();
-        let side = FitSide { basis: shape.basis(), surface: Some(&surface) };
+        let side = Oriented { basis: shape.basis(), surface: &surface };
         let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
         let off = |map: &FunctionalMap, to: &[u32]| off(map, to, shape.basis(), shape.basis());
-        let kept = by_signatures(side, side, false);
-        let swapped = by_signatures(side, side, true);
+        let kept = by_signatures(&side, &side, false);
+        let swapped = by_signatures(&side, &side, true);
         let found = [
             off(&kept, &identity),
             off(&kept, &partner),
@@ -332,12 +341,12 @@ mod tests {
         .unwrap();
         let (one, other) = (shape(&mesh, 15), shape(&mirrored, 15));
         let surfaces = [&one, &other].map(|shape| OrientedSurface::new(shape.mesh()).unwrap());
-        let source = FitSide { basis: one.basis(), surface: Some(&surfaces[0]) };
-        let target = FitSide { basis: other.basis(), surface: Some(&surfaces[1]) };
+        let source = Oriented { basis: one.basis(), surface: &surfaces[0] };
+        let target = Oriented { basis: other.basis(), surface: &surfaces[1] };
         let identity: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
         let off = |map: &FunctionalMap| off(map, &identity, source.basis, target.basis);
         let (swapped, kept) =
-            (by_signatures(source, target, true), by_signatures(source, target, false));
+            (by_signatures(&source, &target, true), by_signatures(&source, &target, false));
         let found = [off(&swapped), off(&kept)];
         assert!(found[0] < 0.1 && found[1] > 0.4, "{found:?}");
     }

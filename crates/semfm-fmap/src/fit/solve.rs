@@ -12,10 +12,12 @@ use crate::{Error, Result};
 const CG_TOLERANCE: f64 = 1e-10;
 pub(super) const CG_LIMIT: usize = 2000;
 /// Added to the blocks of the preconditioner, relative to their mean diagonal: they are positive
-/// definite, but some only by the floor of the normal equations.
+/// definite, but some only by what is added to the normal equations.
 const BLOCK_SHIFT: f64 = 1e-11;
 
-/// Row i of C solves (A Aᵀ + diag(maskᵢ) + floor) cᵢ = (B Aᵀ)ᵢ, without operators.
+const FAILED: Error = Error::LinearAlgebra("the preconditioner of the fit");
+
+/// Row i of C solves (A Aᵀ + diag(maskᵢ) + δ I) cᵢ = (B Aᵀ)ᵢ, without operators.
 pub(super) fn by_rows(energy: &Energy) -> Result<Mat<f64>> {
     let (k_target, k_source) = (energy.right.nrows(), energy.right.ncols());
     let mut matrix = Mat::zeros(k_target, k_source);
@@ -30,11 +32,16 @@ pub(super) fn by_rows(energy: &Energy) -> Result<Mat<f64>> {
     Ok(matrix)
 }
 
-/// Minimises the whole energy; also the number of iterations.
-pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f64>, usize)> {
-    let inner = |x: &Mat<f64>, y: &Mat<f64>| -> f64 {
-        (0..x.ncols()).map(|j| x.col(j).transpose() * y.col(j)).sum()
-    };
+/// Where the conjugate gradients stopped.
+pub(super) struct Solved {
+    /// C (k_target × k_source).
+    pub matrix: Mat<f64>,
+    /// Iterations until then.
+    pub iterations: usize,
+}
+
+/// Minimises the whole energy.
+pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<Solved> {
     let preconditioner = RowBlocks::new(energy)?;
     let mut c = preconditioner.apply(energy.right.as_ref());
     let mut residual = &energy.right - energy.apply(&c);
@@ -43,7 +50,7 @@ pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f
     let mut size = inner(&residual, &direction);
     for iteration in 0..CG_LIMIT {
         if residual.norm_l2() <= goal {
-            return Ok((c, iteration));
+            return Ok(Solved { matrix: c, iterations: iteration });
         }
         if !size.is_finite() {
             return Err(Error::LinearAlgebra("the regularised fit"));
@@ -58,7 +65,12 @@ pub(super) fn conjugate_gradients(energy: &Energy, task: &Task) -> Result<(Mat<f
         direction = conditioned + &direction * faer::Scale(next / size);
         size = next;
     }
-    Ok((c, CG_LIMIT))
+    Ok(Solved { matrix: c, iterations: CG_LIMIT })
+}
+
+/// Σ xᵢⱼ yᵢⱼ
+fn inner(x: &Mat<f64>, y: &Mat<f64>) -> f64 {
+    (0..x.ncols()).map(|j| x.col(j).transpose() * y.col(j)).sum()
 }
 
 /// The inverse of the energy's blocks that belong to single rows of Vᵀ C, where V nearly
@@ -74,12 +86,11 @@ struct RowBlocks {
 impl RowBlocks {
     fn new(energy: &Energy) -> Result<Self> {
         let rotation = nearly_diagonal(&energy.multipliers)?;
-        let failed = |_| Error::LinearAlgebra("the preconditioner of the fit");
         let blocks = energy.row_blocks(rotation.as_ref()).into_iter().map(|mut block| {
             let k = block.nrows();
             let mean = (0..k).map(|j| block[(j, j)]).sum::<f64>() / k as f64;
             (0..k).for_each(|j| block[(j, j)] += BLOCK_SHIFT * mean);
-            Ok(block.llt(Side::Lower).map_err(failed)?.inverse())
+            Ok(block.llt(Side::Lower).map_err(|_| FAILED)?.inverse())
         });
         Ok(Self { inverses: blocks.collect::<Result<_>>()?, rotation })
     }

@@ -1,10 +1,15 @@
-//! Every method on small pairs: what is carried where, and what is refused.
+//! Every method on small pairs: what is transferred where, and what is refused.
+
+use std::sync::Arc;
+
+use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings};
 
 use super::*;
 use crate::metrics;
+use crate::propagation::PropagationSettings;
+use crate::settings::Rule;
 use crate::test_objects::{blob, cloud, shape};
-use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings};
 
 fn object(shape: Shape, cloud: SemanticCloud) -> PreparedObject {
     PreparedObject::new(Arc::new(shape), Arc::new(cloud), &Task::default()).unwrap()
@@ -24,7 +29,7 @@ fn tip(object: &PreparedObject, stretch: f64) -> Region {
 }
 
 #[test]
-fn every_method_with_meaning_carries_the_tip_to_the_tip() {
+fn every_method_with_features_transfers_the_tip_to_the_tip() {
     let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let (region, truth) = (tip(&source, 1.0), tip(&target, 1.5));
     for (method, least) in [
@@ -41,11 +46,11 @@ fn every_method_with_meaning_carries_the_tip_to_the_tip() {
         assert!(iou >= least, "{method} reaches IoU {iou:.2} only");
         assert_eq!(answer.point_map.n_target(), target.shape().original().n_vertices());
         assert_eq!(answer.other_rule.is_some(), method == Method::Semfm);
-        assert_eq!(answer.report.map.orthogonality.is_some(), method.has_map());
+        assert_eq!(answer.report.map.orthogonality.is_some(), method.info().has_map);
         assert_eq!(answer.report.anchors.len(), 2);
         let json = serde_json::to_value(&answer.report).unwrap();
         assert_eq!(json["settings"]["method"], method.name());
-        assert!(json["stages_ms"]["transport"].as_f64().unwrap() > 0.0);
+        assert!(json["stages_ms"]["features"].as_f64().unwrap() > 0.0);
         assert!(json["anchors"][0]["cosine"].as_f64().unwrap() <= 1.0 + 1e-9);
         if method == Method::Fused {
             assert_eq!(answer.verdict, Verdict::Accept, "agreement {}", answer.confidence);
@@ -79,7 +84,7 @@ fn the_image_rule_hits_fewer_vertices_of_the_same_place() {
 }
 
 #[test]
-fn one_matching_carries_many_regions_and_says_the_same_as_the_short_call() {
+fn one_matching_transfers_many_regions_and_says_the_same_as_the_short_call() {
     let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
     let (task, settings) = (Task::default(), TransferSettings::default());
     let matching = Matching::new(&source, &target, &settings, &task).unwrap();
@@ -157,10 +162,39 @@ fn bad_input_is_named() {
 }
 
 #[test]
-fn thresholds_are_bent_onto_one_half() {
-    let bent = at_threshold(&[0.0, 0.2, 0.4, 0.7, 1.0, 1.3, -0.1], 0.4);
-    for (x, expected) in bent.iter().zip([0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 0.0]) {
-        assert!((x - expected).abs() < 1e-12, "{x} for {expected}");
+fn a_second_opinion_is_computed_where_it_is_needed_or_asked_for() {
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
+    let (region, task) = (tip(&source, 1.0), Task::default());
+    for method in Method::ALL {
+        let settings = TransferSettings::of(method);
+        let matching = Matching::new(&source, &target, &settings, &task).unwrap();
+        let alone = matching.transfer(&region).unwrap();
+        let info = method.info();
+        assert_eq!(alone.report.agreement.is_some(), info.has_map, "{method}");
+        assert_eq!(alone.report.transport.is_some(), method != Method::Nearest, "{method}");
+        let anchored = matches!(method, Method::Semfm | Method::Anchored);
+        assert_eq!(!alone.report.anchors.is_empty(), anchored, "{method}");
+        if info.has_map {
+            continue;
+        }
+        assert_eq!(alone.confidence, alone.report.evidence.probability());
+        let asked = TransferSettings { second_opinion: true, ..settings };
+        let both = transfer(&source, &target, &region, &asked, &task).unwrap();
+        assert_eq!(both.region, alone.region, "{method}: the answer is the same");
+        let agreement = both.report.agreement.unwrap();
+        assert_eq!(both.confidence, probability_by_agreement(agreement));
+        assert!(both.report.stages_ms.iter().any(|(stage, _)| stage == "zoomout"));
+        assert!(!alone.report.stages_ms.iter().any(|(stage, _)| stage == "zoomout"));
     }
-    assert!(at_threshold(&[0.4f64.next_down()], 0.4)[0] < Region::COUNTS);
+}
+
+#[test]
+fn anchors_are_listed_once_they_are_asked_for() {
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
+    let (region, task) = (tip(&source, 1.0), Task::default());
+    let matching = Matching::new(&source, &target, &TransferSettings::default(), &task).unwrap();
+    assert!(matching.transfer(&region).unwrap().report.anchors.is_empty());
+    let anchors = matching.anchors(&task).unwrap().pairs.clone();
+    let listed = matching.transfer(&region).unwrap().report.anchors;
+    assert_eq!(listed.iter().map(|listed| listed.anchor).collect::<Vec<_>>(), anchors);
 }

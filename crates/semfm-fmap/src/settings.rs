@@ -1,4 +1,4 @@
-//! The methods' names and constants.
+//! What can be set about a transfer.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,99 +8,13 @@ use serde::{Deserialize, Serialize};
 use crate::clusters::ClusterSettings;
 use crate::descriptors::DescriptorNorm;
 use crate::fit::FitSettings;
+use crate::method::Method;
 use crate::propagation::PropagationSettings;
 use crate::transport::TransportSettings;
 use crate::zoomout::ZoomOutSettings;
 use crate::{Error, Result};
 
-/// Which of the six methods carries the region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Transport, then bidirectional feature-augmented ZoomOut (our successor of the paper's).
-    #[default]
-    Fused,
-    /// The published method, to the letter.
-    Semfm,
-    /// Its anchors, then feature-augmented ZoomOut.
-    Anchored,
-    /// Transport alone.
-    Sinkhorn,
-    /// Nearest points in feature space.
-    Nearest,
-    /// Wave kernel signatures: geometry alone.
-    Wks,
-}
-
-impl Method {
-    /// All methods, best first.
-    pub const ALL: [Self; 6] =
-        [Self::Fused, Self::Semfm, Self::Anchored, Self::Sinkhorn, Self::Nearest, Self::Wks];
-
-    /// The name used by files and commands.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fused => "fused",
-            Self::Semfm => "semfm",
-            Self::Anchored => "anchored",
-            Self::Sinkhorn => "sinkhorn",
-            Self::Nearest => "nearest",
-            Self::Wks => "wks",
-        }
-    }
-
-    /// Whether a functional map stands behind the answer: the others know no image rule.
-    pub fn has_map(self) -> bool {
-        !matches!(self, Self::Sinkhorn | Self::Nearest)
-    }
-
-    /// The vote from which a vertex counts. Once it is spread, .4 to .45 are the same for `fused`
-    /// on real pairs; .5 costs .01, and .02 on the hardest of the simulated ones.
-    pub(super) fn threshold(self) -> f64 {
-        if self == Self::Fused { 0.42 } else { 0.5 }
-    }
-
-    /// How the vote is spread along the target's features; the paper's method and the baselines
-    /// know nothing of it.
-    pub(super) fn propagation(self) -> PropagationSettings {
-        let settings = PropagationSettings::default();
-        if self == Self::Fused { settings } else { PropagationSettings { weight: 0.0, ..settings } }
-    }
-
-    /// Heat time (area 1) of the implicit step that smooths the vote of a map. On the truth itself
-    /// it costs IoU 0 to .09; .003 on 60 eigenfunctions cost up to .3 on the handle of a kettle.
-    pub(super) fn diffusion(self) -> f64 {
-        if matches!(self, Self::Fused | Self::Anchored) { 0.001 } else { 0.0 }
-    }
-
-    fn zoomout(self) -> ZoomOutSettings {
-        let (k_start, k_final, feature_weight) = match self {
-            Self::Anchored => (20, 50, 0.5),
-            Self::Semfm | Self::Wks => (20, 50, 0.0),
-            // The optimum is flat: k 20 to 50 and w .5 to 1 are within .02.
-            Self::Fused | Self::Sinkhorn | Self::Nearest => (10, 30, 1.0),
-        };
-        ZoomOutSettings { k_start, k_final, step: 5, feature_weight }
-    }
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Method {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let names = Self::ALL.map(Self::name).join(", ");
-        let found = Self::ALL.into_iter().find(|method| method.name() == text);
-        found.map_or_else(|| Error::out_of_range("method", names, text), Ok)
-    }
-}
-
-/// How a region travels through a map.
+/// How a map transfers a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
@@ -154,7 +68,7 @@ impl FromStr for Rule {
 pub struct TransferSettings {
     /// The method.
     pub method: Method,
-    /// The rule by which a map carries the region.
+    /// The rule by which a map transfers the region.
     pub rule: Rule,
     /// Alternatives returned at most.
     pub n_hypotheses: usize,
@@ -174,7 +88,7 @@ pub struct TransferSettings {
     pub feature_dims: usize,
     /// Transport between the clouds.
     pub transport: TransportSettings,
-    /// Neighbours asked by `nearest`.
+    /// Nearest points whose mean is the vote of `nearest`.
     pub neighbours: usize,
     /// Heat time that smooths the vote of a map, 0 for none.
     pub diffusion: f64,
@@ -182,12 +96,23 @@ pub struct TransferSettings {
     pub propagation: PropagationSettings,
     /// The vote from which a vertex counts, inside (0, 1).
     pub threshold: f64,
+    /// Whether a second opinion is computed, in another way than the method's: by transport beside a
+    /// method with a map, by the map of `fused` beside one without. `semfm`, `anchored` and `wks`
+    /// need it, for their confidence is the agreement with it; `fused` has its transport at hand;
+    /// beside `nearest` and `sinkhorn` it costs a whole `fused`, and is left out where it is not
+    /// asked for.
+    pub second_opinion: bool,
 }
 
 impl TransferSettings {
     /// The constants of a method.
     pub fn of(method: Method) -> Self {
-        let literal = method == Method::Semfm;
+        (method.info().settings)(Self::common(method))
+    }
+
+    /// What methods have in common: no smoothing, a threshold of one half, the constants of the paper
+    /// where it gives any.
+    fn common(method: Method) -> Self {
         Self {
             method,
             rule: Rule::default(),
@@ -195,26 +120,20 @@ impl TransferSettings {
             clusters: ClusterSettings::default(),
             n_anchors: 2,
             heat_time: 0.005,
-            descriptor_norm: if literal {
-                DescriptorNorm::Vertices
-            } else {
-                DescriptorNorm::Surface
-            },
-            fit: FitSettings {
-                laplacian: if method == Method::Wks { 0.01 } else { 0.0 },
-                ..FitSettings::default()
-            },
-            zoomout: method.zoomout(),
+            descriptor_norm: DescriptorNorm::Surface,
+            fit: FitSettings::default(),
+            zoomout: ZoomOutSettings { k_start: 10, k_final: 30, step: 5, feature_weight: 1.0 },
             feature_dims: 32,
             transport: TransportSettings::default(),
             neighbours: 15,
-            diffusion: method.diffusion(),
-            propagation: method.propagation(),
-            threshold: method.threshold(),
+            diffusion: 0.0,
+            propagation: PropagationSettings { weight: 0.0, ..PropagationSettings::default() },
+            threshold: 0.5,
+            second_opinion: true,
         }
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if !(self.threshold > 0.0 && self.threshold < 1.0) {
             return Error::out_of_range("threshold", "a number between 0 and 1", self.threshold);
         }
@@ -244,7 +163,13 @@ impl TransferSettings {
             let expected = format!("0 ({} does not fit descriptors of the surface)", self.method);
             return Error::out_of_range("fit.orientation", expected, self.fit.orientation);
         }
-        if self.rule == Rule::Image && !self.method.has_map() {
+        let info = self.method.info();
+        if info.needs_second_opinion() && !self.second_opinion {
+            let expected =
+                format!("true (the confidence of {} is the agreement with it)", self.method);
+            return Error::out_of_range("second_opinion", expected, false);
+        }
+        if self.rule == Rule::Image && !info.has_map {
             let expected = format!("preimage ({} makes no map that has an image)", self.method);
             return Error::out_of_range("rule", expected, self.rule);
         }
@@ -252,7 +177,7 @@ impl TransferSettings {
     }
 
     /// The same with map sizes that bases of `available` pairs can serve.
-    pub(super) fn clipped(&self, available: usize) -> Self {
+    pub(crate) fn clipped(&self, available: usize) -> Self {
         let k_final = self.zoomout.k_final.min(available);
         let zoomout =
             ZoomOutSettings { k_final, k_start: self.zoomout.k_start.min(k_final), ..self.zoomout };
@@ -261,7 +186,7 @@ impl TransferSettings {
 
     /// `fused` with this transfer's features and transport: the second opinion beside a method
     /// without a map.
-    pub(super) fn as_fused(&self, available: usize) -> Self {
+    pub(crate) fn as_fused(&self, available: usize) -> Self {
         let settings = Self::of(Method::Fused).clipped(available);
         Self { feature_dims: self.feature_dims, transport: self.transport, ..settings }
     }
@@ -278,16 +203,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_back_and_strangers_refused() {
-        for method in Method::ALL {
-            assert_eq!(method.name().parse::<Method>().unwrap(), method);
-            assert_eq!(serde_json::to_string(&method).unwrap(), format!("\"{method}\""));
-        }
+    fn rules_are_read_back_and_are_each_others_other() {
         for rule in [Rule::Preimage, Rule::Image] {
             assert_eq!(rule.name().parse::<Rule>().unwrap(), rule);
+            assert_eq!(rule.other().other(), rule);
         }
-        let error = "magic".parse::<Method>().unwrap_err().to_string();
-        assert!(error.contains("fused, semfm") && error.contains("magic"), "{error}");
+        assert!("inverse".parse::<Rule>().is_err());
     }
 
     #[test]
@@ -297,5 +218,15 @@ mod tests {
         assert_eq!(serde_json::from_str::<TransferSettings>(&text).unwrap(), settings);
         let clipped = settings.clipped(4).zoomout;
         assert_eq!((clipped.k_start, clipped.k_final), (4, 4));
+    }
+
+    #[test]
+    fn a_confidence_by_agreement_needs_the_second_opinion() {
+        for method in Method::ALL {
+            let settings =
+                TransferSettings { second_opinion: false, ..TransferSettings::of(method) };
+            let needed = matches!(method, Method::Semfm | Method::Anchored | Method::Wks);
+            assert_eq!(settings.check().is_err(), needed, "{method}");
+        }
     }
 }

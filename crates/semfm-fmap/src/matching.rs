@@ -1,0 +1,283 @@
+//! A matched pair, and the short call that transfers one region.
+
+use semfm_geom::{Shape, Task};
+
+use crate::confidence::{Answer, Evidence, probability_by_agreement};
+use crate::hypotheses::{Hypothesis, hypotheses, is_connected};
+use crate::method::Method;
+use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
+use crate::metrics::overlap;
+use crate::report::{
+    MapQuality, OtherRule, TransferReport, TransportReport, anchor_reports, area_share,
+};
+use crate::settings::TransferSettings;
+use crate::stages::Stages;
+use crate::transfer::Transfer;
+use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result, Verdict};
+
+/// Transfers `region`, which lies on the source's original vertices, to the target: a [`Matching`]
+/// for one region, whose report lists the anchors whatever the method.
+///
+/// # Errors
+/// [`Error::EmptyRegion`], [`Error::Length`] where the region is not one of the source's mesh or
+/// the features differ in dimension, [`Error::OutOfRange`] for impossible settings,
+/// [`Error::LinearAlgebra`], [`Error::NotOriented`] for `wks` with an orientation, [`Error::Geom`] on
+/// cancellation. A region that lands nowhere is no error but a refusal.
+pub fn transfer(
+    source: &PreparedObject,
+    target: &PreparedObject,
+    region: &Region,
+    settings: &TransferSettings,
+    task: &Task,
+) -> Result<Transfer> {
+    check_region(region, source.shape().original().n_vertices())?;
+    let mut matching = Matching::new(source, target, settings, task)?;
+    matching.stages.time("anchors", || matching.pair.select_anchors(task).map(drop))?;
+    matching.transfer(region)
+}
+
+/// A matched pair: computed once, it transfers any number of regions.
+pub struct Matching {
+    pair: Pair,
+    settings: TransferSettings,
+    matched: Matched,
+    /// The second opinion beside a method without a map: the map of `fused`.
+    second_map: Option<SecondMap>,
+    stages: Stages,
+}
+
+/// A map of `fused` beside another method, and the settings that it was made with.
+struct SecondMap {
+    settings: TransferSettings,
+    matched: Matched,
+}
+
+/// One region on the way: where it lies on the source and what the method says of the target.
+struct Voted {
+    /// Whether each working vertex of the source (n_source) is inside.
+    inside: Vec<bool>,
+    /// The method's votes on the target's working vertices (n_target), threshold at
+    /// [`Region::COUNTS`].
+    votes: Vec<f64>,
+}
+
+impl Matching {
+    /// Matches two prepared objects by the method and constants of `settings`. Map sizes are clipped
+    /// to what both bases hold, and the report says so.
+    ///
+    /// # Errors
+    /// As [`transfer`], those of the region aside.
+    pub fn new(
+        source: &PreparedObject,
+        target: &PreparedObject,
+        settings: &TransferSettings,
+        task: &Task,
+    ) -> Result<Self> {
+        semfm_geom::algebra::keep_sequential();
+        settings.check()?;
+        let available = source.shape().basis().k().min(target.shape().basis().k());
+        let settings = settings.clipped(available);
+        let info = settings.method.info();
+        let mut stages = Stages::default();
+        task.check()?;
+        let pair = Pair::new(source, target, &settings, &mut stages)?;
+        let matched = (info.matched)(&pair, &settings, &mut stages, task)?;
+        let mut second_map = None;
+        if settings.second_opinion && info.has_map {
+            pair.couple(&mut stages, task)?;
+        } else if settings.second_opinion {
+            let settings = settings.as_fused(available);
+            let matched = (Method::Fused.info().matched)(&pair, &settings, &mut stages, task)?;
+            second_map = Some(SecondMap { settings, matched });
+        }
+        Ok(Self { pair, settings, matched, second_map, stages })
+    }
+
+    /// The demonstrated object.
+    pub fn source(&self) -> &PreparedObject {
+        &self.pair.source
+    }
+
+    /// The object that regions are transferred to.
+    pub fn target(&self) -> &PreparedObject {
+        &self.pair.target
+    }
+
+    /// The semantic anchors of the pair, selected when first asked for: the methods `semfm` and
+    /// `anchored` ask. Reports list them from then on.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for no clusters, [`Error::Geom`] where the eigensolver fails or on
+    /// cancellation.
+    pub fn anchors(&self, task: &Task) -> Result<&Anchors> {
+        Ok(&self.pair.select_anchors(task)?.anchors)
+    }
+
+    /// The functional map between the working shapes, where the method makes one.
+    pub fn functional_map(&self) -> Option<&FunctionalMap> {
+        self.matched.map.as_ref()
+    }
+
+    /// The point map between the working meshes.
+    pub fn working_point_map(&self) -> &PointMap {
+        &self.matched.point_map
+    }
+
+    /// Transfers one region, which lies on the source's original vertices.
+    ///
+    /// # Errors
+    /// [`Error::EmptyRegion`], [`Error::Length`] where it is not one of the source's mesh.
+    pub fn transfer(&self, region: &Region) -> Result<Transfer> {
+        check_region(region, self.source().shape().original().n_vertices())?;
+        let mut stages = self.stages.clone();
+        let mut transfer = stages.time("vote", || self.answer(region))?;
+        stages.time("report", || self.complete(&mut transfer.report));
+        transfer.report.stages_ms = stages;
+        Ok(transfer)
+    }
+
+    /// The answer, with a report that lacks what does not depend on the region.
+    fn answer(&self, region: &Region) -> Result<Transfer> {
+        let (source, target) = (self.source().shape(), self.target().shape());
+        let areas = &target.basis().mass;
+        let voted = self.vote(region)?;
+        let second = self.second_opinion(&voted.inside)?;
+        let answer = mask(&voted.votes);
+        let agreement = second.as_ref().map(|second| overlap(&answer, &mask(second), areas));
+        let other = self.other_rule(&voted.inside)?;
+        let other_iou = other.as_ref().map(|other| overlap(&answer, &mask(other), areas));
+        let region = onto_original(target, &voted.votes)?;
+        let evidence = self.evidence(&voted, &answer);
+        let confidence = match (self.settings.method.info().confidence, agreement) {
+            _ if region.is_empty() => 0.0,
+            (ConfidenceRule::Agreement, Some(agreement)) => probability_by_agreement(agreement),
+            _ => evidence.probability(),
+        };
+        Ok(Transfer {
+            region,
+            confidence,
+            verdict: Verdict::of(confidence),
+            hypotheses: self.hypotheses(&voted, second.as_deref())?,
+            point_map: self.matched.point_map.onto_originals(source, target),
+            other_rule: other.map(|votes| onto_original(target, &votes)).transpose()?,
+            report: TransferReport {
+                settings: self.settings.clone(),
+                stages_ms: Stages::default(),
+                agreement,
+                evidence,
+                source_area_share: area_share(&voted.inside, &source.basis().mass),
+                target_area_share: area_share(&answer, areas),
+                anchors: Vec::new(),
+                fit: self.matched.fit.clone(),
+                map: MapQuality::default(),
+                transport: self.pair.plan().map(TransportReport::of),
+                other_rule: other_iou
+                    .map(|iou| OtherRule { rule: self.settings.rule.other(), iou }),
+            },
+        })
+    }
+
+    /// What a report says of the pair.
+    fn complete(&self, report: &mut TransferReport) {
+        let (pair, matched) = (&self.pair, &self.matched);
+        if let Some(clustered) = pair.clustered() {
+            report.anchors = anchor_reports(pair, clustered, &matched.point_map);
+        }
+        report.map = MapQuality::of(pair, matched);
+    }
+
+    fn vote(&self, region: &Region) -> Result<Voted> {
+        let inside = self.source().region_on_working(&region.mask());
+        let votes = self.settings.method.info().votes;
+        let votes = votes(&self.pair, &self.settings, &self.matched, &inside)?;
+        Ok(Voted { votes: at_threshold(&votes, self.settings.threshold), inside })
+    }
+
+    /// The votes of the second opinion: of the map of `fused` beside a method without a map, else of
+    /// the transport.
+    fn second_opinion(&self, inside: &[bool]) -> Result<Option<Vec<f64>>> {
+        if let Some(SecondMap { settings, matched }) = &self.second_map {
+            let votes = (Method::Fused.info().votes)(&self.pair, settings, matched, inside)?;
+            return Ok(Some(at_threshold(&votes, settings.threshold)));
+        }
+        let plan = self.pair.plan().filter(|_| self.settings.second_opinion);
+        Ok(plan.map(|plan| {
+            let on_target = plan.vote(&on_points(self.source(), inside));
+            let threshold = TransferSettings::of(Method::Sinkhorn).threshold;
+            at_threshold(&self.target().onto_vertices(&on_target), threshold)
+        }))
+    }
+
+    /// Where the mean of both opinions, or the only one, says that the region may belong.
+    fn hypotheses(&self, voted: &Voted, second: Option<&[f64]>) -> Result<Vec<Hypothesis>> {
+        let (source, target) = (self.source().shape(), self.target().shape());
+        let votes = match second {
+            Some(second) => {
+                voted.votes.iter().zip(second).map(|(a, b)| (a + b) / 2.0).collect::<Vec<f64>>()
+            }
+            None => voted.votes.clone(),
+        };
+        let connected = is_connected(source.mesh(), &voted.inside, &source.basis().mass);
+        let (areas, count) = (&target.basis().mass, self.settings.n_hypotheses);
+        let found = hypotheses(target.mesh(), &votes, areas, connected, count).into_iter();
+        found
+            .map(|found| {
+                let region = onto_original(target, &found.weights)?;
+                Ok(Hypothesis { region, probability: found.probability })
+            })
+            .collect()
+    }
+
+    /// What the answer says about itself.
+    fn evidence(&self, voted: &Voted, answer: &[bool]) -> Evidence {
+        let (source, target) = (self.source(), self.target());
+        let region = at_vertices(source.vertex_of_point(), &voted.inside);
+        let answer = at_vertices(target.vertex_of_point(), answer);
+        let on_target: Vec<f64> = answer.iter().map(|&b| f64::from(u8::from(b))).collect();
+        let back = match self.pair.plan() {
+            Some(plan) => plan.vote_back(&on_target),
+            None => self.pair.nearest_target_points().vote(&on_target),
+        };
+        let answer = Answer {
+            votes: &voted.votes,
+            areas: &target.shape().basis().mass,
+            region: &region,
+            answer: &answer,
+            back: &mask(&back),
+            source_masses: source.masses(),
+            target_masses: target.masses(),
+        };
+        Evidence::of(&answer, &self.pair.joint)
+    }
+
+    /// The votes under the rule that was not asked for, where both maps are at hand (`semfm`).
+    fn other_rule(&self, inside: &[bool]) -> Result<Option<Vec<f64>>> {
+        if self.settings.method != Method::Semfm {
+            return Ok(None);
+        }
+        let settings =
+            TransferSettings { rule: self.settings.rule.other(), ..self.settings.clone() };
+        let votes = by_map(&self.pair, &settings, &self.matched, inside)?;
+        Ok(Some(at_threshold(&votes, settings.threshold)))
+    }
+}
+
+/// Whether the vertex of each cloud point is inside.
+fn at_vertices(vertex_of_point: &[u32], inside: &[bool]) -> Vec<bool> {
+    vertex_of_point.iter().map(|&v| inside[v as usize]).collect()
+}
+
+/// Weights on the working vertices as a region of the original mesh. A mix of weights inside [0, 1]
+/// leaves it by a rounding error at most.
+fn onto_original(shape: &Shape, weights: &[f64]) -> Result<Region> {
+    let weights = shape.onto_original(weights);
+    Region::from_weights(weights.into_iter().map(|w| w.clamp(0.0, 1.0)).collect())
+}
+
+fn check_region(region: &Region, n_vertices: usize) -> Result<()> {
+    Error::length("vertices of the region's mesh", n_vertices, region.n_vertices())?;
+    if region.is_empty() { Err(Error::EmptyRegion { n_vertices }) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests;
