@@ -8,7 +8,7 @@ use semfm::aligned::read_aligned;
 use semfm::geom::io::{read_points, write_mesh};
 use semfm::geom::math::{DAffine3, DMat3, DQuat, DVec3};
 use semfm::geom::{Intrinsics, Pinhole};
-use semfm::views::{Paint, RenderSettings, render};
+use semfm::views::{RenderSettings, SurfaceColor, render};
 use semfm::{Mesh, Task};
 use semfm_synth::{Category, ObjectSettings, make_object};
 use semfm_tests::shell::{Answer, run, shared};
@@ -66,7 +66,8 @@ impl Scene {
         )
         .unwrap();
         let settings = RenderSettings::default();
-        let view = render(&metric, &Paint::GREY, &[camera], &settings, &Task::default()).unwrap();
+        let view =
+            render(&metric, &SurfaceColor::GREY, &[camera], &settings, &Task::default()).unwrap();
         let (mut depth, mut mask) = (Vec::new(), Vec::new());
         for (pixel, &z) in view[0].depth.iter().enumerate() {
             let pole = (120..128).contains(&(pixel as u32 % SIZE.0));

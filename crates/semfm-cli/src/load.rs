@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Result, bail};
 use semfm::Mesh;
 use semfm::geom::io::{Appearance, MeshFile, read_mesh};
-use semfm::views::Paint;
+use semfm::views::SurfaceColor;
 use semfm::views::mcap::EmbeddingsFile;
 
 /// A mesh with its colours; `texture` is put on it where one is given.
@@ -74,16 +74,16 @@ pub fn features(path: &Path, mesh: &Mesh) -> Result<Vec<f32>> {
 pub fn with_paint<T>(
     mesh: &Mesh,
     appearance: Option<&Appearance>,
-    work: impl FnOnce(&Paint<'_>) -> T,
+    work: impl FnOnce(&SurfaceColor<'_>) -> T,
 ) -> T {
     match appearance {
-        None => work(&Paint::default()),
+        None => work(&SurfaceColor::default()),
         Some(appearance) => {
             let color = |face: usize, weights: [f64; 3]| {
                 let [r, g, b, _] = appearance.color_at(face, mesh.faces()[face], weights);
                 [r, g, b].map(|c| f32::from(c) / 255.0)
             };
-            work(&Paint::Surface(&color))
+            work(&SurfaceColor::Surface(&color))
         }
     }
 }

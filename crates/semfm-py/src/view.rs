@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use semfm::views::{self, Paint, RenderSettings, RigSettings};
+use semfm::views::{self, RenderSettings, RigSettings, SurfaceColor};
 
 use crate::arrays::{self, Axis};
 use crate::camera::{self, Camera, rows_and_columns};
@@ -180,12 +180,13 @@ pub fn render(
             Some(cameras) => cameras,
             None => views::rig(&held, &RigSettings::default())?,
         };
-        let draw = |paint: &Paint<'_>| views::render(&held, paint, &cameras, &settings, task);
+        let draw =
+            |paint: &SurfaceColor<'_>| views::render(&held, paint, &cameras, &settings, task);
         Ok(match &paint {
-            Colors::Grey => draw(&Paint::default()),
-            Colors::Normals => draw(&Paint::Normals),
-            Colors::Vertices(colors) => draw(&Paint::Vertices(colors)),
-            Colors::File(file) => draw(&Paint::Surface(&|face, weights| {
+            Colors::Grey => draw(&SurfaceColor::default()),
+            Colors::Normals => draw(&SurfaceColor::Normals),
+            Colors::Vertices(colors) => draw(&SurfaceColor::Vertices(colors)),
+            Colors::File(file) => draw(&SurfaceColor::Surface(&|face, weights| {
                 let [r, g, b, _] = file.appearance.color_at(face, held.faces()[face], weights);
                 [r, g, b].map(|c| f32::from(c) / 255.0)
             })),

@@ -10,7 +10,7 @@ use semfm_geom::math::DVec3;
 use semfm_geom::{Task, principal_axes};
 use semfm_synth::{Category, ObjectSettings, SynthObject, make_object};
 use semfm_views::rig::camera_towards;
-use semfm_views::{Paint, RenderSettings, RigSettings, render};
+use semfm_views::{RenderSettings, RigSettings, SurfaceColor, render};
 
 const KINDS: usize = 6;
 const SIDE: u32 = 200;
@@ -62,7 +62,7 @@ fn picture(
     let longest = principal_axes(&object.mesh)?.row(2);
     let seen_from = longest.cross(DVec3::Z).normalize() + 0.3 * longest + 0.7 * DVec3::Z;
     let camera = camera_towards(&object.mesh, seen_from, DVec3::Z, &rig)?;
-    let paint = Paint::Vertices(&colours);
+    let paint = SurfaceColor::Vertices(&colours);
     let views =
         render(&object.mesh, &paint, &[camera], &RenderSettings::default(), &Task::default())?;
     let pixels = views.into_iter().next().map(|view| view.rgb).ok_or("no view")?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use semfm_geom::Task;
 use semfm_geom::io::{write_atomically, write_mesh};
 use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
-use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
+use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
 
 use crate::{Level, Result, SynthObject, embed};
 
@@ -28,7 +28,7 @@ pub struct ObjectFiles {
 pub fn render_views(object: &SynthObject, task: &Task) -> Result<Vec<View>> {
     let cameras = rig(&object.mesh, &RigSettings::default())?;
     let settings = RenderSettings::default();
-    Ok(render(&object.mesh, &Paint::default(), &cameras, &settings, task)?)
+    Ok(render(&object.mesh, &SurfaceColor::default(), &cameras, &settings, task)?)
 }
 
 /// Writes `NAME.obj`, `NAME.json` and `NAME.emb.mcap` into `folder`, which must exist.

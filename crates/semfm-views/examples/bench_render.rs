@@ -15,8 +15,8 @@ use std::time::Instant;
 
 use semfm_geom::{Mesh, Pinhole, Task};
 use semfm_views::{
-    EmbeddedView, LiftSettings, Paint, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings,
-    View, lift, render, rig,
+    EmbeddedView, LiftSettings, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings,
+    SurfaceColor, View, lift, render, rig,
 };
 use serde_json::{Value, json};
 
@@ -33,7 +33,7 @@ fn main() -> Result<(), Failure> {
         match who.as_str() {
             "cpu" => bench.draw("cpu", &|cameras| {
                 let (settings, task) = (RenderSettings::default(), Task::default());
-                render(&mesh, &Paint::GREY, cameras, &settings, &task)
+                render(&mesh, &SurfaceColor::GREY, cameras, &settings, &task)
             })?,
             "driver" => bench_driver(&mut bench)?,
             "lift" => bench_lift(&bench)?,
@@ -201,7 +201,7 @@ fn bench_driver(bench: &mut Bench<'_>) -> Result<(), Failure> {
     bench.times.push(json!({ "who": "driver", "adapter": gpu.name(), "open_ms": opened }));
     let mesh = bench.mesh;
     bench.draw("driver", &|cameras| {
-        gpu.render(mesh, &Paint::GREY, cameras, &RenderSettings::default(), &Task::default())
+        gpu.render(mesh, &SurfaceColor::GREY, cameras, &RenderSettings::default(), &Task::default())
     })
 }
 
@@ -213,7 +213,7 @@ fn bench_driver(_: &mut Bench<'_>) -> Result<(), Failure> {
 fn bench_lift(bench: &Bench<'_>) -> Result<(), Failure> {
     let (mesh, task) = (bench.mesh, Task::default());
     let cameras = rig(mesh, &RigSettings::default())?;
-    let views = render(mesh, &Paint::GREY, &cameras, &RenderSettings::default(), &task)?;
+    let views = render(mesh, &SurfaceColor::GREY, &cameras, &RenderSettings::default(), &task)?;
     let embedded: Vec<EmbeddedView> = views.iter().map(noise_tokens).collect();
     for (name, settings) in
         [("pull", LiftSettings::default()), ("unproject", LiftSettings::paper())]

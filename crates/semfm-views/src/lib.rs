@@ -22,7 +22,7 @@ pub use error::{Error, Fault, Result};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuRenderer;
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
-pub use render::{Paint, RenderSettings, render};
+pub use render::{RenderSettings, SurfaceColor, render};
 pub use renderer::{Renderer, RendererChoice};
 pub use rig::{RigSettings, rig};
 pub use view::View;

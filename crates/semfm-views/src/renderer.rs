@@ -1,4 +1,4 @@
-//! Who draws: the graphics driver where there is one, else the CPU.
+//! Rendering by the graphics driver where there is one, else on the CPU.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use semfm_geom::{Mesh, Pinhole, Task};
 
 #[cfg(feature = "gpu")]
 use crate::GpuRenderer;
-use crate::{Error, Paint, RenderSettings, Result, View, render};
+use crate::{Error, RenderSettings, Result, SurfaceColor, View, render};
 
 /// Which renderer is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,11 +52,12 @@ impl FromStr for RendererChoice {
 pub struct Renderer {
     #[cfg(feature = "gpu")]
     gpu: Option<GpuRenderer>,
-    /// Whether the CPU takes over what the driver refuses, and why it did the last time.
+    /// Whether the CPU takes over what the driver refuses.
     #[cfg(feature = "gpu")]
-    yielding: bool,
+    falls_back: bool,
+    /// Why the CPU took over the last time.
     #[cfg(feature = "gpu")]
-    yielded: Mutex<Option<String>>,
+    refusal: Mutex<Option<String>>,
     note: Option<String>,
 }
 
@@ -67,17 +68,23 @@ impl Renderer {
             #[cfg(feature = "gpu")]
             gpu: None,
             #[cfg(feature = "gpu")]
-            yielding: true,
+            falls_back: true,
             #[cfg(feature = "gpu")]
-            yielded: Mutex::default(),
+            refusal: Mutex::default(),
             note: None,
         }
     }
 
-    /// The renderer on a driver; where it is `yielding`, the CPU takes over what the driver refuses.
+    /// The renderer on a driver; where it `falls_back`, the CPU takes over what the driver refuses.
     #[cfg(feature = "gpu")]
-    pub(crate) fn by(gpu: GpuRenderer, yielding: bool) -> Self {
-        Self { gpu: Some(gpu), yielding, ..Self::cpu() }
+    pub(crate) fn with_gpu(gpu: GpuRenderer, falls_back: bool) -> Self {
+        Self { gpu: Some(gpu), falls_back, ..Self::cpu() }
+    }
+
+    /// The renderer on the CPU with a note why it is not a driver.
+    #[cfg(feature = "gpu")]
+    fn cpu_because(note: String) -> Self {
+        Self { note: Some(note), ..Self::cpu() }
     }
 
     /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: they
@@ -88,18 +95,19 @@ impl Renderer {
     /// feature `gpu`), [`Error::Gpu`] where it does not open.
     #[cfg(feature = "gpu")]
     pub fn open(choice: RendererChoice) -> Result<Self> {
-        let fall_back = |note: String| Ok(Self { note: Some(note), ..Self::cpu() });
         match (choice, if choice == RendererChoice::Cpu { None } else { Some(GpuRenderer::new()) })
         {
             (_, None) => Ok(Self::cpu()),
             (RendererChoice::Auto, Some(Err(error))) => {
-                fall_back(format!("views are drawn on the CPU: {error}"))
+                Ok(Self::cpu_because(format!("views are drawn on the CPU: {error}")))
             }
-            (RendererChoice::Auto, Some(Ok(gpu))) if gpu.is_software() => fall_back(format!(
-                "views are drawn on the CPU, exactly; {} would draw them there, too",
-                gpu.name()
-            )),
-            (_, Some(gpu)) => Ok(Self::by(gpu?, choice == RendererChoice::Auto)),
+            (RendererChoice::Auto, Some(Ok(gpu))) if gpu.is_software() => {
+                Ok(Self::cpu_because(format!(
+                    "views are drawn on the CPU, exactly; {} would draw them there, too",
+                    gpu.name()
+                )))
+            }
+            (_, Some(gpu)) => Ok(Self::with_gpu(gpu?, choice == RendererChoice::Auto)),
         }
     }
 
@@ -121,27 +129,27 @@ impl Renderer {
     /// refused, after drawing; nothing where all is as wanted.
     pub fn note(&self) -> Option<String> {
         #[cfg(feature = "gpu")]
-        if let Some(reason) = self.yielded() {
+        if let Some(reason) = self.refusal() {
             return Some(reason);
         }
         self.note.clone()
     }
 
     #[cfg(feature = "gpu")]
-    fn yielded(&self) -> Option<String> {
-        self.yielded.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    fn refusal(&self) -> Option<String> {
+        self.refusal.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Who draws, for reports; once something was drawn, who drew it.
+    /// The renderer's name, for reports: the driver's, or `CPU`; after drawing, of what drew.
     pub fn name(&self) -> String {
         #[cfg(feature = "gpu")]
-        if let Some(gpu) = self.gpu.as_ref().filter(|_| self.yielded().is_none()) {
+        if let Some(gpu) = self.gpu.as_ref().filter(|_| self.refusal().is_none()) {
             return gpu.name();
         }
         "CPU".to_owned()
     }
 
-    /// One picture per camera: [`render`](crate::render()) by whoever draws. A driver's pictures
+    /// One picture per camera: [`render`](crate::render()) on the driver or the CPU. A driver's pictures
     /// differ from the CPU's in single pixels at edges.
     ///
     /// # Errors
@@ -150,27 +158,27 @@ impl Renderer {
     pub fn render(
         &self,
         mesh: &Mesh,
-        paint: &Paint<'_>,
+        color: &SurfaceColor<'_>,
         cameras: &[Pinhole],
         settings: &RenderSettings,
         task: &Task,
     ) -> Result<Vec<View>> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = &self.gpu {
-            let answer = gpu.render(mesh, paint, cameras, settings, task);
+            let answer = gpu.render(mesh, color, cameras, settings, task);
             let refusal = match &answer {
                 Err(
                     error @ (Error::Gpu { .. } | Error::BeyondGpu { .. } | Error::NoGpu { .. }),
-                ) if self.yielding => Some(format!("views are drawn on the CPU: {error}")),
+                ) if self.falls_back => Some(format!("views are drawn on the CPU: {error}")),
                 _ => None,
             };
-            let yields = refusal.is_some();
-            *self.yielded.lock().unwrap_or_else(PoisonError::into_inner) = refusal;
-            if !yields {
+            let is_refused = refusal.is_some();
+            *self.refusal.lock().unwrap_or_else(PoisonError::into_inner) = refusal;
+            if !is_refused {
                 return answer;
             }
         }
-        render(mesh, paint, cameras, settings, task)
+        render(mesh, color, cameras, settings, task)
     }
 }
 
@@ -179,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn choices_are_read_back_and_strangers_refused() {
+    fn choices_are_read_back_and_other_words_refused() {
         for (choice, name) in RendererChoice::ALL {
             assert_eq!(name.parse::<RendererChoice>().unwrap(), choice);
             assert_eq!(choice.to_string(), name);

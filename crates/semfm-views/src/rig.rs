@@ -16,7 +16,7 @@ const STAND_OFF: f64 = 1.02;
 /// What the encoder is shown matters more than any later choice. The defaults were found on real
 /// meshes with a real encoder; the frame of the file instead of the principal one, a rig of two
 /// rings, and orthographic or unzoomed pictures were all worse.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RigSettings {
     /// Number of views N.
     pub count: usize,

@@ -13,8 +13,8 @@ use std::sync::OnceLock;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
 use semfm_views::{
-    Error, GpuRenderer, Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View, render,
-    rig,
+    Error, GpuRenderer, RenderSettings, Renderer, RendererChoice, RigSettings, SurfaceColor, View,
+    render, rig,
 };
 use shapes::{lumpy_torus, zoo};
 
@@ -41,7 +41,12 @@ fn gpu() -> Option<&'static GpuRenderer> {
     }
 }
 
-fn both(gpu: &GpuRenderer, mesh: &Mesh, paint: &Paint<'_>, cameras: &[Pinhole]) -> [Vec<View>; 2] {
+fn both(
+    gpu: &GpuRenderer,
+    mesh: &Mesh,
+    paint: &SurfaceColor<'_>,
+    cameras: &[Pinhole],
+) -> [Vec<View>; 2] {
     let (settings, task) = (RenderSettings::default(), Task::default());
     let by_gpu = gpu.render(mesh, paint, cameras, &settings, &task).unwrap();
     [by_gpu, render(mesh, paint, cameras, &settings, &task).unwrap()]
@@ -88,7 +93,7 @@ fn the_zoo_looks_the_same() {
     let (mut different, mut n) = (0, 0);
     for (name, mesh) in zoo().into_iter().chain(semfm_geom::zoo::all()) {
         // 100 is not a multiple of 64: rows come back padded.
-        let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 5, 100));
+        let views = both(gpu, &mesh, &SurfaceColor::GREY, &cameras(&mesh, 5, 100));
         let counts = compare(name, &views);
         (different, n) = (different + counts.0, n + counts.1);
     }
@@ -105,9 +110,9 @@ fn every_paint_looks_the_same() {
         mesh.vertices().iter().map(|p| (p.normalize() * 0.5 + 0.5).as_vec3().to_array()).collect();
     let stripes = |face: usize, w: [f64; 3]| [w[0] as f32, (face % 2) as f32, w[2] as f32];
     for (name, paint) in [
-        ("vertices", Paint::Vertices(&places)),
-        ("function", Paint::Surface(&stripes)),
-        ("normals", Paint::Normals),
+        ("vertices", SurfaceColor::Vertices(&places)),
+        ("function", SurfaceColor::Surface(&stripes)),
+        ("normals", SurfaceColor::Normals),
     ] {
         let (different, n) = compare(name, &both(gpu, &mesh, &paint, &shots));
         assert!(different as f64 <= OTHER_TRIANGLE * n as f64, "{name}: {different} of {n}");
@@ -121,7 +126,7 @@ fn views_of_several_sizes_come_back_in_order() {
     let mut mixed = cameras(&mesh, 2, 64);
     mixed.extend(cameras(&mesh, 3, 50));
     mixed.extend(cameras(&mesh, 1, 64));
-    let views = both(gpu, &mesh, &Paint::GREY, &mixed);
+    let views = both(gpu, &mesh, &SurfaceColor::GREY, &mixed);
     let (different, n) = compare("mixed", &views);
     assert!(different as f64 <= 2.0 * OTHER_TRIANGLE * n as f64);
 }
@@ -135,7 +140,7 @@ fn what_is_behind_the_camera_is_not_drawn() {
     let mut pose = inside.camera_from_world();
     pose.translation = DVec3::ZERO;
     let inside = inside.posed(pose).unwrap();
-    let (different, n) = compare("inside", &both(gpu, &mesh, &Paint::GREY, &[inside]));
+    let (different, n) = compare("inside", &both(gpu, &mesh, &SurfaceColor::GREY, &[inside]));
     assert!(different as f64 <= 5.0 * OTHER_TRIANGLE * n as f64, "{different} of {n}");
 }
 
@@ -155,8 +160,8 @@ fn other_settings_look_the_same() {
     looks.push(RenderSettings { occlusion: 1.0, ..Default::default() });
     looks.push(RenderSettings { edges: 0.8, ..Default::default() });
     for settings in looks {
-        let by_gpu = gpu.render(&mesh, &Paint::GREY, &shots, &settings, &task).unwrap();
-        let by_cpu = render(&mesh, &Paint::GREY, &shots, &settings, &task).unwrap();
+        let by_gpu = gpu.render(&mesh, &SurfaceColor::GREY, &shots, &settings, &task).unwrap();
+        let by_cpu = render(&mesh, &SurfaceColor::GREY, &shots, &settings, &task).unwrap();
         assert_eq!(by_gpu[0].rgb[..3], by_cpu[0].rgb[..3], "the background");
         let (different, n) = compare(&settings.to_string(), &[by_gpu, by_cpu]);
         assert!(different as f64 <= 2.0 * OTHER_TRIANGLE * n as f64, "{different} of {n}");
@@ -170,9 +175,10 @@ fn cancelled_work_is_an_error_and_the_next_is_done() {
     let shots = cameras(&mesh, 1, 32);
     let cancelled = Task::default();
     cancelled.cancel();
-    let answer = gpu.render(&mesh, &Paint::GREY, &shots, &RenderSettings::default(), &cancelled);
+    let answer =
+        gpu.render(&mesh, &SurfaceColor::GREY, &shots, &RenderSettings::default(), &cancelled);
     assert!(matches!(answer, Err(Error::Geom(semfm_geom::Error::Cancelled))), "{answer:?}");
-    assert_eq!(both(gpu, &mesh, &Paint::GREY, &shots)[0].len(), 1);
+    assert_eq!(both(gpu, &mesh, &SurfaceColor::GREY, &shots)[0].len(), 1);
 }
 
 #[test]
@@ -180,7 +186,7 @@ fn threads_may_share_a_driver() {
     let Some(gpu) = gpu() else { return };
     let mesh = lumpy_torus(16);
     let shots = cameras(&mesh, 4, 80);
-    let draw = || both(gpu, &mesh, &Paint::GREY, &shots)[0].clone();
+    let draw = || both(gpu, &mesh, &SurfaceColor::GREY, &shots)[0].clone();
     let alone = draw();
     std::thread::scope(|scope| {
         let others: Vec<_> = (0..4).map(|_| scope.spawn(draw)).collect();
@@ -244,7 +250,7 @@ fn real_objects_look_the_same() {
     let (mut different, mut n) = (0, 0);
     for path in &files {
         let mesh = semfm_geom::io::read_mesh(path).unwrap().mesh;
-        let views = both(gpu, &mesh, &Paint::GREY, &cameras(&mesh, 4, 224));
+        let views = both(gpu, &mesh, &SurfaceColor::GREY, &cameras(&mesh, 4, 224));
         let counts = compare(&path.display().to_string(), &views);
         println!("{}: {} of {} pixels", path.display(), counts.0, counts.1);
         (different, n) = (different + counts.0, n + counts.1);

@@ -5,8 +5,8 @@ mod shapes;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
 use semfm_views::{
-    EmbeddedView, LiftRule, LiftSettings, Paint, PatchEmbeddings, PatchGrid, RenderSettings,
-    RigSettings, lift, render, rig,
+    EmbeddedView, LiftRule, LiftSettings, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings,
+    SurfaceColor, lift, render, rig,
 };
 use shapes::{ellipsoid, lumpy_torus, together};
 
@@ -20,7 +20,7 @@ fn encode(
     feature: impl Fn(DVec3) -> [f32; DIM],
 ) -> Vec<EmbeddedView> {
     let settings = RenderSettings { supersampling: 1, ..Default::default() };
-    let views = render(mesh, &Paint::GREY, cameras, &settings, &Task::default()).unwrap();
+    let views = render(mesh, &SurfaceColor::GREY, cameras, &settings, &Task::default()).unwrap();
     let encode_one = |view: &semfm_views::View| {
         let camera = view.camera;
         let (width, height) = (camera.width() as usize, camera.height() as usize);

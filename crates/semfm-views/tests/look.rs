@@ -5,10 +5,10 @@ mod shapes;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_views::render::openness;
-use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
+use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
 use shapes::{ellipsoid, lumpy_torus, together};
 
-fn views(mesh: &Mesh, paint: &Paint<'_>, settings: &RenderSettings) -> Vec<View> {
+fn views(mesh: &Mesh, paint: &SurfaceColor<'_>, settings: &RenderSettings) -> Vec<View> {
     let cameras = rig(mesh, &RigSettings { count: 4, size: 96, ..Default::default() }).unwrap();
     render(mesh, paint, &cameras, settings, &Task::default()).unwrap()
 }
@@ -60,7 +60,7 @@ fn occlusion_darkens_by_its_strength_and_leaves_depth_alone() {
     let ring = lumpy_torus(24);
     let brightness = |strength: f64| {
         let settings = RenderSettings { occlusion: strength, ..Default::default() };
-        let views = views(&ring, &Paint::GREY, &settings);
+        let views = views(&ring, &SurfaceColor::GREY, &settings);
         let sum: u64 = views.iter().flat_map(|view| &view.rgb).map(|&byte| u64::from(byte)).sum();
         (sum, views[0].depth.clone())
     };
@@ -73,9 +73,9 @@ fn occlusion_darkens_by_its_strength_and_leaves_depth_alone() {
 fn edges_are_drawn_where_the_surface_ends_and_nowhere_else() {
     // A smooth ball: its outline is all there is to draw.
     let ball = ellipsoid(32, DVec3::ONE, DVec3::ZERO);
-    let plain = views(&ball, &Paint::GREY, &RenderSettings::default());
+    let plain = views(&ball, &SurfaceColor::GREY, &RenderSettings::default());
     let black = RenderSettings { edges: 1.0, ..Default::default() };
-    let drawn = views(&ball, &Paint::GREY, &black);
+    let drawn = views(&ball, &SurfaceColor::GREY, &black);
     for (plain, drawn) in plain.iter().zip(&drawn) {
         let width = plain.camera.width() as usize;
         let mut n_edges = 0;
@@ -95,7 +95,7 @@ fn edges_are_drawn_where_the_surface_ends_and_nowhere_else() {
 #[test]
 fn directions_as_colours_face_the_viewer() {
     let ball = ellipsoid(32, DVec3::ONE, DVec3::ZERO);
-    for view in views(&ball, &Paint::Normals, &RenderSettings::default()) {
+    for view in views(&ball, &SurfaceColor::Normals, &RenderSettings::default()) {
         let middle = (48 * 96 + 48) * 3;
         // Straight at the viewer in the middle of a ball: no part to the right, none upwards.
         let [right, up, towards] = [0, 1, 2].map(|k| i32::from(view.rgb[middle + k]));
@@ -114,7 +114,7 @@ fn looks_out_of_range_are_named() {
         (RenderSettings { edges: f64::NAN, ..Default::default() }, "edges"),
         (RenderSettings { background: [0.0, 2.0, 0.0], ..Default::default() }, "background"),
     ] {
-        let answer = render(&ball, &Paint::GREY, &cameras, &settings, &Task::default());
+        let answer = render(&ball, &SurfaceColor::GREY, &cameras, &settings, &Task::default());
         let message = answer.unwrap_err().to_string();
         assert!(message.contains(name), "{message}");
     }

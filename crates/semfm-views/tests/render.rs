@@ -4,12 +4,12 @@ mod shapes;
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
-use semfm_views::{Paint, RenderSettings, RigSettings, View, render, rig};
+use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
 use shapes::{ellipsoid, lumpy_torus, together, zoo};
 
 fn shot(mesh: &Mesh, camera: Pinhole) -> View {
     let settings = RenderSettings::default();
-    render(mesh, &Paint::GREY, &[camera], &settings, &Task::default()).unwrap().remove(0)
+    render(mesh, &SurfaceColor::GREY, &[camera], &settings, &Task::default()).unwrap().remove(0)
 }
 
 /// Nearest triangle and its depth on the ray through a pixel's centre (Möller & Trumbore 1997).
@@ -176,9 +176,10 @@ fn paint_reaches_the_pixels() {
         let corners = mesh.corners(face);
         position((0..3).map(|k| weights[k] * corners[k]).sum())
     };
-    let by_vertex = render(&mesh, &Paint::Vertices(&colours), &cameras, &settings, &task).unwrap();
+    let by_vertex =
+        render(&mesh, &SurfaceColor::Vertices(&colours), &cameras, &settings, &task).unwrap();
     let by_surface =
-        render(&mesh, &Paint::Surface(&on_surface), &cameras, &settings, &task).unwrap();
+        render(&mesh, &SurfaceColor::Surface(&on_surface), &cameras, &settings, &task).unwrap();
     for (one, other) in by_vertex.iter().zip(&by_surface) {
         let largest = one.rgb.iter().zip(&other.rgb).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(largest <= 1);
@@ -190,7 +191,7 @@ fn paint_reaches_the_pixels() {
             assert!(error.abs() < 0.03, "{error}");
         }
     }
-    let refused = render(&mesh, &Paint::Vertices(&colours[1..]), &cameras, &settings, &task);
+    let refused = render(&mesh, &SurfaceColor::Vertices(&colours[1..]), &cameras, &settings, &task);
     assert!(refused.unwrap_err().to_string().contains("vertex colours"));
 }
 
@@ -199,7 +200,8 @@ fn every_mesh_of_the_zoo_is_seen() {
     for (name, mesh) in zoo() {
         let cameras = rig(&mesh, &RigSettings { size: 32, ..Default::default() }).unwrap();
         let settings = RenderSettings::default();
-        let views = render(&mesh, &Paint::GREY, &cameras, &settings, &Task::default()).unwrap();
+        let views =
+            render(&mesh, &SurfaceColor::GREY, &cameras, &settings, &Task::default()).unwrap();
         let covered: usize =
             views.iter().map(|view| view.triangles.iter().filter(|&&id| id >= 0).count()).sum();
         assert!(covered > views.len() * 20, "{name}: {covered} pixels");
@@ -219,13 +221,14 @@ fn bands_threads_and_repetition_change_nothing() {
     let mesh = lumpy_torus(16);
     let settings = RenderSettings { supersampling: 3, ..Default::default() };
     let cameras = rig(&mesh, &RigSettings { count: 2, size: 500, ..Default::default() }).unwrap();
-    let draw = || render(&mesh, &Paint::GREY, &cameras, &settings, &Task::default()).unwrap();
+    let draw =
+        || render(&mesh, &SurfaceColor::GREY, &cameras, &settings, &Task::default()).unwrap();
     let views = draw();
     // 500 px · 3² samples take several bands; a window of the same picture takes one.
     let whole = cameras[0];
     let window = Intrinsics { height: 40, cy: whole.cy() - 217.0, ..whole.intrinsics() };
     let window = Pinhole::with_pixel_centres_at_half(window, whole.camera_from_world()).unwrap();
-    let part = render(&mesh, &Paint::GREY, &[window], &settings, &Task::default()).unwrap();
+    let part = render(&mesh, &SurfaceColor::GREY, &[window], &settings, &Task::default()).unwrap();
     let offset = 217 * 500;
     assert_eq!(part[0].triangles, views[0].triangles[offset..][..40 * 500]);
     let differing =
@@ -241,7 +244,9 @@ fn absurd_orders_are_refused() {
     let camera = rig(&mesh, &RigSettings::default()).unwrap()[0];
     let settings = RenderSettings::default();
     let order = |mesh: &Mesh, cameras: &[Pinhole], settings: &RenderSettings| {
-        render(mesh, &Paint::GREY, cameras, settings, &Task::default()).unwrap_err().to_string()
+        render(mesh, &SurfaceColor::GREY, cameras, settings, &Task::default())
+            .unwrap_err()
+            .to_string()
     };
     let sized = |width, height| {
         let intrinsics = Intrinsics { width, height, ..camera.intrinsics() };
@@ -259,5 +264,5 @@ fn absurd_orders_are_refused() {
     assert!(order(&needle, &[camera], &settings).contains("no area"));
     let stopped = Task::default();
     stopped.cancel();
-    assert!(render(&mesh, &Paint::GREY, &[camera], &settings, &stopped).is_err());
+    assert!(render(&mesh, &SurfaceColor::GREY, &[camera], &settings, &stopped).is_err());
 }

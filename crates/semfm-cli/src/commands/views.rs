@@ -6,7 +6,9 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use semfm::geom::io::MeshFile;
 use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
-use semfm::views::{Paint, RenderSettings, Renderer, RendererChoice, RigSettings, View, rig};
+use semfm::views::{
+    RenderSettings, Renderer, RendererChoice, RigSettings, SurfaceColor, View, rig,
+};
 use semfm_show::write_sheet;
 
 use super::Outcome;
@@ -202,7 +204,7 @@ pub fn make_views(
     let shots = rig(&file.mesh, cameras)?;
     let own = Some(&file.appearance).filter(|own| *coloring == Coloring::Own && !own.is_plain());
     let views = load::with_paint(&file.mesh, own, |paint| {
-        let paint = if *coloring == Coloring::Normals { &Paint::Normals } else { paint };
+        let paint = if *coloring == Coloring::Normals { &SurfaceColor::Normals } else { paint };
         renderer.render(&file.mesh, paint, &shots, look, &task)
     })?;
     let colors = match (coloring, own) {

@@ -10,7 +10,7 @@ use std::path::{Component, Path, PathBuf};
 
 use rayon::prelude::*;
 use semfm::geom::Pinhole;
-use semfm::views::{Paint, RenderSettings, render};
+use semfm::views::{RenderSettings, SurfaceColor, render};
 use semfm::{Mesh, Region, Task};
 use semfm_show::colors::{EXTRA, RIGHT, outcome_colors, position_colors, weight_colors_to};
 use semfm_show::html::jpeg_data_uri;
@@ -224,7 +224,7 @@ impl DrawnObject {
         let camera = self.cameras[side as usize];
         let settings = RenderSettings { supersampling: 3, ..RenderSettings::default() };
         let views =
-            render(&self.mesh, &Paint::Vertices(colors), &[camera], &settings, task).ok()?;
+            render(&self.mesh, &SurfaceColor::Vertices(colors), &[camera], &settings, task).ok()?;
         jpeg_data_uri(&views.first()?.rgb, camera.width(), camera.height())
     }
 }

@@ -15,7 +15,7 @@ use semfm::views::mcap::{
     Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
     ScenePoints, Severity,
 };
-use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::views::{RenderSettings, SurfaceColor, View, render};
 use semfm::{Mesh, Region, Task, Verdict};
 
 use crate::Result;
@@ -111,7 +111,8 @@ impl<'a> SceneObject<'a> {
         let marked = weight_colors(figure.weights);
         let cameras = [figure.viewpoints.best];
         let light = RenderSettings::default();
-        let mut views = render(figure.mesh(), &Paint::Vertices(&marked), &cameras, &light, task)?;
+        let mut views =
+            render(figure.mesh(), &SurfaceColor::Vertices(&marked), &cameras, &light, task)?;
         let anchors = &figure.anchors;
         Ok(Self {
             names,

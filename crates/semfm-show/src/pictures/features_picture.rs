@@ -9,7 +9,7 @@ use std::path::Path;
 
 use semfm::Task;
 use semfm::output::ObjectAnchors;
-use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::views::{RenderSettings, SurfaceColor, View, render};
 
 use super::sheet::{Entry, Row, Sheet};
 use super::{ObjectFigure, TransferFigure, Viewpoints};
@@ -49,8 +49,9 @@ fn pictures(figure: &ObjectFigure<'_>, task: &Task) -> Result<Vec<View>> {
     let (mesh, light) = (figure.mesh(), RenderSettings::default());
     let features = figure.onto_vertices(&figure.feature_colors);
     let clusters = figure.onto_vertices(&cluster_colors(&figure.anchors));
-    let mut pictures = render(mesh, &Paint::Vertices(&features), &[best, other], &light, task)?;
-    pictures.extend(render(mesh, &Paint::Vertices(&clusters), &[best], &light, task)?);
+    let mut pictures =
+        render(mesh, &SurfaceColor::Vertices(&features), &[best, other], &light, task)?;
+    pictures.extend(render(mesh, &SurfaceColor::Vertices(&clusters), &[best], &light, task)?);
     Ok(pictures)
 }
 

@@ -10,7 +10,7 @@ use semfm::geom::math::DVec3;
 use semfm::geom::{Mesh, Task};
 use semfm::grasp::Grasp;
 use semfm::robot::Gripper;
-use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::views::{RenderSettings, SurfaceColor, View, render};
 
 use super::sheet::{Entry, PICTURE_SIDE, Row, Sheet};
 use super::upright::upright;
@@ -82,7 +82,7 @@ fn pictures(
     let viewpoints = viewpoints_with_grippers(object, &with_grippers, PICTURE_SIDE, task)?;
     let cameras = [viewpoints.best, viewpoints.other];
     let light = RenderSettings::default();
-    Ok(render(&with_grippers, &Paint::Vertices(&colors), &cameras, &light, task)?)
+    Ok(render(&with_grippers, &SurfaceColor::Vertices(&colors), &cameras, &light, task)?)
 }
 
 /// From where an object with grippers is looked at: `with_grippers` is the object's mesh with the

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use semfm::Task;
-use semfm::views::{Paint, RenderSettings, View, render};
+use semfm::views::{RenderSettings, SurfaceColor, View, render};
 
 use super::sheet::{Entry, Row, Sheet};
 use super::{ObjectFigure, TransferFigure, Viewpoints};
@@ -54,8 +54,9 @@ fn pictures(figure: &ObjectFigure<'_>, task: &Task) -> Result<Vec<View>> {
     let Viewpoints { best, other, .. } = figure.viewpoints;
     let (mesh, light) = (figure.mesh(), RenderSettings::default());
     let weights = weight_colors(figure.weights);
-    let mut pictures = render(mesh, &Paint::Vertices(&weights), &[best, other], &light, task)?;
-    let matches = Paint::Vertices(&figure.match_colors);
+    let mut pictures =
+        render(mesh, &SurfaceColor::Vertices(&weights), &[best, other], &light, task)?;
+    let matches = SurfaceColor::Vertices(&figure.match_colors);
     pictures.extend(render(mesh, &matches, &[best], &light, task)?);
     Ok(pictures)
 }

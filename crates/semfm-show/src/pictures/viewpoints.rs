@@ -5,7 +5,7 @@ use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::geom::{Mesh, Pinhole, Task};
 use semfm::views::rig::{camera_towards, fibonacci_directions};
-use semfm::views::{Paint, RenderSettings, RigSettings, View, render};
+use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, render};
 
 use super::pair_rotation::{Standing, WeightedMesh, pair_rotation};
 use super::upright::upright;
@@ -178,7 +178,8 @@ fn visible(
 ) -> Result<Vec<Visible>> {
     let cameras: Vec<Pinhole> =
         directions.iter().map(|d| d.camera(object.mesh, SMALL_SIDE)).collect::<Result<_>>()?;
-    let views = render(object.mesh, &Paint::default(), &cameras, &RenderSettings::default(), task)?;
+    let views =
+        render(object.mesh, &SurfaceColor::default(), &cameras, &RenderSettings::default(), task)?;
     let counts: Vec<PixelCounts> = views.iter().map(|view| PixelCounts::of(view, object)).collect();
     let most_region = counts.iter().map(|count| count.region).max().unwrap_or(0).max(1) as f64;
     let most_object = counts.iter().map(|count| count.object).max().unwrap_or(0).max(1) as f64;

@@ -1,4 +1,4 @@
-//! The graphics driver: found, opened, and listened to.
+//! The graphics driver: found, opened, and its failures kept.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
@@ -11,21 +11,21 @@ use crate::{Error, Result};
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Less than what the driver has, so that tests meet its limits.
-pub(super) struct Restraint {
+pub(super) struct DriverLimits {
     pub texture_side: u32,
     pub buffer_bytes: u64,
     /// Share of the driver's memory beyond which it says that there is none left.
     pub memory_percent: u8,
 }
 
-impl Default for Restraint {
+impl Default for DriverLimits {
     fn default() -> Self {
         Self { texture_side: u32::MAX, buffer_bytes: u64::MAX, memory_percent: 95 }
     }
 }
 
-/// An open driver. What goes wrong inside it is kept until somebody asks with [`Device::check`];
-/// left alone, the library would panic.
+/// An open driver. What goes wrong inside it is kept until [`Device::check`] reports it; without
+/// that the library would panic.
 pub(super) struct Device {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
@@ -38,18 +38,19 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
-    pub fn open(restraint: &Restraint) -> Result<Self> {
-        // GL is asked last: its loader talks to the terminal where there is no display.
-        let adapter = adapter(wgpu::Backends::PRIMARY, restraint).or_else(|reason| {
-            adapter(wgpu::Backends::GL, restraint)
+    pub fn open(limits: &DriverLimits) -> Result<Self> {
+        // GL comes last: its loader writes to the terminal where there is no display.
+        let adapter = adapter(wgpu::Backends::PRIMARY, limits).or_else(|reason| {
+            adapter(wgpu::Backends::GL, limits)
                 .map_err(|_| Error::NoGpu { reason: reason.to_string() })
         })?;
         let own = adapter.limits();
-        let mut limits = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
-        limits.max_texture_dimension_2d =
-            limits.max_texture_dimension_2d.min(restraint.texture_side);
-        limits.max_buffer_size = own.max_buffer_size.min(restraint.buffer_bytes);
-        let description = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+        let mut required = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
+        required.max_texture_dimension_2d =
+            required.max_texture_dimension_2d.min(limits.texture_side);
+        required.max_buffer_size = own.max_buffer_size.min(limits.buffer_bytes);
+        let description =
+            wgpu::DeviceDescriptor { required_limits: required, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&description))
             .map_err(|error| Error::Gpu { reason: error.to_string() })?;
         let fault = Arc::new(Mutex::new(None));
@@ -62,7 +63,7 @@ impl Device {
         Ok(Self { device, queue, adapter: adapter.get_info(), fault })
     }
 
-    /// The first thing that went wrong since the last question.
+    /// The first thing that went wrong since the last check.
     ///
     /// # Errors
     /// [`Error::Gpu`].
@@ -113,12 +114,12 @@ impl Device {
 /// The fastest adapter behind some interfaces.
 fn adapter(
     backends: wgpu::Backends,
-    restraint: &Restraint,
+    limits: &DriverLimits,
 ) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let description = wgpu::InstanceDescriptor {
         backends,
         memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
-            for_resource_creation: Some(restraint.memory_percent),
+            for_resource_creation: Some(limits.memory_percent),
             for_device_loss: None,
         },
         ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -130,7 +131,7 @@ fn adapter(
     pollster::block_on(wgpu::Instance::new(description).request_adapter(&wanted))
 }
 
-/// Keeps the first fault: those that follow are its echo.
+/// Keeps the first fault: those that follow are its consequences.
 fn note(fault: &Mutex<Option<String>>, reason: String) {
     if let Ok(mut fault) = fault.lock() {
         fault.get_or_insert(reason);

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use semfm_geom::Pinhole;
 
 use super::Driver;
-use super::frame::{COLOR_BYTES, Extent, Frame, ID_BYTES, padded};
-use super::parts::{Part, extent};
+use super::gpu_mesh::GpuMesh;
 use super::pipelines::CameraBlock;
-use super::scene::Scene;
+use super::render_target::{COLOR_BYTES, Extent, ID_BYTES, RenderTarget, padded};
+use super::tiles::{Tile, extent};
 use crate::render::Request;
 use crate::{Result, View};
 
@@ -15,79 +15,79 @@ use crate::{Result, View};
 pub(super) struct Draw<'a> {
     pub driver: &'a Driver,
     pub request: &'a Request<'a>,
-    pub scene: &'a Scene,
+    pub mesh: &'a GpuMesh,
     pub cameras: &'a [Pinhole],
     /// What every batch fits into.
-    pub room: Extent,
+    pub largest: Extent,
 }
 
-/// Parts that the driver is drawing, with `scale` pixels along each side of a view's pixel.
+/// Tiles that the driver is drawing, with `scale` pixels along each side of a view's pixel.
 pub(super) struct Batch<'a> {
-    parts: &'a [Part],
+    tiles: &'a [Tile],
     scale: u32,
-    frame: Frame,
+    target: RenderTarget,
     submission: wgpu::SubmissionIndex,
 }
 
 impl Draw<'_> {
     /// Sends the drawing of a batch to the driver, with `per_pixel` samples along each side of a
     /// pixel for its colour; 0 for triangle and depth only.
-    pub fn submit<'a>(&self, parts: &'a [Part], scale: u32, per_pixel: u32) -> Result<Batch<'a>> {
+    pub fn submit<'a>(&self, tiles: &'a [Tile], scale: u32, per_pixel: u32) -> Result<Batch<'a>> {
         let Self { driver, request, .. } = self;
-        let frame = driver.frame(self.room.scaled(scale), per_pixel);
-        let bound = self.bind(&frame, parts)?;
-        let extent = extent(parts).scaled(scale);
+        let target = driver.target(self.largest.scaled(scale), per_pixel);
+        let bound = self.bind(&target, tiles)?;
+        let extent = extent(tiles).scaled(scale);
         let mut encoder = driver.device.device.create_command_encoder(&Default::default());
-        let pass = begin(&mut encoder, &frame.id_view, NO_TRIANGLE, Some(&frame.id_depth));
-        self.draw(pass, &driver.pipelines.identify, &bound, parts, scale);
-        if let (Some(colors), Some(samples)) = (&frame.colors, &bound.samples) {
+        let pass = begin(&mut encoder, &target.id_view, NO_TRIANGLE, Some(&target.id_depth));
+        self.draw(pass, &driver.pipelines.identify, &bound, tiles, scale);
+        if let (Some(colors), Some(samples)) = (&target.colors, &bound.samples) {
             let [r, g, b] = request.settings.background.map(f64::from);
             let background = wgpu::Color { r, g, b, a: 0.0 };
             let pass = begin(&mut encoder, &colors.samples, background, Some(&colors.depth));
-            self.draw(pass, &driver.pipelines.paint, &bound, parts, scale * per_pixel);
+            self.draw(pass, &driver.pipelines.shade, &bound, tiles, scale * per_pixel);
             let mut pass = begin(&mut encoder, &colors.mean_view, background, None);
             pass.set_pipeline(&driver.pipelines.average);
             pass.set_bind_group(0, samples, &[0]);
             pass.set_scissor_rect(0, 0, extent.width, extent.height);
             pass.draw(0..3, 0..1);
         }
-        frame.copy(&mut encoder, extent);
+        target.copy(&mut encoder, extent);
         let submission = driver.device.queue.submit([encoder.finish()]);
         driver.device.check()?;
-        frame.fetch();
-        Ok(Batch { parts, scale, frame, submission })
+        target.fetch();
+        Ok(Batch { tiles, scale, target, submission })
     }
 
-    /// Draws the mesh once for each part.
+    /// Draws the mesh once for each tile.
     fn draw(
         &self,
         mut pass: wgpu::RenderPass<'_>,
         pipeline: &wgpu::RenderPipeline,
         bound: &Bound,
-        parts: &[Part],
+        tiles: &[Tile],
         scale: u32,
     ) {
         pass.set_pipeline(pipeline);
-        pass.set_vertex_buffer(0, self.scene.corners.slice(..));
-        for (part, k) in parts.iter().zip(0..) {
+        pass.set_vertex_buffer(0, self.mesh.corners.slice(..));
+        for (tile, k) in tiles.iter().zip(0..) {
             let [top, width, height] =
-                [part.top, part.columns.len(), part.rows.len()].map(|n| n as u32 * scale);
+                [tile.top, tile.columns.len(), tile.rows.len()].map(|n| n as u32 * scale);
             pass.set_bind_group(0, &bound.camera, &[k * bound.stride]);
             pass.set_viewport(0.0, top as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(0, top, width, height);
-            pass.draw(0..self.scene.n_corners, 0..1);
+            pass.draw(0..self.mesh.n_corners, 0..1);
         }
     }
 
     /// The cameras' numbers where the programs read them.
-    fn bind(&self, frame: &Frame, parts: &[Part]) -> Result<Bound> {
+    fn bind(&self, target: &RenderTarget, tiles: &[Tile]) -> Result<Bound> {
         let (driver, pipelines) = (&self.driver.device, &self.driver.pipelines);
         let alignment = driver.device.limits().min_uniform_buffer_offset_alignment as usize;
         let stride = size_of::<CameraBlock>().next_multiple_of(alignment.max(1));
-        let mut bytes = vec![0; stride * parts.len()];
-        for (place, part) in bytes.chunks_exact_mut(stride).zip(parts) {
-            let camera = part.camera(&self.cameras[part.view]);
-            let block = self.scene.camera_block(&camera, self.request.settings);
+        let mut bytes = vec![0; stride * tiles.len()];
+        for (place, tile) in bytes.chunks_exact_mut(stride).zip(tiles) {
+            let camera = tile.camera(&self.cameras[tile.view]);
+            let block = self.mesh.camera_block(&camera, self.request.settings);
             place[..size_of::<CameraBlock>()].copy_from_slice(bytemuck::bytes_of(&block));
         }
         let blocks = driver.buffer(&bytes, wgpu::BufferUsages::UNIFORM)?;
@@ -104,7 +104,7 @@ impl Draw<'_> {
             let description = wgpu::BindGroupDescriptor { label: None, layout, entries };
             driver.device.create_bind_group(&description)
         };
-        let samples = frame.colors.as_ref().map(|colors| {
+        let samples = target.colors.as_ref().map(|colors| {
             let samples = entry(1, wgpu::BindingResource::TextureView(&colors.samples));
             let between = entry(2, wgpu::BindingResource::Sampler(&pipelines.between));
             group(&pipelines.samples_layout, &[camera.clone(), samples, between])
@@ -116,14 +116,14 @@ impl Draw<'_> {
     /// Puts what the driver drew into the views.
     pub fn read(&self, batch: Batch<'_>, views: &mut [View]) -> Result<()> {
         self.driver.device.wait(&batch.submission)?;
-        let width = extent(batch.parts).width;
+        let width = extent(batch.tiles).width;
         let [id_row, color_row] =
             [ID_BYTES, COLOR_BYTES].map(|bytes| padded(width, bytes) as usize);
-        batch.frame.read(|ids, colors| {
-            each_part(batch.parts, views, |view, part| {
-                for (row, line) in part.rows.clone().zip(part.top..) {
+        batch.target.read(|ids, colors| {
+            each_tile(batch.tiles, views, |view, tile| {
+                for (row, line) in tile.rows.clone().zip(tile.top..) {
                     let first = row * view.camera.width() as usize;
-                    let pixels = first + part.columns.start..first + part.columns.end;
+                    let pixels = first + tile.columns.start..first + tile.columns.end;
                     let hits = ids[line * id_row..].as_chunks::<{ ID_BYTES as usize }>().0;
                     let places = view.triangles[pixels.clone()].iter_mut();
                     let places = places.zip(&mut view.depth[pixels.clone()]);
@@ -141,7 +141,7 @@ impl Draw<'_> {
                 }
             });
         })?;
-        self.driver.keep(batch.frame);
+        self.driver.keep(batch.target);
         Ok(())
     }
 
@@ -149,19 +149,19 @@ impl Draw<'_> {
     pub fn shade(&self, batch: Batch<'_>, views: &mut [View]) -> Result<()> {
         self.driver.device.wait(&batch.submission)?;
         let scale = batch.scale as usize;
-        let row = padded(extent(batch.parts).scaled(batch.scale).width, ID_BYTES) as usize;
-        batch.frame.read(|ids, _| {
-            each_part(batch.parts, views, |view, part| {
-                let lines = part.top * scale..(part.top + part.rows.len()) * scale;
+        let row = padded(extent(batch.tiles).scaled(batch.scale).width, ID_BYTES) as usize;
+        batch.target.read(|ids, _| {
+            each_tile(batch.tiles, views, |view, tile| {
+                let lines = tile.top * scale..(tile.top + tile.rows.len()) * scale;
                 let samples = lines.flat_map(|line| {
                     let samples = ids[line * row..].as_chunks::<{ ID_BYTES as usize }>().0;
-                    samples[..part.columns.len() * scale].iter().map(|&hit| self.seen(hit))
+                    samples[..tile.columns.len() * scale].iter().map(|&hit| self.seen(hit))
                 });
-                let window = [part.columns.clone(), part.rows.clone()];
+                let window = [tile.columns.clone(), tile.rows.clone()];
                 self.request.shade_hits(view, window, samples);
             });
         })?;
-        self.driver.keep(batch.frame);
+        self.driver.keep(batch.target);
         Ok(())
     }
 
@@ -169,15 +169,15 @@ impl Draw<'_> {
     fn seen(&self, hit: [u8; 8]) -> (i32, f32) {
         let bits = u64::from_le_bytes(hit);
         let depth = f32::from_bits((bits >> 32) as u32);
-        (bits as i32, (f64::from(depth) * self.scene.radius) as f32)
+        (bits as i32, (f64::from(depth) * self.mesh.radius) as f32)
     }
 }
 
-/// Hands each view that has parts in a batch to `work`, part by part.
-fn each_part(parts: &[Part], views: &mut [View], work: impl Fn(&mut View, &Part) + Sync) {
-    let (first, last) = (parts[0].view, parts[parts.len() - 1].view);
+/// Hands each view that has tiles in a batch to `work`, tile by tile.
+fn each_tile(tiles: &[Tile], views: &mut [View], work: impl Fn(&mut View, &Tile) + Sync) {
+    let (first, last) = (tiles[0].view, tiles[tiles.len() - 1].view);
     views[first..=last].par_iter_mut().enumerate().for_each(|(k, view)| {
-        parts.iter().filter(|part| part.view == first + k).for_each(|part| work(view, part));
+        tiles.iter().filter(|tile| tile.view == first + k).for_each(|tile| work(view, tile));
     });
 }
 

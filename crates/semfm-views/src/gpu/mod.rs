@@ -1,10 +1,10 @@
 //! The renderer on a graphics driver: the same pictures as [`render`](crate::render()), from the
 //! same request.
 //!
-//! `device` opens the driver, `pipelines` holds its programs (`shaders.wgsl`), `scene` the mesh.
-//! `parts` cuts the views to the rectangles that the object fills and puts them into batches; `draw`
-//! sends each to the driver, which draws it into a `frame`, and reads it back while the next is
-//! drawn. Triangle and depth are those at a pixel's centre, colour is the mean of its samples.
+//! `device` opens the driver, `pipelines` holds its programs (`shaders.wgsl`), `gpu_mesh` the mesh.
+//! `tiles` cuts the views to the rectangles that the object fills and puts them into batches; `draw`
+//! sends each to the driver, which draws it into a `render_target`, and reads it back while the next
+//! is drawn. Triangle and depth are those at a pixel's centre, colour is the mean of its samples.
 //!
 //! A driver snaps corners to a 256th of a pixel and works in `f32`, so at silhouettes and inner
 //! edges single pixels differ from the CPU's exact answer.
@@ -12,11 +12,11 @@
 mod device;
 mod draw;
 #[cfg(test)]
-mod faults;
-mod frame;
-mod parts;
+mod failure_tests;
+mod gpu_mesh;
 mod pipelines;
-mod scene;
+mod render_target;
+mod tiles;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,16 +25,16 @@ use rayon::prelude::*;
 use semfm_geom::{Mesh, Pinhole, Task};
 
 use crate::render::{Request, blank};
-use crate::{Error, Paint, RenderSettings, Result, View};
-use device::{Device, Restraint};
+use crate::{Error, RenderSettings, Result, SurfaceColor, View};
+use device::{Device, DriverLimits};
 use draw::Draw;
-use frame::{Extent, Frame};
-use parts::{batches, extent};
+use gpu_mesh::GpuMesh;
 use pipelines::Pipelines;
-use scene::Scene;
+use render_target::{Extent, RenderTarget};
+use tiles::{batches, extent};
 
-/// Frames that are kept for the next call: one that is drawn into, one that is read.
-const KEPT_FRAMES: usize = 2;
+/// Targets that are kept for the next call: one that is drawn into, one that is read.
+const KEPT_TARGETS: usize = 2;
 
 /// An open graphics driver. Opening costs 50 to 100 ms, so keep it.
 pub struct GpuRenderer {
@@ -53,11 +53,11 @@ impl GpuRenderer {
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
     pub fn new() -> Result<Self> {
-        Self::within(&Restraint::default())
+        Self::within(&DriverLimits::default())
     }
 
-    fn within(restraint: &Restraint) -> Result<Self> {
-        Ok(Self { driver: Mutex::new(Arc::new(Driver::open(restraint)?)) })
+    fn within(limits: &DriverLimits) -> Result<Self> {
+        Ok(Self { driver: Mutex::new(Arc::new(Driver::open(limits)?)) })
     }
 
     /// Adapter and interface, as the driver names itself.
@@ -73,7 +73,7 @@ impl GpuRenderer {
 
     /// One picture per camera, as [`render`](crate::render()) makes them.
     ///
-    /// Paint that is a function of the place ([`Paint::Surface`], [`Paint::Normals`]) is asked on the
+    /// SurfaceColor that is a function of the place ([`SurfaceColor::Surface`], [`SurfaceColor::Normals`]) is asked on the
     /// CPU for what the driver found to be visible. After a failure of the driver the next call opens it anew.
     ///
     /// # Errors
@@ -82,13 +82,13 @@ impl GpuRenderer {
     pub fn render(
         &self,
         mesh: &Mesh,
-        paint: &Paint<'_>,
+        color: &SurfaceColor<'_>,
         cameras: &[Pinhole],
         settings: &RenderSettings,
         task: &Task,
     ) -> Result<Vec<View>> {
-        let request = Request::new(mesh, paint, cameras, settings)?;
-        let driver = self.working()?;
+        let request = Request::new(mesh, color, cameras, settings)?;
+        let driver = self.usable_driver()?;
         let answer = driver.render(&request, cameras, task);
         if matches!(answer, Err(Error::Gpu { .. })) {
             driver.failed.store(true, Ordering::Relaxed);
@@ -101,53 +101,55 @@ impl GpuRenderer {
     }
 
     /// The driver, opened anew where it has failed.
-    fn working(&self) -> Result<Arc<Driver>> {
+    fn usable_driver(&self) -> Result<Arc<Driver>> {
         let mut driver = self.driver.lock().unwrap_or_else(PoisonError::into_inner);
         if driver.failed.load(Ordering::Relaxed) {
-            *driver = Arc::new(Driver::open(&Restraint::default())?);
+            *driver = Arc::new(Driver::open(&DriverLimits::default())?);
         }
         Ok(driver.clone())
     }
 }
 
-/// The driver, its programs, frames that are free, and whether it ever failed.
+/// The driver, its programs, targets that are free, and whether it ever failed.
 struct Driver {
     device: Device,
     pipelines: Pipelines,
-    frames: Mutex<Vec<Frame>>,
+    free_targets: Mutex<Vec<RenderTarget>>,
     failed: AtomicBool,
 }
 
 impl Driver {
-    fn open(restraint: &Restraint) -> Result<Self> {
-        let device = Device::open(restraint)?;
+    fn open(limits: &DriverLimits) -> Result<Self> {
+        let device = Device::open(limits)?;
         let pipelines = Pipelines::new(&device);
         device.check()?;
-        Ok(Self { device, pipelines, frames: Mutex::default(), failed: AtomicBool::new(false) })
+        Ok(Self {
+            device,
+            pipelines,
+            free_targets: Mutex::default(),
+            failed: AtomicBool::new(false),
+        })
     }
 
     fn render(&self, request: &Request<'_>, cameras: &[Pinhole], task: &Task) -> Result<Vec<View>> {
         task.step("render", 0, cameras.len())?;
-        let scene = Scene::new(&self.device, request)?;
+        let mesh = GpuMesh::new(&self.device, request)?;
         let per_pixel = request.settings.supersampling;
-        let on_surface = matches!(request.paint, Paint::Surface(_) | Paint::Normals);
+        let on_surface = matches!(request.color, SurfaceColor::Surface(_) | SurfaceColor::Normals);
         let batches =
             batches(&self.device, request, cameras, if on_surface { per_pixel } else { 1 });
-        let room = batches.iter().map(|batch| extent(batch)).fold(
-            Extent { width: 0, height: 0 },
-            |room, batch| Extent {
-                width: room.width.max(batch.width),
-                height: room.height.max(batch.height),
-            },
-        );
-        let draw = Draw { driver: self, request, scene: &scene, cameras, room };
+        let largest = batches
+            .iter()
+            .map(|batch| extent(batch))
+            .fold(Extent { width: 0, height: 0 }, Extent::covering);
+        let draw = Draw { driver: self, request, mesh: &mesh, cameras, largest };
         let mut views: Vec<View> =
             cameras.par_iter().map(|camera| blank(camera, request.settings)).collect();
         let mut in_flight = None;
         for k in 0..=batches.len() {
-            let next = batches.get(k).map(|parts| {
-                let colored = draw.submit(parts, 1, if on_surface { 0 } else { per_pixel })?;
-                let samples = on_surface.then(|| draw.submit(parts, per_pixel, 0)).transpose()?;
+            let next = batches.get(k).map(|tiles| {
+                let colored = draw.submit(tiles, 1, if on_surface { 0 } else { per_pixel })?;
+                let samples = on_surface.then(|| draw.submit(tiles, per_pixel, 0)).transpose()?;
                 Ok::<_, Error>((colored, samples))
             });
             if let Some((batch, samples)) = std::mem::replace(&mut in_flight, next.transpose()?) {
@@ -155,8 +157,8 @@ impl Driver {
                 if let Some(samples) = samples {
                     draw.shade(samples, &mut views)?;
                 }
-                // Parts are in the order of their views.
-                let done = batches.get(k).map_or(cameras.len(), |parts| parts[0].view);
+                // Tiles are in the order of their views.
+                let done = batches.get(k).map_or(cameras.len(), |tiles| tiles[0].view);
                 task.step("render", done, cameras.len())?;
             }
         }
@@ -164,20 +166,20 @@ impl Driver {
         Ok(views)
     }
 
-    /// A free frame, or a new one.
-    fn frame(&self, extent: Extent, per_pixel: u32) -> Frame {
-        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
-        match frames.iter().position(|frame| frame.suits(extent, per_pixel)) {
-            Some(k) => frames.swap_remove(k),
-            None => Frame::new(&self.device, extent, per_pixel),
+    /// A free target, or a new one.
+    fn target(&self, extent: Extent, per_pixel: u32) -> RenderTarget {
+        let mut free = self.free_targets.lock().unwrap_or_else(PoisonError::into_inner);
+        match free.iter().position(|target| target.fits(extent, per_pixel)) {
+            Some(k) => free.swap_remove(k),
+            None => RenderTarget::new(&self.device, extent, per_pixel),
         }
     }
 
-    fn keep(&self, frame: Frame) {
-        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
-        frames.push(frame);
-        if frames.len() > KEPT_FRAMES {
-            frames.remove(0);
+    fn keep(&self, target: RenderTarget) {
+        let mut free = self.free_targets.lock().unwrap_or_else(PoisonError::into_inner);
+        free.push(target);
+        if free.len() > KEPT_TARGETS {
+            free.remove(0);
         }
     }
 }

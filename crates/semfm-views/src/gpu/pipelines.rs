@@ -27,10 +27,10 @@ pub(super) struct CameraBlock {
     pub padding: [u32; 3],
 }
 
-/// `identify` draws triangle and depth, `paint` the samples' colours, `average` the picture.
+/// `identify` draws triangle and depth, `shade` the samples' colours, `average` the picture.
 pub(super) struct Pipelines {
     pub identify: wgpu::RenderPipeline,
-    pub paint: wgpu::RenderPipeline,
+    pub shade: wgpu::RenderPipeline,
     pub average: wgpu::RenderPipeline,
     pub camera_layout: wgpu::BindGroupLayout,
     pub samples_layout: wgpu::BindGroupLayout,
@@ -66,7 +66,7 @@ impl Pipelines {
         let program = Program { device, module: &module };
         Self {
             identify: program.of_mesh(&camera_layout, "place", "identify", ID_FORMAT),
-            paint: program.of_mesh(&camera_layout, "light", "paint", COLOR_FORMAT),
+            shade: program.of_mesh(&camera_layout, "light", "shade", COLOR_FORMAT),
             average: program.pipeline(&samples_layout, "cover", "average", COLOR_FORMAT, &[], None),
             camera_layout,
             samples_layout,

@@ -46,7 +46,7 @@ fn light(corner: Corner) -> Lit {
 }
 
 @fragment
-fn paint(lit: Lit) -> @location(0) vec4<f32> {
+fn shade(lit: Lit) -> @location(0) vec4<f32> {
     return vec4(lit.color, 1.0);
 }
 

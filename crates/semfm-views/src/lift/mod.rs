@@ -16,7 +16,9 @@ use semfm_geom::{Mesh, SemanticCloud, Task, surface_sphere, surface_vertices};
 use crate::{EmbeddedView, Error, Result};
 
 /// How image features reach the surface samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum LiftRule {
     /// Samples pull their features out of every view that sees them; samples that no view sees
     /// take those of the nearest seen sample along the surface.
@@ -34,7 +36,7 @@ pub enum LiftRule {
 }
 
 /// How the cloud is made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct LiftSettings {
     /// Which way features travel.
     pub rule: LiftRule,

@@ -6,7 +6,7 @@ use semfm_geom::{Mesh, PixelDepth, Task};
 
 use super::nearest_seen::nearest_seen;
 use super::{Features, nothing_in_sight};
-use crate::render::probe::inverse_depths;
+use crate::render::depth_lookup::inverse_depths;
 use crate::render::triangle::Projection;
 use crate::{EmbeddedView, PatchEmbeddings, PatchGrid, Result};
 

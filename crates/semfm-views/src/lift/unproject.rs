@@ -6,7 +6,7 @@ use semfm_geom::sampling::SurfaceSample;
 use semfm_geom::{Mesh, PointIndex, Task};
 
 use super::{Features, nothing_in_sight};
-use crate::render::probe::inverse_depths;
+use crate::render::depth_lookup::inverse_depths;
 use crate::render::triangle::Projection;
 use crate::{EmbeddedView, Result};
 

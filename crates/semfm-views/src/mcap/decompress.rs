@@ -15,7 +15,7 @@ const CHUNK_PER_FILE_BYTE: usize = 16;
 /// its file: 32 KB of zstd can hold a gigabyte.
 const CHUNK_BYTES_AT_MOST: usize = 256 << 20;
 
-/// Decompresses `stored`, which must give exactly `size` bytes, into `room`, or returns it as it is
+/// Decompresses `stored`, which must give exactly `size` bytes, into `buffer`, or returns it as it is
 /// where there is no compression.
 ///
 /// # Errors
@@ -26,7 +26,7 @@ pub(super) fn decompress<'a>(
     stored: &'a [u8],
     size: u64,
     file_bytes: usize,
-    room: &'a mut Vec<u8>,
+    buffer: &'a mut Vec<u8>,
     place: Place<'_>,
 ) -> Result<&'a [u8]> {
     let wrong_size =
@@ -49,13 +49,13 @@ pub(super) fn decompress<'a>(
     let length = usize::try_from(size).ok().filter(|&length| length <= limit).ok_or_else(|| {
         place.error(Fault::OverLimit, format!("at most {limit} bytes decompressed"), size)
     })?;
-    room.resize(length, 0);
+    buffer.resize(length, 0);
     let broken = |error: std::io::Error| {
         place.error(Fault::Decompress, format!("a sound {compression} stream"), error)
     };
     if compression == "zstd" {
         // In one go: the streaming decoder would allocate whatever window the stream asks for.
-        let written = zstd::bulk::decompress_to_buffer(stored, &mut room[..]).map_err(broken)?;
+        let written = zstd::bulk::decompress_to_buffer(stored, &mut buffer[..]).map_err(broken)?;
         if written != length {
             return Err(wrong_size(written.to_string()));
         }
@@ -63,7 +63,7 @@ pub(super) fn decompress<'a>(
         let mut decoder = lz4::Decoder::new(stored).map_err(broken)?;
         let mut written = 0;
         while written < length {
-            match decoder.read(&mut room[written..]).map_err(broken)? {
+            match decoder.read(&mut buffer[written..]).map_err(broken)? {
                 0 => return Err(wrong_size(written.to_string())),
                 n => written += n,
             }
@@ -73,7 +73,7 @@ pub(super) fn decompress<'a>(
         }
         decoder.finish().1.map_err(broken)?;
     }
-    Ok(room)
+    Ok(buffer)
 }
 
 #[cfg(test)]
@@ -85,8 +85,8 @@ mod tests {
 
     fn unpack(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>> {
         let place = Place { path: Path::new("a.mcap"), opcode: None, offset: 0, chunk: None };
-        let mut room = Vec::new();
-        decompress(compression, stored, size, stored.len(), &mut room, place).map(<[u8]>::to_vec)
+        let mut buffer = Vec::new();
+        decompress(compression, stored, size, stored.len(), &mut buffer, place).map(<[u8]>::to_vec)
     }
 
     fn code(compression: &str, stored: &[u8], size: u64) -> &'static str {

@@ -10,7 +10,10 @@ use std::fmt;
 use std::path::Path;
 
 use semfm_geom::{Mesh, MeshHash};
+use serde::de::Error as _;
+use serde::{Deserialize, Serialize};
 
+use super::entries::{Entries, EntryError, from_entries, to_entries};
 use crate::{Error, Result};
 
 /// Name of the metadata record in which our files describe themselves.
@@ -94,6 +97,68 @@ pub struct EmbeddingsMetadata {
 const VIEWS_FORMAT: &str = "semfm.views/1";
 const EMBEDDINGS_FORMAT: &str = "semfm.embeddings/1";
 
+/// The keys of views as they stand in the record.
+#[derive(Serialize, Deserialize)]
+struct ViewsRecord {
+    format: String,
+    #[serde(with = "hash_text")]
+    mesh_hash: MeshHash,
+    n_vertices: u64,
+    n_triangles: u64,
+    n_views: u64,
+    width: u32,
+    height: u32,
+    #[serde(default)]
+    rig: String,
+    #[serde(default)]
+    background: String,
+    #[serde(default)]
+    seed: u64,
+    #[serde(flatten)]
+    more: Entries,
+}
+
+/// The keys that an embeddings file adds.
+#[derive(Serialize, Deserialize)]
+struct EmbeddingsRecord {
+    encoder: String,
+    #[serde(default)]
+    revision: String,
+    #[serde(default)]
+    preprocessing: String,
+    rolls: u32,
+    #[serde(default)]
+    outliers: String,
+    #[serde(default, skip_serializing_if = "is_false")]
+    simulated: bool,
+    /// The keys of [`ViewsRecord`].
+    #[serde(flatten)]
+    views: Entries,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands out a reference")]
+fn is_false(truth: &bool) -> bool {
+    !truth
+}
+
+/// A mesh's hash as its text.
+mod hash_text {
+    use semfm_geom::MeshHash;
+    use serde::de::{Error, Unexpected};
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(hash: &MeshHash, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(hash)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<MeshHash, D::Error> {
+        let text = String::deserialize(from)?;
+        let expected = "`blake3:` and 64 hexadecimal digits";
+        MeshHash::parse(&text)
+            .ok_or_else(|| D::Error::invalid_value(Unexpected::Str(&text), &expected))
+    }
+}
+
 impl ViewsMetadata {
     /// Metadata for views of `mesh`; the rest is for the caller to fill.
     pub fn of(mesh: &Mesh, width: u32, height: u32) -> Self {
@@ -110,150 +175,114 @@ impl ViewsMetadata {
 
     /// The record's entries for a file of `n_views` views.
     pub fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
-        let own = [
-            ("format", VIEWS_FORMAT.to_owned()),
-            ("mesh_hash", self.mesh.hash.to_string()),
-            ("n_vertices", self.mesh.n_vertices.to_string()),
-            ("n_triangles", self.mesh.n_triangles.to_string()),
-            ("n_views", n_views.to_string()),
-            ("width", self.width.to_string()),
-            ("height", self.height.to_string()),
-            ("rig", self.rig.clone()),
-            ("background", self.background.clone()),
-            ("seed", self.seed.to_string()),
-        ];
+        let record = ViewsRecord {
+            format: VIEWS_FORMAT.to_owned(),
+            mesh_hash: self.mesh.hash,
+            n_vertices: self.mesh.n_vertices as u64,
+            n_triangles: self.mesh.n_triangles as u64,
+            n_views: n_views as u64,
+            width: self.width,
+            height: self.height,
+            rig: self.rig.clone(),
+            background: self.background.clone(),
+            seed: self.seed,
+            more: Entries::new(),
+        };
         let mut entries = self.more.clone();
-        entries.extend(own.map(|(key, value)| (key.to_owned(), value)));
+        entries.extend(to_entries(&record));
         entries
     }
 
     /// Reads the record of a views file; also the number of views that it names.
-    pub(super) fn read(
-        path: &Path,
-        records: &[(String, BTreeMap<String, String>)],
-    ) -> Result<(Self, usize)> {
-        let mut entries = Entries::find(path, records)?;
-        entries.format(VIEWS_FORMAT)?;
-        let (mut metadata, n_views) = Self::take(&mut entries)?;
-        metadata.more = entries.left;
-        Ok((metadata, n_views))
+    pub(super) fn read(path: &Path, records: &[(String, Entries)]) -> Result<(Self, usize)> {
+        let entries = own_record(path, records, VIEWS_FORMAT)?;
+        Self::of_record(from_entries(entries).map_err(|error| at_fault(path, error))?, path)
     }
 
-    fn take(entries: &mut Entries<'_>) -> Result<(Self, usize)> {
-        let hash = entries.take("mesh_hash")?;
-        let hash = MeshHash::parse(&hash).ok_or_else(|| {
-            entries.error("mesh_hash", "`blake3:` and 64 hexadecimal digits", &hash)
-        })?;
+    fn of_record(record: ViewsRecord, path: &Path) -> Result<(Self, usize)> {
         let mesh = MeshIdentity {
-            hash,
-            n_vertices: entries.number("n_vertices")?,
-            n_triangles: entries.number("n_triangles")?,
+            hash: record.mesh_hash,
+            n_vertices: count(path, "n_vertices", record.n_vertices)?,
+            n_triangles: count(path, "n_triangles", record.n_triangles)?,
         };
-        let metadata = Self {
-            mesh,
-            width: entries.number("width")?,
-            height: entries.number("height")?,
-            rig: entries.take_or_empty("rig"),
-            background: entries.take_or_empty("background"),
-            seed: match entries.left.contains_key("seed") {
-                true => entries.number("seed")?,
-                false => 0,
-            },
-            more: BTreeMap::new(),
-        };
-        Ok((metadata, entries.number("n_views")?))
+        let n_views = count(path, "n_views", record.n_views)?;
+        let ViewsRecord { width, height, rig, background, seed, more, .. } = record;
+        Ok((Self { mesh, width, height, rig, background, seed, more }, n_views))
     }
 }
 
 impl EmbeddingsMetadata {
     /// The record's entries for a file of `n_views` views.
-    pub fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
+    pub(super) fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
+        let record = EmbeddingsRecord {
+            encoder: self.encoder.clone(),
+            revision: self.revision.clone(),
+            preprocessing: self.preprocessing.clone(),
+            rolls: self.rolls,
+            outliers: self.outliers.clone(),
+            simulated: self.simulated,
+            views: Entries::new(),
+        };
         let mut entries = self.views.entries(n_views);
-        let own = [
-            ("format", EMBEDDINGS_FORMAT.to_owned()),
-            ("encoder", self.encoder.clone()),
-            ("revision", self.revision.clone()),
-            ("preprocessing", self.preprocessing.clone()),
-            ("rolls", self.rolls.to_string()),
-            ("outliers", self.outliers.clone()),
-        ];
-        entries.extend(own.map(|(key, value)| (key.to_owned(), value)));
-        if self.simulated {
-            entries.insert("simulated".to_owned(), "true".to_owned());
-        }
+        entries.extend(to_entries(&record));
+        entries.insert("format".to_owned(), EMBEDDINGS_FORMAT.to_owned());
         entries
     }
 
     /// Reads the record of an embeddings file; also the number of views that it names.
-    pub(super) fn read(
-        path: &Path,
-        records: &[(String, BTreeMap<String, String>)],
-    ) -> Result<(Self, usize)> {
-        let mut entries = Entries::find(path, records)?;
-        entries.format(EMBEDDINGS_FORMAT)?;
-        let (views, n_views) = ViewsMetadata::take(&mut entries)?;
-        let mut metadata = Self {
-            views,
-            encoder: entries.take("encoder")?,
-            revision: entries.take_or_empty("revision"),
-            preprocessing: entries.take_or_empty("preprocessing"),
-            rolls: entries.number("rolls")?,
-            outliers: entries.take_or_empty("outliers"),
-            simulated: entries.take_or_empty("simulated") == "true",
-        };
-        metadata.views.more = entries.left;
+    pub(super) fn read(path: &Path, records: &[(String, Entries)]) -> Result<(Self, usize)> {
+        let entries = own_record(path, records, EMBEDDINGS_FORMAT)?;
+        let record: EmbeddingsRecord =
+            from_entries(entries).map_err(|error| at_fault(path, error))?;
+        let views = from_entries(&record.views).map_err(|error| at_fault(path, error))?;
+        let (views, n_views) = ViewsMetadata::of_record(views, path)?;
+        let EmbeddingsRecord {
+            encoder, revision, preprocessing, rolls, outliers, simulated, ..
+        } = record;
+        let metadata = Self { views, encoder, revision, preprocessing, rolls, outliers, simulated };
         Ok((metadata, n_views))
     }
 }
 
-/// Entries of the record that are not read yet.
-struct Entries<'a> {
-    path: &'a Path,
-    left: BTreeMap<String, String>,
+/// The one record of ours in a file, which must be of the given format.
+fn own_record<'r>(
+    path: &Path,
+    records: &'r [(String, Entries)],
+    format: &str,
+) -> Result<&'r Entries> {
+    let mut ours = records.iter().filter(|(name, _)| name == METADATA_NAME);
+    let entries = match (ours.next(), ours.next()) {
+        (Some((_, entries)), None) => entries,
+        (first, _) => {
+            return Err(Error::Format {
+                path: path.to_path_buf(),
+                place: "metadata".to_owned(),
+                expected: format!("one record named `{METADATA_NAME}`"),
+                found: if first.is_none() { "none" } else { "more than one" }.to_owned(),
+            });
+        }
+    };
+    let (key, expected) = ("format".to_owned(), format.to_owned());
+    match entries.get("format") {
+        Some(found) if found == format => Ok(entries),
+        Some(found) => Err(at_fault(path, EntryError { key, expected, found: found.clone() })),
+        None => Err(at_fault(path, EntryError::missing_field("format"))),
+    }
 }
 
-impl<'a> Entries<'a> {
-    fn find(path: &'a Path, records: &[(String, BTreeMap<String, String>)]) -> Result<Self> {
-        let mut ours = records.iter().filter(|(name, _)| name == METADATA_NAME);
-        let found = match (ours.next(), ours.next()) {
-            (Some((_, entries)), None) => return Ok(Self { path, left: entries.clone() }),
-            (None, _) => "none",
-            _ => "more than one",
-        };
-        Err(Error::Format {
-            path: path.to_path_buf(),
-            place: "metadata".to_owned(),
-            expected: format!("one record named `{METADATA_NAME}`"),
-            found: found.to_owned(),
-        })
+fn at_fault(path: &Path, error: EntryError) -> Error {
+    let EntryError { key, expected, found } = error;
+    Error::Format {
+        path: path.to_path_buf(),
+        place: format!("metadata record `{METADATA_NAME}`, key `{key}`"),
+        expected,
+        found,
     }
+}
 
-    fn error(&self, key: &str, expected: &str, found: &str) -> Error {
-        Error::Format {
-            path: self.path.to_path_buf(),
-            place: format!("metadata record `{METADATA_NAME}`, key `{key}`"),
-            expected: expected.to_owned(),
-            found: found.to_owned(),
-        }
-    }
-
-    fn format(&mut self, expected: &str) -> Result<()> {
-        match self.take("format")? {
-            found if found == expected => Ok(()),
-            found => Err(self.error("format", expected, &found)),
-        }
-    }
-
-    fn take(&mut self, key: &str) -> Result<String> {
-        self.left.remove(key).ok_or_else(|| self.error(key, "a value", "nothing"))
-    }
-
-    fn take_or_empty(&mut self, key: &str) -> String {
-        self.left.remove(key).unwrap_or_default()
-    }
-
-    fn number<T: std::str::FromStr>(&mut self, key: &str) -> Result<T> {
-        let text = self.take(key)?;
-        text.parse().map_err(|_| self.error(key, "a whole number", &text))
-    }
+fn count(path: &Path, key: &str, n: u64) -> Result<usize> {
+    usize::try_from(n).map_err(|_| {
+        let expected = format!("at most {}", usize::MAX);
+        at_fault(path, EntryError { key: key.to_owned(), expected, found: n.to_string() })
+    })
 }

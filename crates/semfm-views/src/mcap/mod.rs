@@ -11,6 +11,7 @@ mod decode;
 mod decompress;
 mod embeddings_file;
 mod embeddings_message;
+mod entries;
 mod inspect;
 mod layout;
 mod message_index;

@@ -134,7 +134,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Walks over the records in a stretch of bytes.
+/// Iterates over the records in a stretch of bytes.
 pub(super) struct Records<'a> {
     pub path: &'a Path,
     pub bytes: &'a [u8],

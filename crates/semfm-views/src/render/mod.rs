@@ -1,13 +1,13 @@
 //! The renderer: a mesh and cameras in, pictures with depth and triangle ids out.
 //!
 //! `triangle` turns a triangle into linear forms over the image, `raster` fills a z-buffer with
-//! them, `shade` gives its samples colours, `probe` asks for the depth at single positions,
+//! them, `shade` gives its samples colours, `depth_lookup` finds the depth at single positions,
 //! `occlusion` darkens what little light reaches, `edges` draws outlines.
 //! Everything is computed on the CPU, the same at every thread count.
 
+pub(crate) mod depth_lookup;
 mod edges;
 mod occlusion;
-pub(crate) mod probe;
 pub(crate) mod raster;
 mod shade;
 pub(crate) mod triangle;
@@ -22,7 +22,7 @@ use semfm_geom::{Mesh, Pinhole, Sphere, Task, surface_sphere};
 
 #[cfg(feature = "gpu")]
 pub(crate) use shade::light_direction;
-pub use shade::{CornerNormals, Paint};
+pub use shade::{CornerNormals, SurfaceColor};
 
 use crate::{Error, Result, View};
 pub use occlusion::openness;
@@ -39,7 +39,7 @@ const BAND_SAMPLES: usize = 1 << 20;
 const MAX_PIXELS: u64 = 1 << 28;
 
 /// Light, colours and smoothing. The defaults are those that the encoder was measured with.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RenderSettings {
     /// Colour samples along each side of a pixel (1 to 8).
     pub supersampling: u32,
@@ -118,10 +118,10 @@ impl RenderSettings {
 ///
 /// ```
 /// use semfm_geom::{Mesh, Task, math::DVec3};
-/// use semfm_views::{Paint, RenderSettings, RigSettings, render, rig};
+/// use semfm_views::{SurfaceColor, RenderSettings, RigSettings, render, rig};
 /// let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]])?;
 /// let cameras = rig(&mesh, &RigSettings::default())?;
-/// let views = render(&mesh, &Paint::default(), &cameras, &RenderSettings::default(), &Task::default())?;
+/// let views = render(&mesh, &SurfaceColor::default(), &cameras, &RenderSettings::default(), &Task::default())?;
 /// assert_eq!(views[0].rgb.len(), 224 * 224 * 3);
 /// # Ok::<(), semfm_views::Error>(())
 /// ```
@@ -131,12 +131,12 @@ impl RenderSettings {
 /// [`semfm_geom::Error::NoArea`] for a surface without area; [`semfm_geom::Error::Cancelled`].
 pub fn render(
     mesh: &Mesh,
-    paint: &Paint<'_>,
+    color: &SurfaceColor<'_>,
     cameras: &[Pinhole],
     settings: &RenderSettings,
     task: &Task,
 ) -> Result<Vec<View>> {
-    let request = Request::new(mesh, paint, cameras, settings)?;
+    let request = Request::new(mesh, color, cameras, settings)?;
     let done = AtomicUsize::new(0);
     task.step("render", 0, cameras.len())?;
     cameras
@@ -153,7 +153,7 @@ pub fn render(
 /// What is to be drawn: checked, and with what all views of it share.
 pub(crate) struct Request<'a> {
     pub mesh: &'a Mesh,
-    pub paint: &'a Paint<'a>,
+    pub color: &'a SurfaceColor<'a>,
     pub settings: &'a RenderSettings,
     pub normals: CornerNormals,
     /// Centre and radius of the surface.
@@ -167,12 +167,12 @@ impl<'a> Request<'a> {
     /// As [`render`].
     pub fn new(
         mesh: &'a Mesh,
-        paint: &'a Paint<'a>,
+        color: &'a SurfaceColor<'a>,
         cameras: &[Pinhole],
         settings: &'a RenderSettings,
     ) -> Result<Self> {
         settings.check()?;
-        paint.check(mesh)?;
+        color.check(mesh)?;
         for (k, camera) in cameras.iter().enumerate() {
             check_size(k, camera)?;
         }
@@ -189,11 +189,11 @@ impl<'a> Request<'a> {
             return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
         }
         let darkened = |open: f32| 1.0 - settings.occlusion as f32 * (1.0 - open);
-        let is_lit = !matches!(paint, Paint::Normals);
+        let is_lit = !matches!(color, SurfaceColor::Normals);
         let occlusion = (is_lit && settings.occlusion > 0.0)
             .then(|| openness(mesh).into_iter().map(darkened).collect());
         let normals = CornerNormals::new(mesh, settings.crease);
-        Ok(Self { mesh, paint, settings, normals, sphere: surface_sphere(mesh), occlusion })
+        Ok(Self { mesh, color, settings, normals, sphere: surface_sphere(mesh), occlusion })
     }
 
     /// Share of the light that reaches a vertex.

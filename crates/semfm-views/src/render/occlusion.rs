@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole, PixelDepth, Sphere, surface_sphere};
 
-use super::probe::inverse_depths;
+use super::depth_lookup::inverse_depths;
 use super::triangle::Projection;
 use crate::rig::fibonacci_directions;
 

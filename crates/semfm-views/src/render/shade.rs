@@ -1,4 +1,4 @@
-//! Colour: paint times light, averaged over the samples of each pixel.
+//! Colour: the surface's own times light, averaged over the samples of each pixel.
 
 use std::fmt;
 
@@ -15,9 +15,9 @@ use crate::{Error, Result};
 /// Light is multiplied onto these values as they are, without going through linear light: that is
 /// how the pictures that the encoder was measured with were made.
 #[derive(Clone, Copy)]
-pub enum Paint<'a> {
+pub enum SurfaceColor<'a> {
     /// The same colour everywhere.
-    Plain([f32; 3]),
+    Uniform([f32; 3]),
     /// A colour per vertex (n), mixed over each triangle.
     Vertices(&'a [[f32; 3]]),
     /// A function of triangle and barycentric weights (sum 1): textures, corner colours.
@@ -27,9 +27,9 @@ pub enum Paint<'a> {
     Normals,
 }
 
-impl Paint<'_> {
+impl SurfaceColor<'_> {
     /// Grey of albedo .72.
-    pub const GREY: Self = Self::Plain([0.72; 3]);
+    pub const GREY: Self = Self::Uniform([0.72; 3]);
 
     pub(super) fn check(&self, mesh: &Mesh) -> Result<()> {
         match self {
@@ -42,16 +42,16 @@ impl Paint<'_> {
     }
 }
 
-impl Default for Paint<'_> {
+impl Default for SurfaceColor<'_> {
     fn default() -> Self {
         Self::GREY
     }
 }
 
-impl fmt::Debug for Paint<'_> {
+impl fmt::Debug for SurfaceColor<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Plain(colour) => f.debug_tuple("Plain").field(colour).finish(),
+            Self::Uniform(colour) => f.debug_tuple("Uniform").field(colour).finish(),
             Self::Vertices(colours) => f.debug_tuple("Vertices").field(&colours.len()).finish(),
             Self::Surface(_) => f.debug_tuple("Surface").finish_non_exhaustive(),
             Self::Normals => f.write_str("Normals"),
@@ -280,7 +280,7 @@ impl Shader<'_> {
                 line.colours.iter_mut().for_each(|line| line[columns.clone()].fill(0.0));
                 continue;
             };
-            if let Paint::Surface(paint) = self.request.paint {
+            if let SurfaceColor::Surface(paint) = self.request.color {
                 for column in columns {
                     let u = raster.position(raster.columns.start + column);
                     let weights = forms.barycentric(u, v);
@@ -309,13 +309,13 @@ impl Shader<'_> {
         let light = self.brightness(face);
         let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
         let ids = self.projection.mesh.faces()[face];
-        let corners = match self.request.paint {
-            Paint::Plain(colour) => [0, 1, 2].map(|corner| lit(corner, *colour)),
-            Paint::Vertices(colours) => {
+        let corners = match self.request.color {
+            SurfaceColor::Uniform(colour) => [0, 1, 2].map(|corner| lit(corner, *colour)),
+            SurfaceColor::Vertices(colours) => {
                 [0, 1, 2].map(|corner| lit(corner, colours[ids[corner] as usize]))
             }
-            Paint::Normals => self.normal_colours(face),
-            Paint::Surface(_) => [[0.0; 3]; 3],
+            SurfaceColor::Normals => self.normal_colours(face),
+            SurfaceColor::Surface(_) => [[0.0; 3]; 3],
         };
         Known { face, forms: self.projection.forms(face), light, corners }
     }

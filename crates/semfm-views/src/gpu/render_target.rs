@@ -1,4 +1,4 @@
-//! What a batch is drawn into, and how it comes back.
+//! Textures that a batch is drawn into, and how they come back.
 
 use super::device::Device;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, ID_FORMAT};
@@ -27,6 +27,11 @@ impl Extent {
         Self { width: self.width * factor, height: self.height * factor }
     }
 
+    /// The smallest extent that covers both.
+    pub fn covering(self, other: Self) -> Self {
+        Self { width: self.width.max(other.width), height: self.height.max(other.height) }
+    }
+
     fn texture(self) -> wgpu::Extent3d {
         let Self { width, height } = self;
         wgpu::Extent3d { width, height, depth_or_array_layers: 1 }
@@ -39,14 +44,14 @@ pub(super) fn padded(width: u32, bytes_per_pixel: u32) -> u32 {
 }
 
 /// Textures and buffers for one batch.
-pub(super) struct Frame {
+pub(super) struct RenderTarget {
     extent: Extent,
     /// Colour samples along each side of a pixel; 0 for triangle and depth only.
     per_pixel: u32,
     pub id_view: wgpu::TextureView,
     pub id_depth: wgpu::TextureView,
     pub colors: Option<Colors>,
-    ids: Returned,
+    ids: ReadBack,
 }
 
 /// The samples' colours (sides × samples along a pixel), their depth, and the mean.
@@ -54,10 +59,10 @@ pub(super) struct Colors {
     pub samples: wgpu::TextureView,
     pub depth: wgpu::TextureView,
     pub mean_view: wgpu::TextureView,
-    mean: Returned,
+    mean: ReadBack,
 }
 
-impl Frame {
+impl RenderTarget {
     pub fn new(device: &Device, extent: Extent, per_pixel: u32) -> Self {
         let texture = |scale: u32, format, more| {
             device.device.create_texture(&wgpu::TextureDescriptor {
@@ -80,7 +85,7 @@ impl Frame {
                 samples: view(&texture(per_pixel, COLOR_FORMAT, sampled)),
                 depth: view(&texture(per_pixel, DEPTH_FORMAT, none)),
                 mean_view: view(&mean),
-                mean: Returned::new(device, mean, extent, COLOR_BYTES),
+                mean: ReadBack::new(device, mean, extent, COLOR_BYTES),
             }
         });
         let ids = texture(1, ID_FORMAT, read);
@@ -90,12 +95,12 @@ impl Frame {
             id_view: view(&ids),
             id_depth: view(&texture(1, DEPTH_FORMAT, none)),
             colors,
-            ids: Returned::new(device, ids, extent, ID_BYTES),
+            ids: ReadBack::new(device, ids, extent, ID_BYTES),
         }
     }
 
-    /// Whether a batch can be drawn into this frame without much waste.
-    pub fn suits(&self, extent: Extent, per_pixel: u32) -> bool {
+    /// Whether a batch can be drawn into these textures without much waste.
+    pub fn fits(&self, extent: Extent, per_pixel: u32) -> bool {
         self.per_pixel == per_pixel
             && self.extent.width >= extent.width
             && self.extent.height >= extent.height
@@ -108,7 +113,7 @@ impl Frame {
         self.colors.iter().for_each(|colors| colors.mean.copy(encoder, extent));
     }
 
-    /// Asks for what is copied.
+    /// Requests the copied bytes; they have arrived when the submission is done.
     pub fn fetch(&self) {
         self.ids.fetch();
         self.colors.iter().for_each(|colors| colors.mean.fetch());
@@ -131,13 +136,13 @@ impl Frame {
 }
 
 /// A texture and the buffer in which it comes back.
-struct Returned {
+struct ReadBack {
     texture: wgpu::Texture,
     buffer: wgpu::Buffer,
     bytes_per_pixel: u32,
 }
 
-impl Returned {
+impl ReadBack {
     fn new(device: &Device, texture: wgpu::Texture, extent: Extent, bytes_per_pixel: u32) -> Self {
         let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,

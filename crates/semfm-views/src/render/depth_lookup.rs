@@ -1,6 +1,6 @@
 //! Depth at single pixel positions: the z-buffer of a handful of samples, wherever they lie.
 //!
-//! Asking 1 200 positions costs a fraction of a full z-buffer, and the answer is exact at the
+//! 1 200 positions cost a fraction of a full z-buffer, and the depth is exact at the
 //! position instead of at the nearest pixel centre, which matters at silhouettes and thin parts.
 
 use super::triangle::{PixelBox, Projection};
@@ -10,7 +10,7 @@ use super::triangle::{PixelBox, Projection};
 const POSITIONS_PER_CELL: f64 = 0.5;
 
 /// 1/z of the surface nearest to the camera at each position (f64, 0 where there is none).
-/// Positions outside the image are answered too; positions that are NaN see nothing.
+/// Positions outside the image have a depth, too; at positions that are NaN there is nothing.
 pub(crate) fn inverse_depths(projection: &Projection<'_>, positions: &[[f64; 2]]) -> Vec<f64> {
     let cells = Cells::new(positions);
     let mut nearest = vec![0.0; positions.len()];

@@ -6,7 +6,7 @@ use semfm_geom::{Pinhole, Sphere};
 use super::device::Device;
 use super::pipelines::{CameraBlock, Corner};
 use crate::render::{Request, light_direction};
-use crate::{Error, Paint, RenderSettings, Result};
+use crate::{Error, RenderSettings, Result, SurfaceColor};
 
 /// What lies nearer to the camera than this share of the object's radius is cut off.
 const NEAR: f64 = 1e-4;
@@ -16,7 +16,7 @@ const NEAR: f64 = 1e-4;
 /// Neighbours do not share corners: a driver counts corners, and by that a triangle knows its number.
 /// (Sharing them, with the number in each triangle's first corner, saves a twentieth on lavapipe, and
 /// turns triangles, so that of two in one place another one wins.)
-pub(super) struct Scene {
+pub(super) struct GpuMesh {
     pub corners: wgpu::Buffer,
     pub n_corners: u32,
     /// Object coordinates of the corners' origin and unit.
@@ -24,7 +24,7 @@ pub(super) struct Scene {
     pub radius: f64,
 }
 
-impl Scene {
+impl GpuMesh {
     /// # Errors
     /// [`Error::BeyondGpu`] for a mesh that does not fit into a buffer, [`Error::Gpu`].
     pub fn new(device: &Device, request: &Request<'_>) -> Result<Self> {
@@ -47,10 +47,10 @@ impl Scene {
                 [0, 1, 2].map(|corner| {
                     let id = ids[corner] as usize;
                     let position = ((mesh.vertices()[id] - centre) / radius).as_vec3().to_array();
-                    let color = match request.paint {
-                        Paint::Plain(color) => *color,
-                        Paint::Vertices(colors) => colors[id],
-                        Paint::Surface(_) | Paint::Normals => [0.0; 3],
+                    let color = match request.color {
+                        SurfaceColor::Uniform(color) => *color,
+                        SurfaceColor::Vertices(colors) => colors[id],
+                        SurfaceColor::Surface(_) | SurfaceColor::Normals => [0.0; 3],
                     };
                     let color = color.map(|c| c * request.light_at(id));
                     Corner { position, normal: normals[corner], color }
