@@ -213,7 +213,7 @@ impl ViewsMetadata {
 
 impl EmbeddingsMetadata {
     /// The record's entries for a file of `n_views` views.
-    pub(super) fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
+    pub fn entries(&self, n_views: usize) -> BTreeMap<String, String> {
         let record = EmbeddingsRecord {
             encoder: self.encoder.clone(),
             revision: self.revision.clone(),
