@@ -80,8 +80,10 @@ impl Steps<'_> {
     fn files_read_by_python(&self) -> Result<Tally> {
         let samples = self.workspace.built("semfm-samples");
         let samples_text = samples.to_str().context("the target folder's name is not UTF-8")?;
-        let writer = self.workspace.built("debug/examples/write_sample_files");
-        program(self.workspace, &writer, &[samples_text]).succeed()?;
+        for example in ["write_sample_files", "write_sample_scene"] {
+            let writer = self.workspace.built("debug/examples").join(example);
+            program(self.workspace, &writer, &[samples_text]).succeed()?;
+        }
         self.pytest("crates/semfm-views/tests/check_mcap.py", &[], Some(&samples))
     }
 

@@ -4,6 +4,7 @@
 //!   [`semfm::output`]), the pictures and the scene for Foxglove.
 //! - [`TransferFigure`], [`write_grasp_picture`] and [`write_sheet`] draw pictures (PNG).
 //! - [`groups_of_paths`] and [`write_page`] make one HTML page with an interactive viewer.
+//! - `foxglove` (feature `mcap`) holds scenes for Foxglove.
 //! - [`colors`] is the one table of colours, [`html`] the pieces that every page is made of.
 //!
 //! Nothing below this crate draws: a robot build takes `semfm` alone.
@@ -11,7 +12,7 @@
 pub mod colors;
 mod error;
 #[cfg(feature = "mcap")]
-mod foxglove;
+pub mod foxglove;
 pub mod html;
 mod page;
 mod pictures;

@@ -1,5 +1,5 @@
-//! Writes one small file of each kind into a folder: `sample.views.mcap`, `sample.emb.mcap` and
-//! `sample.transfer.mcap`. Every number in them follows from a formula, so that a reader in
+//! Writes one small file of each kind into a folder: `sample.views.mcap` and `sample.emb.mcap`.
+//! Every number in them follows from a formula, so that a reader in
 //! another language can check them (`tests/check_mcap.py` does).
 //!
 //! `cargo run -p semfm-views --example write_sample_files -- FOLDER`
@@ -8,10 +8,7 @@ use std::path::{Path, PathBuf};
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole};
-use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, Scene, SceneMesh, ScenePoints, ViewsMetadata,
-    write_views,
-};
+use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata, write_views};
 use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid, Result, View};
 
 const N_VIEWS: usize = 3;
@@ -49,28 +46,7 @@ fn write_samples(folder: &Path) -> Result<()> {
         },
         views: (0..N_VIEWS).map(embedded).collect(),
     };
-    embeddings.write(&folder.join("sample.emb.mcap"), Dtype::F16)?;
-
-    let colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
-    let shown = |topic, frame_id| SceneMesh {
-        topic,
-        frame_id,
-        name: "mesh",
-        vertices: mesh.vertices(),
-        faces: mesh.faces(),
-        colors: Some(&colors),
-    };
-    let cloud = ScenePoints {
-        topic: "/source/cloud",
-        frame_id: "source",
-        points: mesh.vertices(),
-        colors: &colors,
-        numbers: &[],
-    };
-    let about = serde_json::json!({"method": "sample"});
-    let meshes = vec![shown("/source/mesh", "source"), shown("/target/mesh", "target")];
-    let scene = Scene { meshes, clouds: vec![cloud], ..Default::default() };
-    scene.write(&folder.join("sample.transfer.mcap"), "semfm.transfer/1", &about)
+    embeddings.write(&folder.join("sample.emb.mcap"), Dtype::F16)
 }
 
 fn tetrahedron() -> Result<Mesh> {

@@ -1,8 +1,8 @@
 """Reads files that the Rust side wrote with Python's own ``mcap`` and protobuf packages.
 
-Make the files with ``cargo run -p semfm-views --example write_sample_files -- FOLDER``, install
-``mcap mcap-protobuf-support numpy lz4 zstandard``, then run ``SEMFM_SAMPLES=FOLDER pytest
-check_mcap.py`` or ``python check_mcap.py FOLDER``.
+Make the files with ``cargo run -p semfm-views --example write_sample_files -- FOLDER`` and ``cargo run
+-p semfm-show --example write_sample_scene -- FOLDER``, install ``mcap mcap-protobuf-support numpy lz4
+zstandard``, then run ``SEMFM_SAMPLES=FOLDER pytest check_mcap.py`` or ``python check_mcap.py FOLDER``.
 """
 
 import json

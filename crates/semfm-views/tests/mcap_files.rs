@@ -1,4 +1,4 @@
-//! Views, embeddings and scenes there and back, and what their readers refuse.
+//! Views and embeddings there and back, and what their readers refuse.
 #![cfg(feature = "mcap")]
 
 use std::collections::BTreeMap;
@@ -10,9 +10,8 @@ use prost::Message as _;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, METADATA_NAME, Scene, SceneLabel, SceneLink,
-    SceneMesh, SceneNumbers, ScenePicture, ScenePoints, ViewsFile, ViewsMetadata, inspect,
-    read_bytes, read_messages, read_view, write_views,
+    Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsFile, ViewsMetadata, inspect, read_bytes,
+    read_messages, read_view, write_views,
 };
 use semfm_views::{EmbeddedView, Error, PatchEmbeddings, PatchGrid, View};
 
@@ -403,88 +402,6 @@ fn metadata_that_miss_or_contradict_are_refused() {
         let error = EmbeddingsFile::read(&changed).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
-}
-
-#[test]
-fn a_scene_holds_its_meshes_clouds_and_frames() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("transfer.mcap");
-    let mesh = mesh();
-    let colors = [[1, 2, 3]; 4];
-    let shown = |topic, frame_id| SceneMesh {
-        topic,
-        frame_id,
-        name: "mesh",
-        vertices: mesh.vertices(),
-        faces: mesh.faces(),
-        colors: Some(&colors),
-    };
-    let cloud = ScenePoints {
-        topic: "/target/cloud",
-        frame_id: "target",
-        points: mesh.vertices(),
-        colors: &colors,
-        numbers: &[("weight", SceneNumbers::F32(&[0.5; 4]))],
-    };
-    let rendered = views().swap_remove(0);
-    let scene = Scene {
-        meshes: vec![shown("/source/mesh", "source"), shown("/target/mesh", "target")],
-        clouds: vec![cloud],
-        labels: vec![SceneLabel {
-            topic: "/labels",
-            frame_id: "target",
-            at: None,
-            text: "target".to_owned(),
-            color: [0; 3],
-        }],
-        links: vec![SceneLink {
-            topic: "/matches",
-            from: ("source", DVec3::ZERO),
-            to: ("target", DVec3::X),
-            color: [9; 3],
-        }],
-        pictures: vec![ScenePicture { frame_id: "source", name: "view", view: &rendered }],
-        ..Default::default()
-    };
-    let about = serde_json::json!({"verdict": "accept"});
-    scene.write(&path, "semfm.transfer/1", &about).unwrap();
-    let mut shifts = BTreeMap::new();
-    let contents = read_messages(&path, |message| {
-        if message.channel.topic == "/tf" {
-            let transform = FrameTransform::decode(message.data).unwrap();
-            shifts.insert(transform.child_frame_id, transform.translation.unwrap().x);
-        }
-        Ok(())
-    })
-    .unwrap();
-    // Two meshes, a cloud, a label, links, a camera, a picture, three frames.
-    assert_eq!(contents.n_messages(), 10);
-    let (name, entries) = &contents.metadata[0];
-    assert_eq!(
-        (name.as_str(), entries["json"].as_str()),
-        (METADATA_NAME, r#"{"verdict":"accept"}"#)
-    );
-    // One wide each, a quarter apart.
-    assert_eq!((shifts["source"], shifts["target"]), (0.0, 1.25));
-    let short = SceneNumbers::F32(&[0.5; 3]);
-    let spoil: [fn(&mut Scene<'_>); 3] = [
-        |scene| scene.meshes[0].colors = Some(&[[0; 3]; 3]),
-        |scene| scene.labels[0].frame_id = "elsewhere",
-        |scene| scene.links[0].to.0 = "elsewhere",
-    ];
-    for spoil in spoil {
-        let mut bad = scene.clone();
-        spoil(&mut bad);
-        assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
-    }
-    let mut dark = rendered.clone();
-    dark.rgb.clear();
-    let pictures = vec![ScenePicture { view: &dark, ..scene.pictures[0] }];
-    let bad = Scene { pictures, ..scene.clone() };
-    assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
-    let numbers = [("weight", short)];
-    let bad = Scene { clouds: vec![ScenePoints { numbers: &numbers, ..cloud }], ..scene.clone() };
-    assert!(bad.write(&path, "semfm.transfer/1", &about).is_err());
 }
 
 /// One file of each kind, as bytes.

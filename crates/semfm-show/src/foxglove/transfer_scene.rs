@@ -11,13 +11,14 @@ use std::path::Path;
 use semfm::fmap::Hypothesis;
 use semfm::geom::math::DVec3;
 use semfm::geom::sampling::farthest_points;
-use semfm::views::mcap::{
-    Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
-    ScenePoints, Severity,
-};
 use semfm::views::{RenderSettings, SurfaceColor, View, render};
 use semfm::{Mesh, Region, Task, Verdict};
 
+use super::items::{
+    NamedNumbers, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers,
+    ScenePicture, ScenePoint, ScenePoints, Severity,
+};
+use super::scene::FoxgloveScene;
 use crate::Result;
 use crate::colors::{anchor_color, color_bytes, weight_colors};
 use crate::pictures::{ObjectFigure, TransferFigure};
@@ -69,7 +70,7 @@ pub(crate) fn write_transfer_scene(
     let (in_source, in_target) = (source.cloud_numbers(), target.cloud_numbers());
     let places = other_places(figure);
 
-    let mut scene = Scene::default();
+    let mut scene = FoxgloveScene::default();
     source.add_to(&mut scene, &on_source, &in_source);
     target.add_to(&mut scene, &on_target, &in_target);
     places.iter().for_each(|place| place.add_to(&mut scene));
@@ -97,9 +98,6 @@ struct SceneObject<'a> {
     /// By cloud point.
     cloud_anchor: Vec<i32>,
 }
-
-/// A number for each vertex or point, with its name.
-type NamedNumbers<'a> = (&'a str, SceneNumbers<'a>);
 
 impl<'a> SceneObject<'a> {
     fn new(
@@ -129,25 +127,30 @@ impl<'a> SceneObject<'a> {
     }
 
     fn vertex_numbers(&self) -> Vec<NamedNumbers<'_>> {
-        let mut numbers = vec![
-            ("weight", SceneNumbers::F32(&self.weight)),
-            ("anchor", SceneNumbers::I32(&self.anchor)),
+        let mut named = vec![
+            NamedNumbers { name: "weight", numbers: SceneNumbers::F32(&self.weight) },
+            NamedNumbers { name: "anchor", numbers: SceneNumbers::I32(&self.anchor) },
         ];
-        numbers.extend(self.source_vertex.map(|ids| ("source_vertex", SceneNumbers::U32(ids))));
-        numbers
+        if let Some(ids) = self.source_vertex {
+            let numbers = SceneNumbers::U32(ids);
+            named.push(NamedNumbers { name: "source_vertex", numbers });
+        }
+        named
     }
 
     fn cloud_numbers(&self) -> [NamedNumbers<'_>; 3] {
+        let clusters = SceneNumbers::U32(&self.figure.anchors.cluster_of_point);
+        let n_views = SceneNumbers::U32(self.figure.object.cloud.n_views());
         [
-            ("cluster", SceneNumbers::U32(&self.figure.anchors.cluster_of_point)),
-            ("anchor", SceneNumbers::I32(&self.cloud_anchor)),
-            ("n_views", SceneNumbers::U32(self.figure.object.cloud.n_views())),
+            NamedNumbers { name: "cluster", numbers: clusters },
+            NamedNumbers { name: "anchor", numbers: SceneNumbers::I32(&self.cloud_anchor) },
+            NamedNumbers { name: "n_views", numbers: n_views },
         ]
     }
 
     fn add_to<'s>(
         &'s self,
-        scene: &mut Scene<'s>,
+        scene: &mut FoxgloveScene<'s>,
         vertex_numbers: &'s [NamedNumbers<'s>],
         cloud_numbers: &'s [NamedNumbers<'s>],
     ) {
@@ -230,7 +233,7 @@ impl OtherPlace {
         }
     }
 
-    fn add_to<'s>(&'s self, scene: &mut Scene<'s>) {
+    fn add_to<'s>(&'s self, scene: &mut FoxgloveScene<'s>) {
         scene.meshes.push(SceneMesh {
             topic: HYPOTHESES,
             frame_id: TARGET.frame,
@@ -287,8 +290,8 @@ fn matches<'s>(figure: &TransferFigure<'_>, colors: &[[u8; 3]]) -> Vec<SceneLink
             let matched = figure.transfer.point_map.source_of[i as usize];
             SceneLink {
                 topic: "/matches",
-                from: (TARGET.frame, target[i as usize]),
-                to: (SOURCE.frame, source[matched as usize]),
+                from: ScenePoint { frame_id: TARGET.frame, position: target[i as usize] },
+                to: ScenePoint { frame_id: SOURCE.frame, position: source[matched as usize] },
                 color: colors[i as usize],
             }
         })

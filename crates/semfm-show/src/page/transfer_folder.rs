@@ -186,7 +186,8 @@ fn colour_transfer_layer() -> Layer {
 fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     use semfm::geom::PointIndex;
     use semfm::views::Fault;
-    use semfm::views::mcap::read_cloud;
+
+    use crate::foxglove::{ColoredPoints, read_cloud};
 
     let path = folder.join("transfer.mcap");
     if !path.is_file() {
@@ -194,12 +195,15 @@ fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     }
     let mut colors = Vec::new();
     for (topic, mesh) in ["/source/cloud", "/target/cloud"].into_iter().zip(meshes) {
-        let (points, of_point) = match read_cloud(&path, topic) {
+        let ColoredPoints { points, colors: of_point } = match read_cloud(&path, topic) {
             Ok(Some(cloud)) => cloud,
             Ok(None) => return Ok(None),
             // A scene of millions of vertices is beyond the reader: that costs this layer, not the page.
-            Err(semfm::views::Error::Container { fault: Fault::OverLimit, .. }) => return Ok(None),
-            Err(error) => return Err(error.into()),
+            Err(Error::Semfm(semfm::Error::Views(semfm::views::Error::Container {
+                fault: Fault::OverLimit,
+                ..
+            }))) => return Ok(None),
+            Err(error) => return Err(error),
         };
         let index = PointIndex::new(&points)?;
         let of_vertex = mesh.vertices().iter().map(|&p| of_point[index.nearest(p).0]);

@@ -1,4 +1,4 @@
-//! MCAP files: views, embeddings and scenes, and the strict reader below them.
+//! MCAP files: views and embeddings, and the strict reader below them.
 //!
 //! A views file ([`write_views`], [`ViewsFile`]) holds Foxglove's well-known messages and opens in
 //! any viewer that knows those; an embeddings file ([`EmbeddingsFile`]) holds
@@ -20,7 +20,6 @@ mod metadata;
 mod pose_array;
 mod reader;
 mod record;
-mod scene;
 mod summary;
 mod topics;
 mod views_file;
@@ -35,10 +34,6 @@ pub use messages::{Colors, find_mesh, read_mesh};
 pub use metadata::{EmbeddingsMetadata, METADATA_NAME, MeshIdentity, ViewsMetadata};
 pub use pose_array::{POSES_TOPIC, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};
-pub use scene::{
-    Scene, SceneFrame, SceneLabel, SceneLink, SceneLog, SceneMesh, SceneNumbers, ScenePicture,
-    ScenePoints, Severity, read_cloud,
-};
 pub use topics::TF;
 pub use views_file::{ViewsFile, read_view, write_views};
 pub use writer::{ChunkCompression, McapWriter, write_mcap};

@@ -1,12 +1,8 @@
 //! What a scene is made of.
 
-use semfm_geom::math::{DMat3, DVec3};
-
-use super::super::messages::MeshEntity;
-use crate::View;
-
-/// The frame in which the frames of a scene stand side by side.
-pub(super) const WORLD: &str = "world";
+use semfm::geom::math::{DMat3, DVec3};
+use semfm::views::View;
+use semfm::views::mcap::messages::MeshEntity;
 
 /// How a frame stands in `world`.
 #[derive(Clone, Copy, Debug)]
@@ -53,12 +49,22 @@ pub struct ScenePoints<'a> {
     pub points: &'a [DVec3],
     /// sRGB colours (n).
     pub colors: &'a [[u8; 3]],
-    /// Named numbers (n each), to colour by.
-    pub numbers: &'a [(&'a str, SceneNumbers<'a>)],
+    /// Numbers (n each) to colour by.
+    pub numbers: &'a [NamedNumbers<'a>],
+}
+
+/// One number for each point, and its name.
+#[derive(Clone, Copy, Debug)]
+pub struct NamedNumbers<'a> {
+    /// Name, such as `weight`.
+    pub name: &'a str,
+    /// One number for each point.
+    pub numbers: SceneNumbers<'a>,
 }
 
 /// One number for each point.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum SceneNumbers<'a> {
     /// Single precision.
     F32(&'a [f32]),
@@ -78,7 +84,7 @@ impl SceneNumbers<'_> {
     }
 }
 
-/// Words in the scene.
+/// Text in the scene.
 #[derive(Clone, Debug)]
 pub struct SceneLabel<'a> {
     /// Topic.
@@ -87,7 +93,7 @@ pub struct SceneLabel<'a> {
     pub frame_id: &'a str,
     /// Where; above everything that the frame holds without.
     pub at: Option<DVec3>,
-    /// The words.
+    /// The text.
     pub text: String,
     /// sRGB.
     pub color: [u8; 3],
@@ -98,12 +104,21 @@ pub struct SceneLabel<'a> {
 pub struct SceneLink<'a> {
     /// Topic.
     pub topic: &'a str,
-    /// Frame and point where it begins.
-    pub from: (&'a str, DVec3),
-    /// Frame and point where it ends.
-    pub to: (&'a str, DVec3),
+    /// Where it begins.
+    pub from: ScenePoint<'a>,
+    /// Where it ends.
+    pub to: ScenePoint<'a>,
     /// sRGB.
     pub color: [u8; 3],
+}
+
+/// A point in a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct ScenePoint<'a> {
+    /// The frame.
+    pub frame_id: &'a str,
+    /// In the frame's coordinates.
+    pub position: DVec3,
 }
 
 /// A picture with its camera: topics `/FRAME/NAME/image` and `/FRAME/NAME/camera`, frame
@@ -136,6 +151,6 @@ pub struct SceneLog<'a> {
     pub topic: &'a str,
     /// How grave it is.
     pub severity: Severity,
-    /// The words.
+    /// The text.
     pub text: String,
 }

@@ -3,10 +3,11 @@
 use foxglove::messages::line_primitive::Type as LineType;
 use foxglove::messages::log::Level;
 use foxglove::messages::{LinePrimitive, Log, SceneEntity, TextPrimitive};
-use semfm_geom::math::DVec3;
+use semfm::geom::math::DVec3;
+use semfm::views::mcap::messages::{color, point, pose_at, scene_entity, timestamp};
 
-use super::super::messages::{color, point, pose_at, scene_entity, timestamp};
-use super::items::{SceneLabel, SceneLog, Severity, WORLD};
+use super::items::{SceneLabel, SceneLog, Severity};
+use super::layout::WORLD;
 
 /// Height of labels in pixels of the screen.
 const FONT: f64 = 16.0;
@@ -32,17 +33,20 @@ pub(super) fn text_entity(
     SceneEntity { texts: vec![text], ..scene_entity(frame_id, id) }
 }
 
-/// A piece of line in the world and its colour.
-pub(super) type Segment = ([DVec3; 2], [u8; 3]);
+/// A piece of line in the world.
+pub(super) struct Segment {
+    pub ends: [DVec3; 2],
+    pub color: [u8; 3],
+}
 
 pub(super) fn segments_entity(segments: &[Segment]) -> SceneEntity {
-    let colors = segments.iter().flat_map(|&(_, rgb)| [color(rgb, LINK_ALPHA); 2]);
+    let colors = segments.iter().flat_map(|segment| [color(segment.color, LINK_ALPHA); 2]);
     let lines = LinePrimitive {
         r#type: LineType::LineList.into(),
         pose: Some(pose_at(DVec3::ZERO)),
         thickness: THICKNESS,
         scale_invariant: true,
-        points: segments.iter().flat_map(|(ends, _)| ends.map(point)).collect(),
+        points: segments.iter().flat_map(|segment| segment.ends.map(point)).collect(),
         color: Some(color([128; 3], LINK_ALPHA)),
         colors: colors.collect(),
         indices: Vec::new(),
