@@ -156,12 +156,12 @@ mod tests {
         let objects: Vec<String> = (0..5).map(|i| i.to_string()).collect();
         let pairs = all_pairs(&objects);
         let values: Vec<Option<f64>> = (0..pairs.len()).map(|i| Some(i as f64)).collect();
-        let interval = |seed| {
+        let [first, again, other] = [3, 3, 4].map(|seed| {
             let settings = BootstrapSettings { seed, ..BootstrapSettings::default() };
             PairDraws::new(&pairs, &settings).interval(|w| weighted_mean(&values, w))
-        };
-        assert_eq!(interval(3), interval(3));
-        assert_ne!(interval(3), interval(4));
+        });
+        assert_eq!(first, again);
+        assert_ne!(first, other);
         let draws = PairDraws::new(&pairs, &BootstrapSettings::default());
         assert_eq!(draws.interval(|w| weighted_mean(&vec![None; pairs.len()], w)), None);
     }

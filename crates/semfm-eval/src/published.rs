@@ -87,9 +87,9 @@ mod tests {
 
     #[test]
     fn the_means_are_those_that_the_paper_states() {
-        let mean = |rows: &[PublishedRow], name: &str| {
+        fn mean(rows: &[PublishedRow], name: &str) -> f64 {
             rows.iter().find(|row| row.method == name).unwrap().mean()
-        };
+        }
         assert!((mean(&IOU, "SemFM") - 0.632).abs() < 5e-4);
         assert!((mean(&IOU, "FM-WKS") - 0.085).abs() < 5e-4);
         assert!((mean(&IOU, "VLM (6 POV)") - 0.637).abs() < 5e-4);

@@ -61,9 +61,11 @@ impl Results {
     ) -> Self {
         let table = ScoreTable::new(&rows);
         let (summaries, differences) = (table.summaries(bootstrap), table.differences(bootstrap));
-        let of =
-            |method: &str| Calibration::of(method, rows.iter().filter(|row| row.method == method));
-        let calibration = table.methods.iter().filter_map(|method| of(method)).collect();
+        let mut calibration = Vec::new();
+        for method in &table.methods {
+            let own = rows.iter().filter(|row| row.method == *method);
+            calibration.extend(Calibration::of(method, own));
+        }
         let (format, bootstrap) = (FORMAT.into(), *bootstrap);
         Self { format, about, bootstrap, objects, summaries, differences, calibration, rows }
     }
@@ -140,9 +142,8 @@ pub(crate) mod tests {
     use crate::row::Failure;
     use std::collections::BTreeMap;
 
-    /// Two pairs of cups, three methods, one failure.
-    pub(crate) fn some_results() -> Results {
-        let row = |source: &str, target: &str, method: &str, iou: Option<f64>| Row {
+    fn row(source: &str, target: &str, method: &str, iou: Option<f64>) -> Row {
+        Row {
             group: "cups".into(),
             category: "cups".into(),
             source: source.into(),
@@ -154,7 +155,11 @@ pub(crate) mod tests {
             stages_ms: BTreeMap::from([("fit".to_owned(), 3.5)]),
             matching_ms: Some(3.5),
             ..Row::default()
-        };
+        }
+    }
+
+    /// Two pairs of cups, three methods, one failure.
+    pub(crate) fn some_results() -> Results {
         let rows = vec![
             row("a", "b", "fused", Some(0.7)),
             row("a", "b", "nearest", None),

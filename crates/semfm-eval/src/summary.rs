@@ -372,13 +372,12 @@ mod tests {
     use super::*;
 
     fn row(category: &str, pair: (&str, &str), method: &str, iou: Option<f64>) -> Row {
-        let name = |n: &str| n.to_owned();
         Row {
             group: format!("{category} things"),
-            category: name(category),
-            source: name(pair.0),
-            target: name(pair.1),
-            method: name(method),
+            category: category.to_owned(),
+            source: pair.0.to_owned(),
+            target: pair.1.to_owned(),
+            method: method.to_owned(),
             iou,
             failure: iou.is_none().then(|| crate::row::Failure::new("object", "gone")),
             ..Row::default()

@@ -17,8 +17,11 @@ pub struct Workers {
 impl Workers {
     /// `threads` in all (0: one for each core), `jobs` pairs at once (0: one for each thread).
     pub fn new(threads: usize, jobs: usize) -> Self {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let all = if threads == 0 { cores() } else { threads };
+        let all = if threads == 0 {
+            std::thread::available_parallelism().map_or(1, usize::from)
+        } else {
+            threads
+        };
         let jobs = if jobs == 0 { all } else { jobs };
         Self { jobs, threads: (all / jobs).max(1) }
     }
@@ -70,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn answers_come_in_order_and_the_first_failure_is_told() {
+    fn answers_come_in_order_and_the_first_failure_is_returned() {
         let workers = Workers::new(3, 3);
         assert_eq!(workers.each(20, |i| Ok(i * i)).unwrap()[19], 361);
         assert!(workers.each(0, Ok).unwrap().is_empty());

@@ -2,7 +2,8 @@
 
 use super::context::{Context, in_words};
 use super::html::{Cell, Table, escape, plot};
-use super::plots::{DrawError, against_views};
+use super::plots::DrawError;
+use super::plots::against_views::{self, AtViews};
 use crate::dataset::DatasetOrigin;
 use crate::published::{self, PublishedRow};
 use crate::summary::{Scope, Summary, is_bound};
@@ -185,17 +186,17 @@ fn by_views(
     context: &Context<'_>,
     category: &str,
     of: impl Fn(&Summary) -> Option<f64>,
-) -> Vec<(f64, f64)> {
-    let mut points: Vec<(f64, f64)> = context
-        .methods
-        .iter()
-        .filter_map(|&method| {
-            let vlm = context.rows_of(method).find_map(|row| row.vlm.as_ref())?;
-            let summary = context.summary(&Scope::Category(category.into()), method)?;
-            Some((vlm.n_views as f64, of(summary).filter(|_| vlm.real_model)?))
-        })
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+) -> Vec<AtViews> {
+    let mut points = Vec::new();
+    for &method in &context.methods {
+        let vlm = context.rows_of(method).find_map(|row| row.vlm.as_ref());
+        let summary = context.summary(&Scope::Category(category.into()), method);
+        if let Some((vlm, summary)) = vlm.filter(|vlm| vlm.real_model).zip(summary) {
+            let value = of(summary);
+            points.extend(value.map(|value| AtViews { n_views: vlm.n_views as f64, value }));
+        }
+    }
+    points.sort_by(|a, b| a.n_views.total_cmp(&b.n_views));
     points
 }
 
@@ -246,7 +247,9 @@ fn panels(
     for (place, category) in published::CATEGORIES.iter().enumerate() {
         let column = context.paper_columns[place];
         let ours = |method: &str| of(context.summary(&Scope::Category(column?.into()), method)?);
-        let models = quoted.iter().filter_map(|row| Some((row.n_views? as f64, row.values[place])));
+        let models = quoted.iter().filter_map(|row| {
+            Some(AtViews { n_views: row.n_views? as f64, value: row.values[place] })
+        });
         let quoted_semfm = quoted.iter().find(|row| row.method == "SemFM");
         panels.push(against_views::Panel {
             title: format!("C. {} {category}", place + 1),

@@ -16,13 +16,25 @@ const APART: i32 = 12;
 /// One category.
 pub(in crate::report) struct Panel {
     pub title: String,
-    /// (views, value) of the paper's model.
-    pub quoted_model: Vec<(f64, f64)>,
+    /// The paper's model.
+    pub quoted_model: Vec<AtViews>,
     pub quoted_semfm: Option<f64>,
-    /// (views, value) of a model that was asked in this run.
-    pub model: Vec<(f64, f64)>,
+    /// A model that was asked in this run.
+    pub model: Vec<AtViews>,
     pub lead: Option<f64>,
     pub second: Option<f64>,
+}
+
+/// A value at a number of views.
+pub(in crate::report) struct AtViews {
+    pub n_views: f64,
+    pub value: f64,
+}
+
+impl AtViews {
+    fn point(&self) -> (f64, f64) {
+        (self.n_views, self.value)
+    }
 }
 
 /// What the vertical axis shows.
@@ -35,6 +47,13 @@ pub(in crate::report) enum Scale {
 }
 
 impl Scale {
+    fn axis_label(self, value: f64) -> String {
+        match self {
+            Self::Share => number(Some(value), 1),
+            Self::Seconds => format!("{value}"),
+        }
+    }
+
     fn write(self, value: f64) -> String {
         match self {
             Self::Share => number(Some(value), 2),
@@ -42,6 +61,14 @@ impl Scale {
             Self::Seconds if value >= 1.0 => format!("{value:.1} s"),
             Self::Seconds => format!("{value:.2} s"),
         }
+    }
+}
+
+/// The numbers of views in the paper.
+fn views_label(x: f64) -> String {
+    match x.round() as i64 {
+        n @ (1 | 3 | 6) if (x - x.round()).abs() < 1e-9 => n.to_string(),
+        _ => String::new(),
     }
 }
 
@@ -64,7 +91,7 @@ pub(in crate::report) fn draw(panels: &[Panel], scale: Scale) -> Result<String, 
 /// Powers of ten around all values.
 fn decades(panels: &[Panel]) -> [f64; 2] {
     let all = panels.iter().flat_map(|p| {
-        let points = p.quoted_model.iter().chain(&p.model).map(|point| point.1);
+        let points = p.quoted_model.iter().chain(&p.model).map(|point| point.value);
         points.chain([p.quoted_semfm, p.lead, p.second].into_iter().flatten())
     });
     let (low, high) = all
@@ -85,14 +112,6 @@ where
         .x_label_area_size(34)
         .y_label_area_size(46)
         .build_cartesian_2d(0.5..6.5, y)?;
-    let views = |x: &f64| match x.round() as i64 {
-        n @ (1 | 3 | 6) if (x - x.round()).abs() < 1e-9 => n.to_string(),
-        _ => String::new(),
-    };
-    let label = |value: &f64| match scale {
-        Scale::Share => number(Some(*value), 1),
-        Scale::Seconds => format!("{value}"),
-    };
     chart
         .configure_mesh()
         .disable_x_mesh()
@@ -101,8 +120,8 @@ where
         .axis_style(SOFT_INK)
         .x_labels(7)
         .y_labels(if scale == Scale::Share { 6 } else { 4 })
-        .x_label_formatter(&views)
-        .y_label_formatter(&label)
+        .x_label_formatter(&|x| views_label(*x))
+        .y_label_formatter(&|value| scale.axis_label(*value))
         .x_desc("views")
         .label_style(font(11.0))
         .axis_desc_style(font(11.0))
@@ -118,13 +137,13 @@ where
         chart.draw_series(dashes((0.5, value), (6.5, value), dash, gap, style))?;
     }
     for (points, color) in [(&panel.quoted_model, QUOTED_VLM), (&panel.model, EXTRA)] {
-        chart.draw_series(LineSeries::new(points.iter().copied(), ink(color).stroke_width(2)))?;
+        let points = points.iter().map(AtViews::point);
+        chart.draw_series(LineSeries::new(points.clone(), ink(color).stroke_width(2)))?;
+        let fill = ink(color).filled();
         if color == EXTRA {
-            let mark = |&point: &(f64, f64)| TriangleMarker::new(point, 5, ink(color).filled());
-            chart.draw_series(points.iter().map(mark))?;
+            chart.draw_series(points.map(|point| TriangleMarker::new(point, 5, fill)))?;
         } else {
-            let mark = |&point: &(f64, f64)| Circle::new(point, 4, ink(color).filled());
-            chart.draw_series(points.iter().map(mark))?;
+            chart.draw_series(points.map(|point| Circle::new(point, 4, fill)))?;
         }
     }
     let known = across.iter().filter_map(|&(value, color, _)| {

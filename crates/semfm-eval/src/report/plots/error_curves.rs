@@ -43,10 +43,10 @@ pub(in crate::report) fn draw(methods: &[Vec<f64>], high: f64) -> Result<String,
 fn staircase(values: &[f64], high: f64) -> Vec<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    let share = |count: usize| count as f64 / sorted.len().max(1) as f64;
+    let n = sorted.len().max(1) as f64;
     let mut corners = vec![(0.0, 0.0)];
     for (before, &x) in sorted.iter().enumerate().take_while(|(_, x)| **x <= high) {
-        corners.extend([(x, share(before)), (x, share(before + 1))]);
+        corners.extend([(x, before as f64 / n), (x, (before + 1) as f64 / n)]);
     }
     let end = corners.last().map_or(0.0, |corner| corner.1);
     corners.push((high, end));

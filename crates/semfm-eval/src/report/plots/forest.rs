@@ -53,8 +53,8 @@ pub(in crate::report) fn draw(lines: &[Line]) -> Result<String, DrawError> {
                 (_, true) => SOFT_INK,
                 _ => TEXT_INK,
             };
-            let dot = |&x: &f64| Circle::new((x, y), 3, SOFT_INK.mix(0.45).filled());
-            chart.draw_series(line.groups.iter().map(dot))?;
+            let faint = SOFT_INK.mix(0.45).filled();
+            chart.draw_series(line.groups.iter().map(|&x| Circle::new((x, y), 3, faint)))?;
             if let Some([low, high]) = line.interval {
                 let bar = PathElement::new(vec![(low, y), (high, y)], color.stroke_width(3));
                 chart.draw_series([bar])?;
