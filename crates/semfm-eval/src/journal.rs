@@ -9,15 +9,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::row::{ObjectRow, Row};
+use crate::variant::Override;
 use crate::{Error, Result};
 
 /// The file in the output folder.
 pub const FILE: &str = "journal.jsonl";
 
 /// Everything that rows depend on. Two runs with the same identity give the same rows.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunIdentity {
     /// Name and version of this format.
     pub format: String,
@@ -29,27 +31,60 @@ pub struct RunIdentity {
     pub embeddings: String,
     /// The methods, in order.
     pub methods: Vec<String>,
-    /// All settings, in words.
-    pub settings: String,
+    /// All settings that methods and objects share.
+    pub settings: RunSettings,
+}
+
+/// The settings of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunSettings {
+    /// Seed of everything drawn by chance.
+    pub seed: u64,
+    /// Working mesh, Laplacian and basis: [`semfm::geom::ShapeSettings`] as JSON.
+    pub shape: serde_json::Value,
+    /// Settings of methods that are changed.
+    pub overrides: Vec<Override>,
 }
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.eval-journal/1";
 
 impl RunIdentity {
-    /// The first difference: what, then, now.
-    fn difference(&self, now: &Self) -> Option<(&'static str, String, String)> {
-        let differ = |what, before: &str, now: &str| {
-            (before != now).then(|| (what, before.to_owned(), now.to_owned()))
-        };
-        differ("journal format", &self.format, &now.format)
-            .or_else(|| differ("program", &self.program, &now.program))
-            .or_else(|| differ("dataset", &self.dataset, &now.dataset))
-            .or_else(|| differ("source of features", &self.embeddings, &now.embeddings))
-            .or_else(|| {
-                differ("choice of methods", &self.methods.join(","), &now.methods.join(","))
-            })
-            .or_else(|| differ("choice of settings", &self.settings, &now.settings))
+    /// The first difference to another run.
+    fn difference(&self, now: &Self) -> Option<Difference> {
+        let (then_settings, now_settings) = (&self.settings, &now.settings);
+        let changes = [
+            Difference::of("journal format", &self.format, &now.format),
+            Difference::of("program", &self.program, &now.program),
+            Difference::of("dataset", &self.dataset, &now.dataset),
+            Difference::of("source of features", &self.embeddings, &now.embeddings),
+            Difference::of("choice of methods", &self.methods.join(","), &now.methods.join(",")),
+            Difference::of(
+                "choice of settings",
+                &format!("seed {}", then_settings.seed),
+                &format!("seed {}", now_settings.seed),
+            ),
+            Difference::of(
+                "choice of settings",
+                &json!(then_settings).to_string(),
+                &json!(now_settings).to_string(),
+            ),
+        ];
+        changes.into_iter().flatten().next()
+    }
+}
+
+/// In what two runs differ.
+struct Difference {
+    what: &'static str,
+    before: String,
+    now: String,
+}
+
+impl Difference {
+    fn of(what: &'static str, before: &str, now: &str) -> Option<Self> {
+        let (before, now) = (before.to_owned(), now.to_owned());
+        (before != now).then_some(Self { what, before, now })
     }
 }
 
@@ -138,7 +173,7 @@ fn read(path: &Path, text: &str, run: &RunIdentity) -> Result<(u64, Vec<Line>)> 
             let before: RunIdentity = serde_json::from_str(line).map_err(|error| {
                 Error::format(path, "line 1", "the identity of a run", error.to_string())
             })?;
-            if let Some((what, before, now)) = before.difference(run) {
+            if let Some(Difference { what, before, now }) = before.difference(run) {
                 return Err(Error::OtherRun { path: path.into(), what: what.into(), before, now });
             }
         } else {
@@ -162,7 +197,7 @@ mod tests {
             dataset: "d".into(),
             embeddings: "e".into(),
             methods: methods.iter().map(|&m| m.into()).collect(),
-            settings: "s".into(),
+            settings: RunSettings::default(),
         }
     }
 
@@ -172,11 +207,13 @@ mod tests {
     }
 
     fn numbers(lines: &[Line]) -> Vec<usize> {
-        let number = |line: &Line| match line {
-            Line::Pair(done) => Some(done.pair),
-            Line::Object(_) => None,
-        };
-        lines.iter().filter_map(number).collect()
+        let mut numbers = Vec::new();
+        for line in lines {
+            if let Line::Pair(done) = line {
+                numbers.push(done.pair);
+            }
+        }
+        numbers
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! Objects made ready once, for all pairs and methods of a group.
+//! Labelled objects prepared once, for all pairs and methods of a group.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 use semfm::fmap::PreparedObject;
-use semfm::fmap::clusters::{ClusterSettings, Clusters, spectral_clusters};
+use semfm::fmap::clusters::ClusterSettings;
 use semfm::geom::{SemanticCloud, Shape, ShapeCache, ShapeSettings};
 use semfm::pipeline::semantic_cloud;
 use semfm::{Meaning, Region, Task};
@@ -16,59 +16,53 @@ use crate::row::{Failure, ObjectRow};
 use crate::variant::Features;
 use crate::{Error, Result};
 
-/// Or why not.
-pub(crate) type Tried<T> = std::result::Result<T, Failure>;
+/// A value, or why the rows that need it have no score.
+pub(crate) type Attempt<T> = std::result::Result<T, Failure>;
 
-/// What preparing needs besides the object.
+/// How objects are prepared.
 pub(crate) struct Preparation<'a> {
     pub embeddings: &'a EmbeddingSource<'a>,
     pub shape: &'a ShapeSettings,
     pub cache: &'a ShapeCache,
     pub seed: u64,
-    /// The features that some variant asks for.
-    pub wanted: &'a BTreeSet<Features>,
+    /// The features that some method needs, with the clusters that methods need of them.
+    pub wanted: &'a BTreeMap<Features, Vec<ClusterSettings>>,
 }
 
-/// One object: its truth, its shape, and its meaning in each sense that is wanted.
+/// An object with its true region, prepared for each kind of features.
 pub(crate) struct EvalObject {
     pub truth: Region,
     /// Area of each vertex as read.
     pub areas: Vec<f64>,
-    pub about: ObjectRow,
-    shape: Tried<Option<Arc<Shape>>>,
-    meanings: BTreeMap<Features, Tried<Seen>>,
+    pub row: ObjectRow,
+    prepared: BTreeMap<Features, Attempt<TimedObject>>,
 }
 
-/// An object's meaning in one sense.
-struct Seen {
-    cloud: Arc<SemanticCloud>,
-    clusters: Arc<Clusters>,
-    times: BTreeMap<&'static str, f64>,
+/// A prepared object and the milliseconds that each stage took, made cold.
+pub(crate) struct TimedObject {
+    pub object: PreparedObject,
+    /// Views, encoder, lifting, shape, and what follows from cloud and shape.
+    stages_ms: BTreeMap<&'static str, f64>,
+    /// Only methods that use clusters are charged for them.
+    clusters_ms: Vec<(ClusterSettings, f64)>,
 }
-
-/// An object ready to be matched, in each sense.
-pub(crate) type Ready = BTreeMap<Features, Tried<(PreparedObject, f64)>>;
 
 impl EvalObject {
     /// Loads and prepares an object. `part_names` are those of the whole group, so that all its
     /// objects have features of one dimension.
     ///
     /// # Errors
-    /// Only cancellation: whatever is wrong with the object is told by its pairs.
+    /// Only cancellation: what is wrong with the object stands in its pairs' rows.
     pub fn new(
         entry: &ObjectEntry,
-        object: Tried<LabelledObject>,
+        object: &LabelledObject,
         part_names: &[String],
         preparation: &Preparation<'_>,
         task: &Task,
-    ) -> Result<Tried<Self>> {
+    ) -> Result<Self> {
         task.check()?;
-        let object = match object {
-            Ok(object) => object,
-            Err(failure) => return Ok(Err(failure)),
-        };
         let mesh = object.mesh();
-        let mut about = ObjectRow {
+        let mut row = ObjectRow {
             name: entry.name.clone(),
             category: entry.category.clone(),
             mesh: mesh.hash().to_string(),
@@ -78,99 +72,124 @@ impl EvalObject {
             parts: object.parts.keys().cloned().collect(),
             ..ObjectRow::default()
         };
-        let mut meanings = BTreeMap::new();
-        for &features in preparation.wanted {
-            let seen = see(entry, &object, features, part_names, preparation, &mut about, task);
-            meanings.insert(features, tried("features", seen)?);
+        let mut clouds = BTreeMap::new();
+        for &features in preparation.wanted.keys() {
+            let cloud = timed_cloud(entry, object, features, part_names, preparation, task);
+            clouds.insert(features, attempt("features", cloud)?);
         }
-        let shape = if preparation.wanted.is_empty() {
-            Ok(None)
-        } else {
+        if let Some(Ok(cloud)) = clouds.get(&Features::Ours) {
+            (row.encoder, row.rolls, row.seen) = (cloud.encoder.clone(), cloud.rolls, cloud.seen);
+        }
+        let mut prepared = BTreeMap::new();
+        if !clouds.is_empty() {
             let made = preparation.cache.shape(mesh.clone(), preparation.shape, task);
-            tried("object", made.map(|made| Some(Arc::new(made.shape))).map_err(Error::from))?
-        };
-        Ok(Ok(Self { areas: mesh.vertex_areas(), truth: object.truth, about, shape, meanings }))
-    }
-
-    /// Everything that does not depend on the partner, with the milliseconds it took.
-    ///
-    /// # Errors
-    /// Only cancellation.
-    pub fn ready(&self, task: &Task) -> Result<Ready> {
-        let mut ready = Ready::new();
-        for (&features, seen) in &self.meanings {
-            ready.insert(features, self.ready_by(seen, task)?);
+            let made = made.map(|made| Arc::new(made.shape)).map_err(Error::from);
+            let shape = attempt("object", made)?;
+            for (features, cloud) in clouds {
+                let clusters = &preparation.wanted[&features];
+                let timed = match (&shape, cloud) {
+                    (Ok(shape), Ok(cloud)) => {
+                        attempt("object", TimedObject::new(shape, cloud, clusters, task))?
+                    }
+                    (Err(failure), _) => Err(failure.clone()),
+                    (_, Err(failure)) => Err(failure),
+                };
+                prepared.insert(features, timed);
+            }
         }
-        Ok(ready)
+        Ok(Self { areas: mesh.vertex_areas(), truth: object.truth.clone(), row, prepared })
     }
 
-    fn ready_by(&self, seen: &Tried<Seen>, task: &Task) -> Result<Tried<(PreparedObject, f64)>> {
-        let (shape, seen) = match (&self.shape, seen) {
-            (Ok(Some(shape)), Ok(seen)) => (shape, seen),
-            (Err(failure), _) | (_, Err(failure)) => return Ok(Err(failure.clone())),
-            (Ok(None), Ok(_)) => return Ok(Err(Failure::new("object", "no shape was made"))),
-        };
-        let start = Instant::now();
-        let prepared = PreparedObject::new(Arc::clone(shape), Arc::clone(&seen.cloud), task)
-            .and_then(|object| object.with_clusters(Arc::clone(&seen.clusters)));
-        let ms = start.elapsed().as_secs_f64() * 1e3;
-        tried("object", prepared.map(|prepared| (prepared, ms)).map_err(Error::from))
-    }
-
-    /// Milliseconds of each stage of its preparation, made cold, in one sense.
-    pub fn times(&self, features: Features) -> BTreeMap<&'static str, f64> {
-        let mut times = match self.meanings.get(&features) {
-            Some(Ok(seen)) => seen.times.clone(),
-            _ => BTreeMap::new(),
-        };
-        if let Ok(Some(shape)) = &self.shape {
-            // A shape from the cache remembers what its making took.
-            let made = shape.report().stages_ms;
-            times.insert("shape", made.working_mesh + made.laplacian + made.eigenbasis);
+    /// The object prepared with these features.
+    pub fn prepared(&self, features: Features) -> Attempt<&TimedObject> {
+        match self.prepared.get(&features) {
+            Some(prepared) => prepared.as_ref().map_err(Clone::clone),
+            None => Err(Failure::new("object", "was not prepared")),
         }
-        times
     }
 }
 
-/// The object's meaning in one sense: cloud and clusters.
-fn see(
+impl TimedObject {
+    fn new(
+        shape: &Arc<Shape>,
+        cloud: TimedCloud,
+        clusters: &[ClusterSettings],
+        task: &Task,
+    ) -> Result<Self> {
+        let mut stages_ms = cloud.stages_ms;
+        // A shape from the cache remembers what its making took.
+        let made = shape.report().stages_ms;
+        stages_ms.insert("shape", made.working_mesh + made.laplacian + made.eigenbasis);
+        let start = Instant::now();
+        let object = PreparedObject::new(Arc::clone(shape), cloud.cloud, task)?;
+        stages_ms.insert("prepare", milliseconds_since(start));
+        let mut clusters_ms = Vec::new();
+        for settings in clusters {
+            let start = Instant::now();
+            object.clusters(settings, task)?;
+            clusters_ms.push((*settings, milliseconds_since(start)));
+        }
+        Ok(Self { object, stages_ms, clusters_ms })
+    }
+
+    /// Milliseconds of each stage; `clusters` are those that the method uses.
+    pub fn stages_ms(&self, clusters: Option<&ClusterSettings>) -> BTreeMap<&'static str, f64> {
+        let mut stages_ms = self.stages_ms.clone();
+        let own = self.clusters_ms.iter().find(|(settings, _)| Some(settings) == clusters);
+        if let Some((_, ms)) = own {
+            stages_ms.insert("clusters", *ms);
+        }
+        stages_ms
+    }
+}
+
+/// An object's semantic cloud, where its features came from and what making it took.
+struct TimedCloud {
+    cloud: Arc<SemanticCloud>,
+    encoder: Option<String>,
+    rolls: Option<u32>,
+    /// Share of the samples that some view saw.
+    seen: Option<f64>,
+    stages_ms: BTreeMap<&'static str, f64>,
+}
+
+fn timed_cloud(
     entry: &ObjectEntry,
     object: &LabelledObject,
     features: Features,
     part_names: &[String],
     preparation: &Preparation<'_>,
-    about: &mut ObjectRow,
     task: &Task,
-) -> Result<Seen> {
-    let mut times = BTreeMap::new();
+) -> Result<TimedCloud> {
     let lift = features.lift(preparation.seed);
     let mesh = object.mesh();
-    let cloud = if features == Features::Parts {
+    if features == Features::Parts {
         let labels = part_features(object, part_names);
-        semantic_cloud(mesh, Meaning::PerVertex(&labels), &lift, task)?.0
-    } else {
-        let embedded = preparation.embeddings.views(entry, object, features.rolls(), task)?;
-        for (stage, ms) in [("views", embedded.views_ms), ("embed", embedded.embed_ms)] {
-            ms.and_then(|ms| times.insert(stage, ms));
+        let (cloud, _) = semantic_cloud(mesh, Meaning::PerVertex(&labels), &lift, task)?;
+        let (cloud, stages_ms) = (Arc::new(cloud), BTreeMap::new());
+        return Ok(TimedCloud { cloud, encoder: None, rolls: None, seen: None, stages_ms });
+    }
+    let embedded = preparation.embeddings.views(entry, object, features.rolls(), task)?;
+    let mut stages_ms = BTreeMap::new();
+    for (stage, ms) in [("views", embedded.views_ms), ("embed", embedded.embed_ms)] {
+        if let Some(ms) = ms {
+            stages_ms.insert(stage, ms);
         }
-        let start = Instant::now();
-        let (cloud, report) = semantic_cloud(mesh, Meaning::Views(&embedded.views), &lift, task)?;
-        times.insert("lift", start.elapsed().as_secs_f64() * 1e3);
-        if features == Features::Ours {
-            (about.encoder, about.rolls) = (Some(embedded.encoder), Some(embedded.rolls));
-            about.seen = report.map(|report| report.n_seen as f64 / cloud.n_points() as f64);
-        }
-        cloud
-    };
+    }
     let start = Instant::now();
-    let settings = ClusterSettings { seed: preparation.seed, ..ClusterSettings::default() };
-    let clusters = spectral_clusters(&cloud, &settings, task)?;
-    times.insert("clusters", start.elapsed().as_secs_f64() * 1e3);
-    Ok(Seen { cloud: Arc::new(cloud), clusters: Arc::new(clusters), times })
+    let (cloud, report) = semantic_cloud(mesh, Meaning::Views(&embedded.views), &lift, task)?;
+    stages_ms.insert("lift", milliseconds_since(start));
+    Ok(TimedCloud {
+        encoder: Some(embedded.encoder),
+        rolls: Some(embedded.rolls),
+        seen: report.map(|report| report.n_seen as f64 / cloud.n_points() as f64),
+        cloud: Arc::new(cloud),
+        stages_ms,
+    })
 }
 
-/// One-hot part labels (n × parts): the features of the upper bound. Where some object of the group names no
-/// parts, region and rest are the parts.
+/// One-hot part labels (n × parts): the features of the upper bound. Where some object of the group
+/// names no parts, region and rest are the parts.
 fn part_features(object: &LabelledObject, part_names: &[String]) -> Vec<f32> {
     let n = object.mesh().n_vertices();
     if part_names.is_empty() {
@@ -183,16 +202,20 @@ fn part_features(object: &LabelledObject, part_names: &[String]) -> Vec<f32> {
     }
     let d = part_names.len();
     let mut features = vec![0.0; n * d];
-    for (column, ids) in
-        part_names.iter().enumerate().filter_map(|(c, name)| Some((c, object.parts.get(name)?)))
-    {
-        ids.iter().for_each(|&id| features[id as usize * d + column] = 1.0);
+    for (column, name) in part_names.iter().enumerate() {
+        for &id in object.parts.get(name).into_iter().flatten() {
+            features[id as usize * d + column] = 1.0;
+        }
     }
     features
 }
 
-/// A failure to be told by the pairs; cancellation alone goes on upwards.
-pub(crate) fn tried<T>(kind: &str, result: Result<T>) -> Result<Tried<T>> {
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+/// A failure for the rows; cancellation alone goes on upwards.
+pub(crate) fn attempt<T>(kind: &str, result: Result<T>) -> Result<Attempt<T>> {
     match result {
         Ok(value) => Ok(Ok(value)),
         Err(error) if error.is_cancelled() => Err(error),

@@ -139,6 +139,7 @@ pub(crate) fn read_results<T: DeserializeOwned>(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::journal::RunSettings;
     use crate::row::Failure;
     use std::collections::BTreeMap;
 
@@ -176,7 +177,7 @@ pub(crate) mod tests {
             dataset: "blake3:1".into(),
             embeddings: "files".into(),
             methods: ["fused", "nearest", "oracle", "whole"].map(String::from).to_vec(),
-            settings: "seed 0".into(),
+            settings: RunSettings::default(),
         };
         let origin = DatasetOrigin::Folder { path: "cups".into() };
         let about = About { identity, origin, seed: 0 };

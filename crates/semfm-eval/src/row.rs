@@ -137,6 +137,13 @@ pub struct VlmDetails {
     pub tokens: serde_json::Value,
 }
 
+impl ObjectRow {
+    /// Category and name.
+    pub(crate) fn key(&self) -> (String, String) {
+        (self.category.clone(), self.name.clone())
+    }
+}
+
 impl Failure {
     pub(crate) fn new(kind: &str, text: impl ToString) -> Self {
         Self { kind: kind.into(), text: text.to_string() }

@@ -71,33 +71,26 @@ struct VlmFailure {
 /// [`Error::Io`]; [`Error::Format`] for another format, a pair that the dataset does not have,
 /// two rows for one question, or a region of another mesh.
 pub fn read(path: &Path, dataset: &Dataset) -> Result<Vec<Row>> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    let file: RowsFile = serde_json::from_slice(&bytes).map_err(|error| {
-        let place = format!("line {}, column {}", error.line(), error.column());
-        Error::format(path, place, "rows of a vision-language model", error.to_string())
-    })?;
-    if file.format != FORMAT {
-        return Err(Error::format(path, "format", FORMAT, file.format));
-    }
+    let file = read_file(path)?;
     let mut pairs = BTreeMap::new();
     for group in &dataset.groups {
-        for &(source, target) in &group.pairs {
-            let name = |place: usize| dataset.objects[place].name.as_str();
-            pairs.insert([&*group.name, name(source), name(target)], target);
+        for pair in &group.pairs {
+            let [source, target] = pair.both().map(|place| dataset.objects[place].name.as_str());
+            pairs.insert([group.name.as_str(), source, target], pair.target);
         }
     }
     // The rows of one target stand together, so that it is loaded once.
     let mut of_target = BTreeMap::<usize, Vec<(usize, VlmRow)>>::new();
     let mut seen = BTreeSet::new();
     for (number, row) in file.rows.into_iter().enumerate() {
-        let place = || format!("rows[{number}]");
+        let place = format!("rows[{number}]");
         let Some(&target) = pairs.get(&[&*row.group, &*row.source, &*row.target]) else {
             let found = format!("{}: {} → {}", row.group, row.source, row.target);
-            return Err(Error::format(path, place(), "a pair of the dataset", found));
+            return Err(Error::format(path, place, "a pair of the dataset", found));
         };
         let key = (method(&row), row.group.clone(), row.source.clone(), row.target.clone());
         if !seen.insert(key) {
-            return Err(Error::format(path, place(), "one row for each question", "a second"));
+            return Err(Error::format(path, place, "one row for each question", "a second"));
         }
         of_target.entry(target).or_default().push((number, row));
     }
@@ -124,17 +117,27 @@ pub fn read(path: &Path, dataset: &Dataset) -> Result<Vec<Row>> {
     Ok(scored.into_iter().map(|(_, row)| row).collect())
 }
 
-/// Keeps the regions of the file's rows beside the predictions of the other methods in `folder`, and
-/// tells `rows`, which [`read`] made of the same file, where they are.
-///
-/// # Errors
-/// As [`read`], and what cannot be written.
-pub fn keep(path: &Path, rows: &mut [Row], folder: &Path) -> Result<()> {
+fn read_file(path: &Path) -> Result<RowsFile> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
     let file: RowsFile = serde_json::from_slice(&bytes).map_err(|error| {
         let place = format!("line {}, column {}", error.line(), error.column());
         Error::format(path, place, "rows of a vision-language model", error.to_string())
     })?;
+    if file.format == FORMAT {
+        Ok(file)
+    } else {
+        Err(Error::format(path, "format", FORMAT, file.format))
+    }
+}
+
+/// Keeps the regions of the file's rows beside the predictions of the other methods in `folder`, and
+/// names their files in `rows`, which [`read`] made of the same file.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] where the file has changed since; [`Error::Facade`] for
+/// predictions that cannot be written.
+pub fn keep(path: &Path, rows: &mut [Row], folder: &Path) -> Result<()> {
+    let file = read_file(path)?;
     if file.rows.len() != rows.len() {
         let found = format!("{} rows", file.rows.len());
         return Err(Error::format(path, "rows", format!("{} as before", rows.len()), found));
@@ -207,8 +210,8 @@ fn score(
     };
     let nobody_answered = row.failure.as_ref().is_some_and(|failure| failure.of_endpoint);
     if !nobody_answered {
-        let nothing = || Region::from_mask(&vec![false; areas.len()]);
-        scored.score(&found.unwrap_or_else(nothing), truth, areas)?;
+        let found = found.unwrap_or_else(|| Region::from_mask(&vec![false; areas.len()]));
+        scored.score(&found, truth, areas)?;
     }
     Ok(scored)
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, Mesh, Result};
 
 /// How a mesh is cleaned.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct CleanSettings {
     /// A component is dust when its share of the surface area is below this; 0 keeps them all.
     ///

@@ -14,7 +14,7 @@ use crate::working::WorkingMesh;
 use crate::{Eigenbasis, Error, Mesh, Result, Task};
 
 /// How a [`Shape`] is prepared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ShapeSettings {
     /// Eigenpairs k.
     pub k: usize,

@@ -5,15 +5,16 @@
 //! no category; both are left out. `pairs.json` at the root (group → \[\[source, target\], …\]) chooses
 //! pairs; else each category's labelled objects form all ordered pairs.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::{MeshFormat, read_mesh};
 use semfm::region_file::read_region;
 use serde::Deserialize;
+use serde_json::json;
 
 use super::{
-    Dataset, DatasetOrigin, Group, LabelledObject, ObjectEntry, ObjectSource, ordered_pairs,
+    Dataset, DatasetOrigin, Group, LabelledObject, ObjectEntry, ObjectSource, Pair, ordered_pairs,
 };
 use crate::{Error, Result};
 
@@ -85,12 +86,14 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// The objects of a category folder that have a label.
 fn labelled(folder: &Path) -> Result<Vec<ObjectEntry>> {
-    let name_of = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let category =
         folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut objects: Vec<ObjectEntry> = Vec::new();
     for mesh in entries(folder)? {
-        let (label, Some(name)) = (mesh.with_extension("json"), name_of(&mesh)) else { continue };
+        let label = mesh.with_extension("json");
+        let Some(name) = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()) else {
+            continue;
+        };
         let is_mesh = mesh.is_file() && MeshFormat::from_path(&mesh).is_some();
         // One object in two formats counts once.
         let known = objects.last().is_some_and(|last| last.name == name);
@@ -121,58 +124,71 @@ fn chosen_pairs(path: &Path, objects: &[ObjectEntry]) -> Result<Vec<Group>> {
             let expected = "group → [[source, target], …]";
             Error::format(path, format!("line {}", error.line()), expected, error.to_string())
         })?;
-    let mut places = HashMap::<String, Vec<usize>>::new();
-    for (place, object) in objects.iter().enumerate() {
-        places.entry(object.name.clone()).or_default().push(place);
-        places.insert(format!("{}/{}", object.category, object.name), vec![place]);
-    }
-    let find = |group: &str, name: &str| match places.get(name).map(Vec::as_slice) {
-        Some([place]) => Ok(*place),
-        Some(_) => {
-            let expected = "CATEGORY/NAME, for several categories have this name";
-            Err(Error::format(path, group, expected, name))
-        }
-        None => Err(Error::format(path, group, "the name of a labelled object", name)),
-    };
+    let names = NamedPlaces::new(objects);
     let mut groups = Vec::new();
-    for (name, pairs) in listed {
-        let pairs = pairs.iter().map(|[source, target]| {
-            let pair = (find(&name, source)?, find(&name, target)?);
-            if pair.0 == pair.1 {
+    for (name, listed) in listed {
+        let mut pairs = Vec::new();
+        for [source, target] in &listed {
+            let pair = Pair {
+                source: names.find(path, &name, source)?,
+                target: names.find(path, &name, target)?,
+            };
+            if pair.source == pair.target {
                 let found = format!("{source} with itself");
                 return Err(Error::format(path, &name, "two different objects", found));
             }
-            Ok(pair)
-        });
-        groups.push(Group { pairs: pairs.collect::<Result<_>>()?, name });
+            pairs.push(pair);
+        }
+        groups.push(Group { name, pairs });
     }
     Ok(groups)
 }
 
+/// Places of objects by NAME and by CATEGORY/NAME.
+struct NamedPlaces(HashMap<String, Vec<usize>>);
+
+impl NamedPlaces {
+    fn new(objects: &[ObjectEntry]) -> Self {
+        let mut places = HashMap::<String, Vec<usize>>::new();
+        for (place, object) in objects.iter().enumerate() {
+            places.entry(object.name.clone()).or_default().push(place);
+            places.insert(format!("{}/{}", object.category, object.name), vec![place]);
+        }
+        Self(places)
+    }
+
+    /// The object that `group` in the file `path` names.
+    fn find(&self, path: &Path, group: &str, name: &str) -> Result<usize> {
+        match self.0.get(name).map(Vec::as_slice) {
+            Some([place]) => Ok(*place),
+            Some(_) => {
+                let expected = "CATEGORY/NAME, for several categories have this name";
+                Err(Error::format(path, group, expected, name))
+            }
+            None => Err(Error::format(path, group, "the name of a labelled object", name)),
+        }
+    }
+}
+
 /// Leaves out objects that no pair names, and numbers the rest anew.
-fn only_used(objects: Vec<ObjectEntry>, groups: Vec<Group>) -> (Vec<ObjectEntry>, Vec<Group>) {
-    let mut new_place = vec![None; objects.len()];
-    for &(source, target) in groups.iter().flat_map(|group| &group.pairs) {
-        (new_place[source], new_place[target]) = (Some(0), Some(0));
+fn only_used(objects: Vec<ObjectEntry>, mut groups: Vec<Group>) -> (Vec<ObjectEntry>, Vec<Group>) {
+    let used: BTreeSet<usize> =
+        groups.iter().flat_map(|group| &group.pairs).flat_map(Pair::both).collect();
+    let new_place: BTreeMap<usize, usize> = used.iter().copied().zip(0..).collect();
+    let objects = objects.into_iter().enumerate();
+    let kept = objects.filter(|(place, _)| used.contains(place)).map(|(_, object)| object);
+    for pair in groups.iter_mut().flat_map(|group| &mut group.pairs) {
+        pair.source = new_place[&pair.source];
+        pair.target = new_place[&pair.target];
     }
-    let mut kept = Vec::new();
-    for (object, place) in objects.into_iter().zip(&mut new_place).filter(|(_, p)| p.is_some()) {
-        *place = Some(kept.len());
-        kept.push(object);
-    }
-    let renumber = |place: usize| new_place[place].unwrap_or(0);
-    let groups = groups.into_iter().map(|group| {
-        let pairs = group.pairs.iter().map(|&(a, b)| (renumber(a), renumber(b))).collect();
-        Group { pairs, ..group }
-    });
-    (kept, groups.collect())
+    (kept.collect(), groups)
 }
 
 /// Names, contents of meshes and labels, and pairs.
 fn hash(objects: &[ObjectEntry], groups: &[Group]) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     for object in objects {
-        hasher.update(format!("{}/{}\n", object.category, object.name).as_bytes());
+        hasher.update(json!([object.category, object.name]).to_string().as_bytes());
         if let ObjectSource::Files { mesh, label } = &object.source {
             for path in [mesh, label] {
                 let bytes = std::fs::read(path).map_err(Error::io(path))?;
@@ -180,9 +196,10 @@ fn hash(objects: &[ObjectEntry], groups: &[Group]) -> Result<String> {
             }
         }
     }
-    groups.iter().for_each(|group| {
-        hasher.update(format!("{group:?}\n").as_bytes());
-    });
+    for group in groups {
+        let pairs: Vec<[usize; 2]> = group.pairs.iter().map(Pair::both).collect();
+        hasher.update(json!([group.name, pairs]).to_string().as_bytes());
+    }
     Ok(format!("blake3:{}", hasher.finalize().to_hex()))
 }
 
@@ -231,7 +248,8 @@ mod tests {
         let fewer = open(folder.path()).unwrap();
         let names: Vec<&str> = fewer.objects.iter().map(|o| o.name.as_str()).collect();
         assert_eq!(names, ["b", "c"]);
-        assert_eq!((&*fewer.groups[1].name, &fewer.groups[1].pairs[..]), ("mugs", &[(0, 1)][..]));
+        let pair = Pair { source: 0, target: 1 };
+        assert_eq!((&*fewer.groups[1].name, &fewer.groups[1].pairs[..]), ("mugs", &[pair][..]));
         assert_ne!(dataset.hash, fewer.hash);
     }
 

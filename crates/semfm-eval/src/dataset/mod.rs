@@ -63,8 +63,24 @@ impl fmt::Display for DatasetOrigin {
 pub struct Group {
     /// Its name in the tables.
     pub name: String,
-    /// Ordered pairs (source, target) of places in [`Dataset::objects`].
-    pub pairs: Vec<(usize, usize)>,
+    /// Ordered pairs.
+    pub pairs: Vec<Pair>,
+}
+
+/// Two objects, by their places in [`Dataset::objects`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Pair {
+    /// The object with the demonstrated region.
+    pub source: usize,
+    /// The object that the region is transferred to.
+    pub target: usize,
+}
+
+impl Pair {
+    /// Source and target.
+    pub(crate) fn both(&self) -> [usize; 2] {
+        [self.source, self.target]
+    }
 }
 
 /// One object by name.
@@ -157,7 +173,8 @@ impl ObjectEntry {
     /// Reads or makes the object.
     ///
     /// # Errors
-    /// What its files or the generator report.
+    /// [`crate::Error::Facade`] for mesh and region, [`crate::Error::Io`] and
+    /// [`crate::Error::Format`] for parts, [`crate::Error::Synth`] for a procedural object.
     pub fn load(&self) -> Result<LabelledObject> {
         match &self.source {
             ObjectSource::Files { mesh, label } => folder::load(mesh, label),
@@ -169,7 +186,11 @@ impl ObjectEntry {
 }
 
 /// All ordered pairs of distinct places among `members`.
-pub(crate) fn ordered_pairs(members: &[usize]) -> Vec<(usize, usize)> {
-    let pairs = members.iter().flat_map(|&a| members.iter().map(move |&b| (a, b)));
-    pairs.filter(|(a, b)| a != b).collect()
+pub(crate) fn ordered_pairs(members: &[usize]) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    for &source in members {
+        pairs.extend(members.iter().map(|&target| Pair { source, target }));
+    }
+    pairs.retain(|pair| pair.source != pair.target);
+    pairs
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use semfm::Region;
 use semfm::geom::io::{Appearance, MeshFile, MeshFormat};
 use semfm_synth::{Category, Level, ObjectSettings, make_object};
+use serde_json::json;
 
 use super::{
     Dataset, DatasetOrigin, Group, LabelledObject, ObjectEntry, ObjectSource, ordered_pairs,
@@ -64,8 +65,8 @@ pub fn make(settings: &SyntheticSettings) -> Result<Dataset> {
         n_objects: *n_objects,
     };
     // The generator is part of the program, and a journal names the program.
-    let words = format!("{origin:?} {:?} {}", ObjectSettings::default(), env!("CARGO_PKG_VERSION"));
-    let hash = format!("blake3:{}", blake3::hash(words.as_bytes()).to_hex());
+    let made_by = json!([origin, env!("CARGO_PKG_VERSION")]).to_string();
+    let hash = format!("blake3:{}", blake3::hash(made_by.as_bytes()).to_hex());
     Ok(Dataset { origin, hash, objects, groups })
 }
 
@@ -101,11 +102,11 @@ mod tests {
                 .unwrap();
         assert_eq!((dataset.objects.len(), dataset.n_pairs()), (36, 72));
         for group in &dataset.groups {
-            for &(source, target) in &group.pairs {
-                let (a, b) = (&dataset.objects[source], &dataset.objects[target]);
+            for pair in &group.pairs {
+                let (a, b) = (&dataset.objects[pair.source], &dataset.objects[pair.target]);
                 assert_eq!((&a.category, &b.category), (&group.name, &group.name));
-                let seed = |o: &ObjectEntry| o.name.rsplit('s').next().map(str::to_owned);
-                assert!(a.name != b.name && seed(a) == seed(b), "{} {}", a.name, b.name);
+                let [x, y] = [a, b].map(|object| object.name.rsplit('s').next());
+                assert!(a.name != b.name && x == y, "{} {}", a.name, b.name);
             }
         }
         let again = Dataset::open(&dataset.origin).unwrap();

@@ -98,11 +98,12 @@ impl<'a> Context<'a> {
         html += &self.tiles();
         let identity = &about.identity;
         html += "<details><summary>Where these numbers come from</summary><dl class=\"facts\">";
+        let settings = serde_json::json!(identity.settings).to_string();
         let facts = [
             ("features", &identity.embeddings),
             ("program", &identity.program),
             ("dataset", &identity.dataset),
-            ("settings", &identity.settings),
+            ("settings", &settings),
         ];
         for (name, value) in facts {
             let _ = write!(html, "<dt>{name}</dt><dd>{}</dd>", escape(value));

@@ -46,7 +46,7 @@ const MOST_SEARCHES: usize = 50;
 const ORTHONORMALITY_TOLERANCE: f64 = 1e-10;
 
 /// How the eigenbasis is computed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct EigenSettings {
     /// Largest relative residual accepted.
     pub tolerance: f64,

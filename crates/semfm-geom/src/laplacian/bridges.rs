@@ -11,7 +11,7 @@ use super::{Laplacian, assembly};
 use crate::{Error, Mesh, Result};
 
 /// How pieces are joined.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BridgeSettings {
     /// Stiffness of a bridge. 0.5 is near that of an edge between equilateral triangles (0.58).
     pub weight: f64,

@@ -51,7 +51,7 @@ impl Laplacian {
 }
 
 /// Which discretisation of the Laplace–Beltrami operator.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
 pub enum LaplacianKind {
     /// Intrinsic Delaunay on the tufted cover, mollified ([`tufted_laplacian`]).
     #[default]
