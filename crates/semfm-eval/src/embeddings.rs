@@ -45,6 +45,7 @@ pub trait Encoder: Sync {
 }
 
 /// Where an evaluation takes its features from.
+#[non_exhaustive]
 pub enum EmbeddingSource<'a> {
     /// Files: `NAME.emb.mcap` (and, for the published method, `NAME.r1.emb.mcap` with one roll where
     /// it is there) in a folder or in its subfolder CATEGORY; `None` for beside the meshes.

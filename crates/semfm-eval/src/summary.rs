@@ -16,6 +16,7 @@ pub(crate) const NOTICED: f64 = 0.01;
 /// Which pairs are summed up.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "scope", content = "name", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Scope {
     /// One group of pairs.
     Group(String),

@@ -30,6 +30,7 @@ pub struct Dataset {
 /// Where a dataset came from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum DatasetOrigin {
     /// A folder of meshes with labels.
     Folder {
@@ -96,6 +97,7 @@ pub struct ObjectEntry {
 
 /// How to get an object.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ObjectSource {
     /// From its files.
     Files {
