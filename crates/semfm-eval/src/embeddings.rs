@@ -3,19 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use semfm::Task;
 use semfm::geom::io::MeshFile;
 use semfm::views::EmbeddedView;
 use semfm::views::mcap::EmbeddingsFile;
+use semfm::{Method, Task};
 use semfm_synth::{embed, render_views};
 
 use crate::dataset::{LabelledObject, ObjectEntry, ObjectSource};
 use crate::{Error, Result};
-
-/// Rotations of each picture that the encoder averages: ours, and the published method's.
-pub const OUR_ROLLS: u32 = 4;
-/// The published method shows each picture once.
-pub const PAPER_ROLLS: u32 = 1;
 
 /// Embedded views of one object, and what making them took where that is known.
 #[derive(Clone, Debug)]
@@ -32,12 +27,12 @@ pub struct Embedded {
     pub embed_ms: Option<f64>,
 }
 
-/// Somebody who makes embeddings of a mesh's default views.
+/// Makes embeddings of a mesh's default views.
 pub trait Encoder: Sync {
     /// Embeddings of `file`, averaged over `rolls` rotations.
     ///
     /// # Errors
-    /// Whatever keeps the encoder from its work, in words.
+    /// Why the encoder has no embeddings, in words.
     fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String>;
 
     /// Names the encoder: another name, other features.
@@ -68,7 +63,8 @@ impl EmbeddingSource<'_> {
     /// The embedded views of an object.
     ///
     /// # Errors
-    /// No file, one of another mesh, or what the encoder reports.
+    /// [`Error::Io`] where there is no file, [`Error::Facade`] for one that cannot be read or is of
+    /// another mesh, [`Error::Format`] with the encoder's reason, [`Error::Synth`].
     pub fn views(
         &self,
         entry: &ObjectEntry,
@@ -114,10 +110,14 @@ fn read(
         Some(folder) => vec![folder.join(&entry.category), folder.to_owned()],
         None => vec![mesh.with_file_name("")],
     };
-    let own = (rolls == PAPER_ROLLS).then(|| format!("{name}.r1.emb.mcap"));
-    let names: Vec<String> = own.into_iter().chain([format!("{name}.emb.mcap")]).collect();
-    let variants = names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name)));
-    let Some(path) = variants.into_iter().find(|path| path.is_file()) else {
+    let usual_rolls = Method::default().info().features.rolls;
+    let mut paths = Vec::new();
+    if rolls != usual_rolls {
+        let file = format!("{name}.r{rolls}.emb.mcap");
+        paths.extend(folders.iter().map(|folder| folder.join(&file)));
+    }
+    paths.extend(folders.iter().map(|folder| folder.join(format!("{name}.emb.mcap"))));
+    let Some(path) = paths.into_iter().find(|path| path.is_file()) else {
         let path = folders[folders.len() - 1].join(format!("{name}.emb.mcap"));
         let source = std::io::Error::new(
             std::io::ErrorKind::NotFound,

@@ -234,7 +234,7 @@ impl Running<'_> {
 }
 
 impl MethodRun {
-    /// The clusters that the method uses.
+    /// The clusters that the method's anchors are selected from.
     fn clusters(&self) -> Option<ClusterSettings> {
         self.settings.as_ref().map(|settings| settings.clusters)
     }
@@ -257,14 +257,16 @@ impl MethodRun {
             (Ok(a), Ok(b)) => (a, b),
             (Err(failure), _) | (_, Err(failure)) => return Ok(Err(failure)),
         };
-        let transferred =
-            Matching::new(&a.object, &b.object, settings, task)?.transfer(&source.truth)?;
+        let matching = Matching::new(&a.object, &b.object, settings, task)?;
+        matching.anchors(task)?; // the rows list them, whatever the method
+        let transferred = matching.transfer(&source.truth)?;
         row.take(&transferred, truth, areas)?;
         for (stage, ms) in transferred.report.stages_ms.iter() {
             row.stages_ms.insert(stage.into(), ms);
         }
         row.matching_ms = Some(transferred.report.stages_ms.total_ms());
-        let clusters = self.clusters();
+        let reads_clusters = row.stages_ms.contains_key("anchors");
+        let clusters = self.clusters().filter(|_| reads_clusters);
         for (side, object) in [("source", a), ("target", b)] {
             for (stage, ms) in object.stages_ms(clusters.as_ref()) {
                 row.stages_ms.insert(format!("{stage}_{side}"), ms);

@@ -43,7 +43,8 @@ pub(crate) struct TimedObject {
     pub object: PreparedObject,
     /// Views, encoder, lifting, shape, and what follows from cloud and shape.
     stages_ms: BTreeMap<&'static str, f64>,
-    /// Only methods that use clusters are charged for them.
+    /// The rows list anchors whatever the method, so there are always clusters; only methods that
+    /// read them are charged for them.
     clusters_ms: Vec<(ClusterSettings, f64)>,
 }
 
@@ -77,7 +78,7 @@ impl EvalObject {
             let cloud = timed_cloud(entry, object, features, part_names, preparation, task);
             clouds.insert(features, attempt("features", cloud)?);
         }
-        if let Some(Ok(cloud)) = clouds.get(&Features::Ours) {
+        if let Some(Ok(cloud)) = clouds.get(&Features::of_default_method()) {
             (row.encoder, row.rolls, row.seen) = (cloud.encoder.clone(), cloud.rolls, cloud.seen);
         }
         let mut prepared = BTreeMap::new();

@@ -38,7 +38,7 @@ pub struct EvalSettings {
 impl Default for EvalSettings {
     fn default() -> Self {
         Self {
-            variants: Variant::ALL.to_vec(),
+            variants: Variant::all(),
             overrides: Vec::new(),
             seed: 0,
             workers: Workers::new(0, 0),

@@ -211,7 +211,7 @@ impl<'a> ScoreTable<'a> {
 
 /// Whether a method is one of the bounds, which compete with no method.
 pub(crate) fn is_bound(method: &str) -> bool {
-    [Variant::Whole.name(), Variant::Oracle.name()].contains(&method)
+    [Variant::LOWER_BOUND.name(), Variant::UPPER_BOUND.name()].contains(&method)
 }
 
 fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -282,8 +282,8 @@ impl<'t, 'a> View<'t, 'a> {
         let ious = self.values(method, |row| row.iou);
         let scored: Vec<f64> = ious.iter().flatten().copied().collect();
         let mean = self.plain_mean(&ious);
-        let lower_bound = self.bound(Variant::Whole, &ious);
-        let upper_bound = self.bound(Variant::Oracle, &ious);
+        let lower_bound = self.bound(Variant::LOWER_BOUND, &ious);
+        let upper_bound = self.bound(Variant::UPPER_BOUND, &ious);
         let anchors = self.rows(method).flat_map(|row| &row.anchors);
         let distances: Vec<f64> = anchors.filter_map(|anchor| anchor.mean_distance).collect();
         Summary {

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use semfm::Method;
+
 use super::html::escape;
 use crate::dataset::DatasetOrigin;
 use crate::published;
@@ -27,7 +29,7 @@ impl<'a> Context<'a> {
     pub fn new(results: &'a Results) -> Self {
         let ScoreTable { methods, .. } = ScoreTable::new(&results.rows);
         let table = ScoreTable::new(&results.rows);
-        let default = Variant::Fused.name();
+        let default = Method::default().name();
         let lead = methods.iter().find(|m| **m == default);
         let lead = lead.or_else(|| methods.iter().find(|m| !is_bound(m))).or(methods.first());
         let categories = table.categories();

@@ -59,7 +59,7 @@ impl<'a> Chosen<'a> {
     fn new(context: &Context<'a>, thumbnails: &Thumbnails<'_>, settings: &ReportSettings) -> Self {
         let (mut rows, mut truncated) = (Vec::new(), Vec::new());
         // The lower bound answers everything, always.
-        let shown = context.methods.iter().filter(|method| **method != Variant::Whole.name());
+        let shown = context.methods.iter().filter(|method| **method != Variant::LOWER_BOUND.name());
         for &method in shown {
             let mut own: Vec<&Row> = context
                 .rows_of(method)

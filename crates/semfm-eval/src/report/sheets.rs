@@ -4,7 +4,7 @@
 //! to the group's, with targets spread evenly from its best to its worst.
 
 use rayon::prelude::*;
-use semfm::Task;
+use semfm::{Method, Task};
 
 use super::context::Context;
 use super::html::{escape, shown};
@@ -12,7 +12,6 @@ use super::thumbnails::{DrawnObject, DrawnPair, Side, Thumbnails};
 use crate::Result;
 use crate::row::Row;
 use crate::table::number;
-use crate::variant::Variant;
 
 /// Targets of each group in the category sheet.
 const SHEET_TARGETS: usize = 5;
@@ -116,7 +115,7 @@ pub(super) fn wks(
     thumbnails: &Thumbnails<'_>,
     task: &Task,
 ) -> Result<String> {
-    let method = Variant::Wks.name();
+    let method = Method::Wks.name();
     if !context.methods.contains(&method) {
         return Ok(String::new());
     }
@@ -137,7 +136,7 @@ fn wks_strip(context: &Context<'_>, thumbnails: &Thumbnails<'_>, rows: &[&Row]) 
     let pair = thumbnails.pair(worst)?;
     let DrawnPair { source, target } = pair;
     let mut answers = thumbnails.answers(worst);
-    let answer = answers.remove(Variant::Wks.name())?;
+    let answer = answers.remove(Method::Wks.name())?;
     let iou = number(worst.iou, 2);
     let on_target = format!("on {}, WKS, IoU {iou}", worst.target);
     let mut strip = demonstrated(source, &source.name);

@@ -33,7 +33,7 @@ pub struct MethodInfo {
 }
 
 /// How the embeddings of views become the features that a method reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ViewFeatures {
     /// How they are lifted to the surface.
     pub lifting: Lifting,
@@ -47,7 +47,7 @@ impl ViewFeatures {
 }
 
 /// How embeddings of views are lifted to the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Lifting {
     /// Samples of the surface take their features out of every view that sees them.
