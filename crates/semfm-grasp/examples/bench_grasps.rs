@@ -53,15 +53,21 @@ fn bench(
     let start = Instant::now();
     let object = GraspObject::from_mesh(&mesh, 1.0)?;
     let prepared = start.elapsed().as_secs_f64();
-    let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
+    let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let mut regions = vec![("whole", vec![1.0; mesh.n_vertices()])];
     if let Some(radius) = small {
         regions.push(("small", far_patch(mesh.vertices(), object.centre_of_mass(), radius)));
     }
     for (name, region) in regions {
         let start = (Instant::now(), cpu_seconds());
-        let found =
-            find_grasps_with(&object, &region, &hand, &Scene::new(), settings, &Task::default())?;
+        let found = find_grasps_with(
+            &object,
+            &region,
+            &gripper,
+            &Scene::new(),
+            settings,
+            &Task::default(),
+        )?;
         // On one thread its own CPU time counts: a busy machine changes nothing then.
         let seconds = match threads {
             1 => cpu_seconds() - start.1,

@@ -1,10 +1,10 @@
 //! How many of the grasps that are there the search finds, against dense sampling.
 //!
 //! `bench_recall [--samples N] [--spread N] [--near SHARE] [--points N] MESH…` reads meshes in metres. The reference knows
-//! nothing of the sampler: points uniform on the surface, hands that close along the normal or 15°
+//! nothing of the sampler: points uniform on the surface, grippers that close along the normal or 15°
 //! beside it, 24 approaches, 3 depths; each pose is examined like any other, and those that pass are
 //! the grasps that are there. One counts as found where a grasp of the search lies within 1 cm and
-//! 15°, a hand and the same hand with its fingers exchanged being one.
+//! 15°, a gripper and the same gripper with its fingers exchanged being one.
 
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -15,10 +15,9 @@ use semfm_geom::io::read_mesh;
 use semfm_geom::math::{DMat3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, SurfaceIndex, Task};
-use semfm_grasp::select::gripper_distance;
 use semfm_grasp::{
-    BoxGripper, Grasp, GraspObject, GraspSettings, GripperGeometry, Scene, Separation,
-    examine_poses, find_grasps_with,
+    BoxGripper, Grasp, GraspDistance, GraspObject, GraspSettings, GripperGeometry, PoseToExamine,
+    Scene, Separation, examine_poses, find_grasps_with,
 };
 
 const APPROACHES: usize = 24;
@@ -33,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut value = || arguments.next().ok_or("an option lacks its value");
         match argument.as_str() {
             "--samples" => settings.n_samples = value()?.parse()?,
-            "--spread" => settings.spread_rounds = value()?.parse()?,
+            "--spread" => settings.neighbour_rounds = value()?.parse()?,
             "--near" => {
                 settings.separation = Separation {
                     translation: NEAR.0 * value()?.parse::<f64>()?,
@@ -56,10 +55,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Box<dyn Error>> {
     let mesh = read_mesh(path)?.mesh;
     let object = GraspObject::from_mesh(&mesh, 1.0)?;
-    let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
+    let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let (region, scene) = (vec![1.0; mesh.n_vertices()], Scene::new());
-    let poses = dense_poses(&mesh, &hand, points)?;
-    let good: Vec<Grasp> = examine_poses(&object, &region, &hand, &scene, settings, &poses)?
+    let poses = dense_poses(&mesh, &gripper, points)?;
+    let good: Vec<Grasp> = examine_poses(&object, &region, &gripper, &scene, settings, &poses)?
         .into_iter()
         .filter_map(Result::ok)
         .collect();
@@ -67,11 +66,12 @@ fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Bo
     let merge_nothing = Separation { translation: 0.0, rotation: 0.0 };
     let mut found = Vec::new();
     for separation in [merge_nothing, settings.separation] {
-        let spread_rounds = if separation == merge_nothing { 0 } else { settings.spread_rounds };
+        let neighbour_rounds =
+            if separation == merge_nothing { 0 } else { settings.neighbour_rounds };
         let top = usize::MAX;
-        let all = GraspSettings { separation, spread_rounds, top, ..settings.clone() };
+        let all = GraspSettings { separation, neighbour_rounds, top, ..settings.clone() };
         let task = Task::default();
-        found.push(find_grasps_with(&object, &region, &hand, &scene, &all, &task)?.grasps);
+        found.push(find_grasps_with(&object, &region, &gripper, &scene, &all, &task)?.grasps);
     }
     let [survivors, returned] = [&found[0], &found[1]];
     println!(
@@ -88,20 +88,21 @@ fn recall(path: &Path, points: usize, settings: &GraspSettings) -> Result<(), Bo
 }
 
 fn share(good: &[Grasp], found: &[Grasp]) -> f64 {
-    let near = |a: &Pose, b: &Pose| {
-        let (translation, rotation) = gripper_distance(a, b);
-        translation <= NEAR.0 && rotation <= NEAR.1.to_radians()
-    };
-    let hit = |g: &&Grasp| found.iter().any(|f| near(&g.object_from_tcp, &f.object_from_tcp));
-    good.iter().filter(hit).count() as f64 / good.len().max(1) as f64
+    let hits = good.iter().filter(|good| found.iter().any(|found| are_near(good, found)));
+    hits.count() as f64 / good.len().max(1) as f64
 }
 
-/// Hands whose pads lie at a surface point and at the next surface behind it.
+fn are_near(a: &Grasp, b: &Grasp) -> bool {
+    let apart = GraspDistance::between(&a.object_from_tcp, &b.object_from_tcp);
+    apart.translation <= NEAR.0 && apart.rotation <= NEAR.1.to_radians()
+}
+
+/// Grippers whose pads lie at a surface point and at the next surface behind it.
 fn dense_poses(
     mesh: &Mesh,
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     points: usize,
-) -> Result<Vec<(Pose, f64)>, Box<dyn Error>> {
+) -> Result<Vec<PoseToExamine>, Box<dyn Error>> {
     let surface = SurfaceIndex::new(mesh)?;
     let mut poses = Vec::new();
     for (i, sample) in sample_uniform(mesh, points, 4711)?.iter().enumerate() {
@@ -112,7 +113,7 @@ fn dense_poses(
             let Some(hit) = surface.first_hit(sample.point + 1e-5 * closing, closing) else {
                 continue;
             };
-            if hit.t > *hand.opening().end() {
+            if hit.t > *gripper.opening().end() {
                 continue;
             }
             for k in 0..APPROACHES {
@@ -121,7 +122,8 @@ fn dense_poses(
                 let axes = DMat3::from_cols(closing.cross(approach), closing, approach);
                 for depth in [-0.006, 0.0, 0.006] {
                     let place: DVec3 = sample.point + closing * (hit.t / 2.0) + approach * depth;
-                    poses.push((Pose::from_parts(place, Rotation::from_mat3(&axes)), hit.t));
+                    let object_from_tcp = Pose::from_parts(place, Rotation::from_mat3(&axes));
+                    poses.push(PoseToExamine { object_from_tcp, width: hit.t });
                 }
             }
         }

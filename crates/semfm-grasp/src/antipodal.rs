@@ -36,7 +36,7 @@ const SAME_SURFACE: f64 = 1e-5;
 /// only, for a cloud has no surface for a ray to hit.
 pub(crate) fn antipodal(
     object: &GraspObject,
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     seed: &Seed,
     friction: f64,
     rng: &mut impl Rng,
@@ -47,10 +47,10 @@ pub(crate) fn antipodal(
         return;
     }
     let least_cosine = friction.atan().cos();
-    let widest = *hand.opening().end();
+    let widest = *gripper.opening().end();
     if !object.is_signed() {
         // An open sheet has no opposite surface: its own other side is.
-        pair(hand, seed.point, seed.normal, 0.0, rng, out);
+        pair(gripper, seed.point, seed.normal, 0.0, rng, out);
     }
     for ray in 0..RAYS {
         let tilted = if ray == 0 { -seed.normal } else { in_cone(-seed.normal, friction, rng) };
@@ -63,7 +63,7 @@ pub(crate) fn antipodal(
             .filter(|(_, face)| *face != seed.item)
             .filter(|(_, face)| opposes(normals[*face as usize], direction, object, least_cosine));
         for &(t, _) in opposite.take(MOST_PAIRS) {
-            pair(hand, seed.point, direction, t, rng, out);
+            pair(gripper, seed.point, direction, t, rng, out);
             // Wider pairs only tell that the object is too thick: one is enough.
             if t > widest {
                 break;
@@ -80,7 +80,7 @@ fn opposes(normal: DVec3, direction: DVec3, object: &GraspObject, least_cosine: 
 
 /// One candidate for each approach about the line from `point` to `point + t · closing`.
 fn pair(
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     point: DVec3,
     closing: DVec3,
     t: f64,
@@ -95,7 +95,7 @@ fn pair(
         let approach = DQuat::from_axis_angle(closing, angle) * across;
         // Every other one holds with the middle of the pads, the rest anywhere along them.
         let off = if k % 2 == 0 { 0.0 } else { OFF_CENTRE * (rng.random::<f64>() - 0.5) };
-        let place = middle + approach * (off * hand.pad()[1]);
+        let place = middle + approach * (off * gripper.pad()[1]);
         let tcp = Pose::from_parts(place, rotation(closing, approach));
         out.push(Candidate { tcp, seed: [-t / 2.0, t / 2.0] });
     }
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
     use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
-    use crate::test_shapes::cylinder;
+    use crate::test_meshes::cylinder;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use semfm_geom::zoo;
@@ -124,12 +124,12 @@ mod tests {
     fn pairs_on_a_cylinder_span_it_inside_both_cones() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.1, 128), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut candidates = Vec::new();
         for _ in 0..50 {
             let seed = region.draw(&object, &mut rng);
-            antipodal(&object, &hand, &seed, 0.5, &mut rng, &mut candidates);
+            antipodal(&object, &gripper, &seed, 0.5, &mut rng, &mut candidates);
         }
         assert!(candidates.len() > 500, "{}", candidates.len());
         for candidate in candidates {
@@ -150,12 +150,12 @@ mod tests {
         let object = GraspObject::from_mesh(&mesh, 0.03).unwrap();
         assert!(!object.is_signed());
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut candidates = Vec::new();
         for _ in 0..20 {
             let seed = region.draw(&object, &mut rng);
-            antipodal(&object, &hand, &seed, 0.5, &mut rng, &mut candidates);
+            antipodal(&object, &gripper, &seed, 0.5, &mut rng, &mut candidates);
         }
         assert!(candidates.iter().any(|c| (c.seed[1] - 0.03).abs() < 2e-3));
     }

@@ -1,9 +1,9 @@
-//! A hand pose worth examining.
+//! A gripper pose worth examining.
 
 use parry3d_f64::math::{Pose, Rotation};
 use semfm_geom::math::{DMat3, DVec3};
 
-/// Where the hand might go, before anybody has checked it.
+/// Where the gripper might go, before anybody has checked it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     /// object_from_tcp; the place along y is settled when the pads close.

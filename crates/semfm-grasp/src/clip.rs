@@ -12,6 +12,21 @@ pub(crate) struct Polygon {
     n: usize,
 }
 
+/// The plane `sign · p[axis] = bound`.
+#[derive(Clone, Copy)]
+struct Plane {
+    axis: usize,
+    sign: f64,
+    bound: f64,
+}
+
+impl Plane {
+    /// Signed distance from the plane, positive on the side that is cut off.
+    fn height(self, p: DVec3) -> f64 {
+        self.sign * p[self.axis] - self.bound
+    }
+}
+
 impl Polygon {
     /// A triangle with the weights of its corners.
     pub(crate) fn triangle(points: [DVec3; 3], weights: [f64; 3]) -> Self {
@@ -29,15 +44,15 @@ impl Polygon {
 
     /// Keeps the part where `sign · p[axis] ≤ bound` (Sutherland & Hodgman 1974).
     pub(crate) fn clip(&mut self, axis: usize, sign: f64, bound: f64) {
-        let height = |p: DVec3| sign * p[axis] - bound;
-        if self.corners().iter().all(|c| height(c.0) <= 0.0) {
+        let plane = Plane { axis, sign, bound };
+        if self.corners().iter().all(|c| plane.height(c.0) <= 0.0) {
             return;
         }
         let (old, n) = (self.corners, self.n);
         self.n = 0;
         for i in 0..n {
             let (a, b) = (old[i], old[(i + 1) % n]);
-            let (ha, hb) = (height(a.0), height(b.0));
+            let (ha, hb) = (plane.height(a.0), plane.height(b.0));
             if ha <= 0.0 {
                 self.push(a);
             }
@@ -68,14 +83,15 @@ impl Polygon {
 mod tests {
     use super::*;
 
+    fn area(polygon: &Polygon) -> f64 {
+        polygon.fan().map(|[a, b, c]| (b.0 - a.0).cross(c.0 - a.0).length() / 2.0).sum()
+    }
+
     #[test]
     fn cuts_add_up_and_weights_stay_linear() {
         let points = [DVec3::ZERO, DVec3::new(2.0, 0.0, 1.0), DVec3::new(0.0, 2.0, 3.0)];
         let weights = points.map(|p| 0.3 * p.x - 0.2 * p.y + 0.1);
         let whole = Polygon::triangle(points, weights);
-        let area = |polygon: &Polygon| -> f64 {
-            polygon.fan().map(|[a, b, c]| (b.0 - a.0).cross(c.0 - a.0).length() / 2.0).sum()
-        };
         let mut sum = 0.0;
         for sign in [-1.0, 1.0] {
             let mut part = whole;

@@ -1,4 +1,4 @@
-//! Whether the hand gets to a grasp and can close there: at rest, on the way in, while closing.
+//! Whether the gripper gets to a grasp and can close there: at rest, on the way in, while closing.
 
 use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
@@ -6,24 +6,23 @@ use semfm_geom::math::DVec3;
 use crate::contact::{Closing, TOUCH_GAP};
 use crate::gripper_geometry::{GripperGeometry, PosedGripper};
 use crate::object::GraspObject;
-use crate::obstacle::Obstacle;
-use crate::rejection::Reason;
+use crate::rejection::{Reason, Refusal};
 use crate::scene::Scene;
 use crate::settings::GraspSettings;
 use crate::solid::Solid;
 use semfm_robot::gripper::Role;
 
-/// The hand keeps at least this away from everything but at its pads, metres.
+/// The gripper keeps at least this away from everything but at its pads, metres.
 const MARGIN: f64 = TOUCH_GAP / 2.0;
 
-/// Where a fully open hand hits something, each pad stays this far from the object on the way in,
+/// Where a fully open gripper hits something, each pad stays this far from the object on the way in,
 /// metres: twice what a calibrated arm misses a pose by.
 const SLACK: f64 = 5e-3;
 
 /// Fingers on a curved path are swept in steps of at most this change of width, metres.
 const CLOSING_STEP: f64 = 4e-3;
 
-/// Parts of the compliance by which a hand may stay wider where a finger meets the object beside
+/// Parts of the compliance by which a gripper may stay wider where a finger meets the object beside
 /// its pad: the pad still touches then, more softly.
 const WIDER: [f64; 3] = [0.0, 0.25, 0.5];
 
@@ -33,7 +32,7 @@ pub(crate) const FAR: f64 = 0.01;
 /// Steps and reach of the search for a free pose behind a colliding one, metres.
 const BACK_OFF: (f64, usize) = (2e-3, 40);
 
-/// A hand that fits: how wide when closed and on the way in, and how far from everything.
+/// A gripper that fits: how wide when closed and on the way in, and how far from everything.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fit {
     pub(crate) width: f64,
@@ -41,11 +40,11 @@ pub(crate) struct Fit {
     pub(crate) clearance: f64,
 }
 
-/// The checks of one hand against one object in one scene.
+/// The checks of one gripper against one object in one scene.
 pub(crate) struct Collision<'a> {
     object: &'a GraspObject,
     scene: &'a Scene,
-    hand: &'a GripperGeometry,
+    gripper: &'a GripperGeometry,
     settings: &'a GraspSettings,
 }
 
@@ -53,67 +52,63 @@ impl<'a> Collision<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
         scene: &'a Scene,
-        hand: &'a GripperGeometry,
+        gripper: &'a GripperGeometry,
         settings: &'a GraspSettings,
     ) -> Self {
-        Self { object, scene, hand, settings }
+        Self { object, scene, gripper, settings }
     }
 
-    /// The cheap half: whether the hand, for one of its openings, stays clear of the table.
-    pub(crate) fn above_table(&self, closing: &Closing) -> Result<(), (Reason, f64)> {
+    /// The cheap half: whether the gripper, for one of its openings, stays clear of the table.
+    pub(crate) fn above_table(&self, closing: &Closing) -> Result<(), Refusal> {
         if self.scene.table().is_none() {
             return Ok(());
         }
-        let closed = self.hand.at(closing.width + 2.0 * TOUCH_GAP);
+        let closed = self.gripper.at(closing.width + 2.0 * TOUCH_GAP);
         let missing = self
             .openings(closing.width)
             .map(|opening| self.below_table(&self.open(opening, &closed), &closing.tcp))
             .fold(f64::INFINITY, f64::min)
             .max(self.below_table(&closed, &closing.tcp));
-        if missing > 0.0 { Err((Reason::Table, missing)) } else { Ok(()) }
+        Refusal::where_positive(Reason::Table, missing)
     }
 
     /// Every check against surfaces, for the widest opening that passes them.
-    pub(crate) fn fit(&self, closing: &Closing) -> Result<Fit, (Reason, f64)> {
-        let closed = self.hand.at(closing.width + 2.0 * TOUCH_GAP);
-        let mut failure = (Reason::NoContact, 0.0);
+    pub(crate) fn fit(&self, closing: &Closing) -> Result<Fit, Refusal> {
+        let closed = self.gripper.at(closing.width + 2.0 * TOUCH_GAP);
+        let mut failure = Refusal::from(Reason::NoContact);
         for opening in self.openings(closing.width) {
             let open = self.open(opening, &closed);
             match self.fit_open(closing, &open, opening) {
-                Ok((width, clearance)) => return Ok(Fit { width, opening, clearance }),
+                Ok(fit) => return Ok(fit),
                 // What came farthest tells most.
-                Err(refused) if refused.0 > failure.0 => failure = refused,
+                Err(refused) if refused.reason > failure.reason => failure = refused,
                 Err(_) => {}
             }
         }
         Err(failure)
     }
 
-    /// Width when closed, and clearance when open.
+    /// The checks for one opening.
     fn fit_open(
         &self,
         closing: &Closing,
         open: &PosedGripper<'a>,
         opening: f64,
-    ) -> Result<(f64, f64), (Reason, f64)> {
+    ) -> Result<Fit, Refusal> {
         let tcp = &closing.tcp;
-        let sunk = self.below_table(open, tcp);
-        if sunk > 0.0 {
-            return Err((Reason::Table, sunk));
-        }
-        let without_amount = |reason| (reason, 0.0);
-        self.way_in(open, tcp).map_err(without_amount)?;
-        let width = self.close_fingers(closing, opening).map_err(without_amount)?;
+        Refusal::where_positive(Reason::Table, self.below_table(open, tcp))?;
+        self.approach_path(open, tcp)?;
+        let width = self.close_fingers(closing, opening)?;
         if self.inside(open, tcp) {
-            return Err((Reason::Inside, 0.0));
+            return Err(Reason::Inside.into());
         }
         let clearance = self.clearance(open, tcp);
-        let missing = self.settings.limits.clearance - clearance;
-        if missing > 0.0 { Err((Reason::Clearance, missing)) } else { Ok((width, clearance)) }
+        Refusal::where_positive(Reason::Clearance, self.settings.limits.clearance - clearance)?;
+        Ok(Fit { width, opening, clearance })
     }
 
-    /// The open hand from `retreat` behind the grasp up to it.
-    fn way_in(&self, open: &PosedGripper<'_>, tcp: &Pose) -> Result<(), Reason> {
+    /// The open gripper from `retreat` behind the grasp up to it.
+    fn approach_path(&self, open: &PosedGripper<'_>, tcp: &Pose) -> Result<(), Reason> {
         let behind = *tcp * Pose::from_translation(-DVec3::Z * self.settings.retreat);
         for (_, shape, pose) in open.pieces() {
             let at = *tcp * *pose;
@@ -143,7 +138,7 @@ impl<'a> Collision<'a> {
     }
 
     fn closes_freely(&self, tcp: &Pose, opening: f64, width: f64) -> bool {
-        let closed = self.hand.at(width);
+        let closed = self.gripper.at(width);
         let open = self.open(opening, &closed);
         let middle = self.open((opening + width) / 2.0, &closed);
         let steps = if moves_straight(&open, &middle, &closed) {
@@ -171,15 +166,14 @@ impl<'a> Collision<'a> {
 
     /// Nothing was touched, so each piece is wholly inside or wholly outside of anything closed.
     fn inside(&self, open: &PosedGripper<'_>, tcp: &Pose) -> bool {
-        let encloses = |obstacle: &Obstacle, p| obstacle.encloses(p);
         open.pieces().any(|(_, shape, pose)| {
             let centre = shape.at(&(*tcp * *pose)).centre();
-            encloses(self.object.obstacle(), centre)
-                || self.scene.obstacles().iter().any(|obstacle| encloses(obstacle, centre))
+            self.object.obstacle().encloses(centre)
+                || self.scene.obstacles().iter().any(|obstacle| obstacle.encloses(centre))
         })
     }
 
-    /// Distance of the open hand at the grasp to object, scene and table, at most [`FAR`] or the
+    /// Distance of the open gripper at the grasp to object, scene and table, at most [`FAR`] or the
     /// asked clearance.
     fn clearance(&self, open: &PosedGripper<'_>, tcp: &Pose) -> f64 {
         let mut least = FAR.max(self.settings.limits.clearance);
@@ -199,38 +193,42 @@ impl<'a> Collision<'a> {
         least.max(0.0)
     }
 
-    /// How far back along the approach the open hand is free, metres: how much a colliding grasp is
+    /// How far back along the approach the open gripper is free, metres: how much a colliding grasp is
     /// off. The end of the search where it is free nowhere.
     pub(crate) fn back_off(&self, closing: &Closing) -> f64 {
-        let closed = self.hand.at(closing.width + 2.0 * TOUCH_GAP);
+        let closed = self.gripper.at(closing.width + 2.0 * TOUCH_GAP);
         let (step, most) = BACK_OFF;
-        let free = |k: &usize| {
-            let tcp = closing.tcp * Pose::from_translation(-DVec3::Z * step * *k as f64);
-            self.openings(closing.width).any(|opening| {
-                self.open(opening, &closed).pieces().all(|(_, shape, pose)| {
-                    let solid = shape.at(&(tcp * *pose));
-                    !self.object.obstacle().meets(&solid, MARGIN) && !self.meets_scene(&solid)
-                })
-            })
-        };
-        step * (1..most).find(free).unwrap_or(most) as f64
+        let first_free = (1..most).find(|&k| {
+            let tcp = closing.tcp * Pose::from_translation(-DVec3::Z * step * k as f64);
+            self.openings(closing.width)
+                .any(|opening| self.is_free(&self.open(opening, &closed), &tcp))
+        });
+        step * first_free.unwrap_or(most) as f64
+    }
+
+    /// Whether the gripper at rest touches neither object nor scene.
+    fn is_free(&self, gripper: &PosedGripper<'_>, tcp: &Pose) -> bool {
+        gripper.pieces().all(|(_, shape, pose)| {
+            let solid = shape.at(&(*tcp * *pose));
+            !self.object.obstacle().meets(&solid, MARGIN) && !self.meets_scene(&solid)
+        })
     }
 
     /// Distances between the pads on the way in: fully open, and as little as is safe.
     fn openings(&self, width: f64) -> impl Iterator<Item = f64> {
-        let widest = *self.hand.opening().end();
+        let widest = *self.gripper.opening().end();
         let fitted = width + 2.0 * (TOUCH_GAP + SLACK);
         [Some(widest), (fitted < widest - SLACK).then_some(fitted)].into_iter().flatten()
     }
 
     fn open(&self, opening: f64, closed: &PosedGripper<'a>) -> PosedGripper<'a> {
-        self.hand.at(opening).with_palm_of(closed)
+        self.gripper.at(opening).with_palm_of(closed)
     }
 
-    /// How much deeper than allowed the hand is in the table, at the grasp or behind it.
-    fn below_table(&self, hand: &PosedGripper<'_>, tcp: &Pose) -> f64 {
+    /// How much deeper than allowed the gripper is in the table, at the grasp or behind it.
+    fn below_table(&self, gripper: &PosedGripper<'_>, tcp: &Pose) -> f64 {
         let Some(table) = self.scene.table() else { return f64::NEG_INFINITY };
-        let lowest = hand
+        let lowest = gripper
             .pieces()
             .map(|(_, shape, pose)| shape.lowest(&(*tcp * *pose), table.normal))
             .fold(f64::INFINITY, f64::min);
@@ -244,7 +242,7 @@ impl<'a> Collision<'a> {
     }
 }
 
-/// Whether each piece is half-way between its ends, unturned, when the hand is half open.
+/// Whether each piece is half-way between its ends, unturned, when the gripper is half open.
 fn moves_straight(
     open: &PosedGripper<'_>,
     middle: &PosedGripper<'_>,
@@ -262,27 +260,36 @@ mod tests {
     use super::*;
     use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
-    use crate::test_shapes::{cuboid, joined, moved};
+    use crate::test_meshes::{cuboid, joined, moved};
     use semfm_geom::Mesh;
 
     fn fit(mesh: &Mesh, scene: &Scene, tcp: &Pose) -> Result<Fit, Reason> {
         let settings = GraspSettings::default();
         let object = GraspObject::from_mesh(mesh, 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let closing =
-            crate::contact::close(&object, &region, &hand, tcp, [-0.015, 0.015], 1.5e-3).unwrap();
-        let collision = Collision::new(&object, scene, &hand, &settings);
-        collision.above_table(&closing).map_err(|(reason, _)| reason)?;
-        collision.fit(&closing).map_err(|(reason, _)| reason)
+            crate::contact::close(&object, &region, &gripper, tcp, [-0.015, 0.015], 1.5e-3)
+                .unwrap();
+        let collision = Collision::new(&object, scene, &gripper, &settings);
+        collision.above_table(&closing).map_err(|refusal| refusal.reason)?;
+        collision.fit(&closing).map_err(|refusal| refusal.reason)
     }
 
-    /// A bar along x, and the hand around it, coming from above.
+    /// A bar along x, and the gripper around it, coming from above.
     fn bar() -> (Mesh, Pose) {
         (
             cuboid(DVec3::new(0.2, 0.03, 0.03)),
             Pose::new(DVec3::ZERO, DVec3::X * std::f64::consts::PI),
         )
+    }
+
+    fn box_at(size: DVec3, at: DVec3) -> Mesh {
+        moved(&cuboid(size), |p| p + at)
+    }
+
+    fn table(z: f64) -> Scene {
+        Scene::new().with_table(DVec3::Z * z, DVec3::Z).unwrap()
     }
 
     #[test]
@@ -298,9 +305,8 @@ mod tests {
     #[test]
     fn what_is_in_the_way_is_named() {
         let (bar, from_above) = bar();
-        let box_at = |size, at: DVec3| moved(&cuboid(size), |p| p + at);
         let knob = DVec3::splat(0.01);
-        // A knob where the open finger would be: the hand comes in less open.
+        // A knob where the open finger would be: the gripper comes in less open.
         let beside = joined(&bar, &box_at(knob, DVec3::new(0.0, 0.05, 0.0)));
         let narrow = fit(&beside, &Scene::new(), &from_above).unwrap();
         assert!(narrow.opening < 0.06);
@@ -330,7 +336,6 @@ mod tests {
     #[test]
     fn a_table_is_kept_clear_of() {
         let (bar, from_above) = bar();
-        let table = |z: f64| Scene::new().with_table(DVec3::Z * z, DVec3::Z).unwrap();
         // Fingertips are 9 mm below the middle of the bar.
         assert!(fit(&bar, &table(-0.015), &from_above).is_ok());
         assert_eq!(fit(&bar, &table(-0.0085), &from_above).unwrap_err(), Reason::Table);

@@ -10,7 +10,7 @@ use crate::gripper_geometry::GripperGeometry;
 use crate::object::{GraspObject, Region, Surface};
 use crate::solid::Solid;
 
-/// Each pad stops this far before the object's first point (metres), and the rest of the hand stays
+/// Each pad stops this far before the object's first point (metres), and the rest of the gripper stays
 /// away by half of it: far above rounding, in this program or another, and far below what a robot
 /// can place.
 pub(crate) const TOUCH_GAP: f64 = 1e-4;
@@ -58,22 +58,22 @@ struct Piece {
 /// Closes the pads on what lies between them.
 ///
 /// `tcp` is object_from_tcp; `seed` an interval along its y axis that the grasp is to hold. The held
-/// part grows from the seed over every gap too narrow for a finger, and may be wider than the hand
+/// part grows from the seed over every gap too narrow for a finger, and may be wider than the gripper
 /// opens. `None` where there is nothing to hold.
 pub(crate) fn close(
     object: &GraspObject,
     region: &Region,
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     tcp: &Pose,
     seed: [f64; 2],
     compliance: f64,
 ) -> Option<Closing> {
-    let widest = *hand.opening().end();
+    let widest = *gripper.opening().end();
     let seeded =
         Pose::from_parts(*tcp * DVec3::new(0.0, (seed[0] + seed[1]) / 2.0, 0.0), tcp.rotation);
     let half = (seed[1] - seed[0]).abs() / 2.0;
-    let gap = hand.reach().finger_thickness + 2.0 * TOUCH_GAP;
-    let [x, z] = hand.pad().map(|extent| extent / 2.0);
+    let gap = gripper.reach().finger_thickness + 2.0 * TOUCH_GAP;
+    let [x, z] = gripper.pad().map(|extent| extent / 2.0);
     // First as far as a finger needs beside the seed; all the way where something is there.
     let (mut reach, far) = (half + 1.01 * gap, half.max(widest));
     let (prism, pieces, [low, high]) = loop {
@@ -91,10 +91,10 @@ pub(crate) fn close(
         Surface::Mesh { .. } => compliance,
         Surface::Cloud { spacing, .. } => compliance.max(*spacing),
     };
-    let gather = |side: f64, end: f64| prism.gather(&pieces, [side, end], depth, object, region);
-    let (left, right) = (gather(-1.0, low)?, gather(1.0, high)?);
+    let left = prism.gather(&pieces, [-1.0, low], depth, object, region)?;
+    let right = prism.gather(&pieces, [1.0, high], depth, object, region)?;
     let aim = (left.centre + right.centre) / 2.0;
-    let patches = [left, right].map(|patch| patch.settle(aim, shift, &centred));
+    let patches = [left, right].map(|patch| patch.into_patch(aim, shift, &centred));
     Some(Closing { tcp: centred, width: high - low, patches })
 }
 
@@ -133,8 +133,8 @@ impl Prism {
 
     /// Extent along y of the triangle's part inside; empty (low above high) where there is none.
     fn extent(&self, corners: [DVec3; 3], whole: [f64; 2]) -> [f64; 2] {
-        let beyond = |axis: usize| corners.iter().any(|p| p[axis].abs() > self.half[axis]);
-        if !beyond(0) && !beyond(2) {
+        let is_beside = corners.iter().any(|p| p.x.abs() > self.half.x || p.z.abs() > self.half.z);
+        if !is_beside {
             return [whole[0].max(-self.half.y), whole[1].min(self.half.y)];
         }
         let inside = self.inside(corners, [0.0; 3]);
@@ -201,14 +201,8 @@ impl Prism {
 
 /// The stretch of surface around [-half, half] that no gap wider than `gap` interrupts.
 fn held_interval(pieces: &[Piece], half: f64, gap: f64) -> Option<[f64; 2]> {
-    let touched = |slack: f64| {
-        let near = |piece: &&Piece| piece.low <= half + slack && piece.high >= -half - slack;
-        let extend = |[l, h]: [f64; 2], piece: &Piece| [l.min(piece.low), h.max(piece.high)];
-        let held = pieces.iter().filter(near).fold([f64::INFINITY, f64::NEG_INFINITY], extend);
-        (held[0] <= held[1]).then_some(held)
-    };
     // A seed may lie a rounding error beside its own surface, or wholly inside of something solid.
-    let mut held = touched(1e-6).or_else(|| touched(gap))?;
+    let mut held = extent_near(pieces, half + 1e-6).or_else(|| extent_near(pieces, half + gap))?;
     loop {
         let before = held;
         for piece in pieces {
@@ -220,6 +214,22 @@ fn held_interval(pieces: &[Piece], half: f64, gap: f64) -> Option<[f64; 2]> {
             return Some(held);
         }
     }
+}
+
+/// Extent along y of the pieces that reach into [-half, half]; `None` where none does.
+fn extent_near(pieces: &[Piece], half: f64) -> Option<[f64; 2]> {
+    let held = pieces
+        .iter()
+        .filter(|piece| piece.low <= half && piece.high >= -half)
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], piece| {
+            [low.min(piece.low), high.max(piece.high)]
+        });
+    (held[0] <= held[1]).then_some(held)
+}
+
+/// A point as a pad sees it, along the closing axis.
+fn flat(p: DVec3) -> DVec3 {
+    DVec3::new(p.x, 0.0, p.z)
 }
 
 /// Sums over a patch, in the frame of the seed.
@@ -273,8 +283,7 @@ impl Gathered {
 
     /// Chooses the patch's point that lies nearest to `aim` as the pad sees it, and turns everything
     /// into the object's frame.
-    fn settle(self, aim: DVec3, shift: f64, tcp: &Pose) -> Patch {
-        let flat = |p: DVec3| DVec3::new(p.x, 0.0, p.z);
+    fn into_patch(self, aim: DVec3, shift: f64, tcp: &Pose) -> Patch {
         let mut best = (f64::INFINITY, f64::INFINITY, DVec3::ZERO, DVec3::ZERO);
         for (corners, normal) in &self.facets {
             let [a, b, c] = *corners;
@@ -308,12 +317,12 @@ impl Gathered {
 mod tests {
     use super::*;
     use crate::gripper_geometry::BoxGripper;
-    use crate::test_shapes::{cuboid, cylinder, joined, moved};
+    use crate::test_meshes::{cuboid, cylinder, joined, moved};
 
     fn closing(object: &GraspObject, tcp: &Pose, half: f64) -> Option<Closing> {
         let region = Region::new(object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
-        close(object, &region, &hand, tcp, [-half, half], 1.5e-3)
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        close(object, &region, &gripper, tcp, [-half, half], 1.5e-3)
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What can go wrong between a region and a grasp.
 
+use std::fmt::Display;
+
 /// Result of a call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -26,6 +28,15 @@ pub enum Error {
 }
 
 impl Error {
+    pub(crate) fn out_of_range<T>(
+        what: &'static str,
+        expected: impl Display,
+        found: impl Display,
+    ) -> Result<T> {
+        let (expected, found) = (expected.to_string(), found.to_string());
+        Err(Self::OutOfRange { what, expected, found })
+    }
+
     /// A stable name for the kind of failure, for scripts.
     pub fn code(&self) -> &'static str {
         match self {

@@ -18,7 +18,7 @@ use crate::select::diverse;
 use crate::settings::GraspSettings;
 use semfm_robot::Gripper;
 
-/// Grasps of one region by one hand in one scene, and what became of the other candidates.
+/// Grasps of one region by one gripper in one scene, and what became of the other candidates.
 #[derive(Clone, Debug)]
 pub struct Grasps {
     /// Best first; empty where nothing survived.
@@ -28,9 +28,9 @@ pub struct Grasps {
     /// Of the refused candidates the one that came farthest, and of those the one that missed by
     /// least.
     pub nearest_miss: Option<Miss>,
-    /// Hand poses examined.
+    /// Gripper poses examined.
     pub n_candidates: usize,
-    /// Hand poses that passed every check, before near ones were merged and the best chosen.
+    /// Gripper poses that passed every check, before near ones were merged and the best chosen.
     pub n_survivors: usize,
     /// Wall time of each stage, milliseconds.
     pub stages_ms: Vec<(&'static str, f64)>,
@@ -58,7 +58,7 @@ pub fn find_grasps(
     find_grasps_with(object, region, &GripperGeometry::new(gripper)?, scene, settings, task)
 }
 
-/// [`find_grasps`] with a hand that was prepared before.
+/// [`find_grasps`] with a gripper that was prepared before.
 ///
 /// ```
 /// use semfm_geom::{Mesh, Task, math::DVec3};
@@ -68,10 +68,10 @@ pub fn find_grasps(
 /// let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 /// let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
 /// let plate = GraspObject::from_mesh(&Mesh::new((0..8).map(corner).collect(), faces)?, 1.0)?;
-/// let hand = GripperGeometry::from_boxes(&BoxGripper::default())?;
+/// let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
 /// let settings = GraspSettings { n_samples: 200, ..GraspSettings::default() };
 /// let whole = vec![1.0; plate.n_weights()];
-/// let found = find_grasps_with(&plate, &whole, &hand, &Scene::new(), &settings, &Task::default())?;
+/// let found = find_grasps_with(&plate, &whole, &gripper, &Scene::new(), &settings, &Task::default())?;
 /// assert!((found.grasps[0].width - 0.01).abs() < 1e-3);
 /// # Ok::<(), semfm_grasp::Error>(())
 /// ```
@@ -81,7 +81,7 @@ pub fn find_grasps(
 pub fn find_grasps_with(
     object: &GraspObject,
     region: &[f64],
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     scene: &Scene,
     settings: &GraspSettings,
     task: &Task,
@@ -89,14 +89,13 @@ pub fn find_grasps_with(
     let start = Instant::now();
     settings.check()?;
     let region = Region::new(object, region)?;
-    let search = Search::new(object, &region, hand, scene, settings);
+    let search = Search::new(object, &region, gripper, scene, settings);
     let prepared = start.elapsed();
     let sampled = search.run(task)?;
     let examined = start.elapsed();
-    let Found { kept, n_survivors, sampled } = search.spread(sampled, task)?;
+    let Found { kept, n_survivors, sampled } = search.add_neighbours(sampled, task)?;
     let spread = start.elapsed();
     let grasps = diverse(kept, settings.top, settings.diversity, object.radius());
-    let ms = |from: Duration, to: Duration| (to - from).as_secs_f64() * 1e3;
     Ok(Grasps {
         grasps,
         rejected: sampled.rejected,
@@ -104,37 +103,50 @@ pub fn find_grasps_with(
         n_candidates: sampled.n_candidates,
         n_survivors,
         stages_ms: vec![
-            ("prepare", prepared.as_secs_f64() * 1e3),
-            ("examine", ms(prepared, examined)),
-            ("spread", ms(examined, spread)),
-            ("select", ms(spread, start.elapsed())),
+            ("prepare", milliseconds(prepared)),
+            ("examine", milliseconds(examined - prepared)),
+            ("spread", milliseconds(spread - examined)),
+            ("select", milliseconds(start.elapsed() - spread)),
         ],
     })
 }
 
-/// Examines hand poses from elsewhere as [`find_grasps`] does its own: for each pose a grasp, or the
+/// A pose from elsewhere, to be examined as our own candidates are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseToExamine {
+    /// The gripper's TCP frame in the object's frame, metres.
+    pub object_from_tcp: Pose,
+    /// The width that the gripper is to hold there, metres.
+    pub width: f64,
+}
+
+/// Examines gripper poses from elsewhere as [`find_grasps`] does its own: for each pose a grasp, or the
 /// first thing that it failed.
 ///
-/// Each is object_from_tcp with the width that the hand is to hold there, metres; the hand is moved
-/// along its closing axis until both pads touch at once. Only those
-/// errors that concern all poses are errors.
+/// The gripper is moved along its closing axis until both pads touch at once. Only what concerns all
+/// poses is an error.
 ///
 /// # Errors
 /// As [`find_grasps`].
 pub fn examine_poses(
     object: &GraspObject,
     region: &[f64],
-    hand: &GripperGeometry,
+    gripper: &GripperGeometry,
     scene: &Scene,
     settings: &GraspSettings,
-    poses: &[(Pose, f64)],
+    poses: &[PoseToExamine],
 ) -> Result<Vec<std::result::Result<Grasp, Box<Miss>>>> {
     settings.check()?;
     let region = Region::new(object, region)?;
-    let search = Search::new(object, &region, hand, scene, settings);
-    let examine = |(tcp, width): &(Pose, f64)| {
-        let candidate = Candidate { tcp: *tcp, seed: [-width / 2.0, width / 2.0] };
+    let search = Search::new(object, &region, gripper, scene, settings);
+    let examined = poses.par_iter().map(|pose| {
+        let seed = [-pose.width / 2.0, pose.width / 2.0];
+        let candidate = Candidate { tcp: pose.object_from_tcp, seed };
         search.examine(&candidate).map_err(|near| Box::new(search.miss(*near)))
-    };
-    Ok(poses.par_iter().map(examine).collect())
+    });
+    Ok(examined.collect())
+}
+
+fn milliseconds(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
 }

@@ -6,27 +6,27 @@ use semfm_geom::math::{DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, Task, zoo};
 
-use crate::find::{Grasps, examine_poses, find_grasps_with};
+use crate::find::{Grasps, PoseToExamine, examine_poses, find_grasps_with};
 use crate::gripper_geometry::{BoxGripper, GripperGeometry};
 use crate::object::GraspObject;
 use crate::rejection::Reason;
 use crate::scene::Scene;
-use crate::select::gripper_distance;
+use crate::select::GraspDistance;
 use crate::settings::{ApproachCone, GraspSettings};
-use crate::test_shapes::{cuboid, cylinder, joined, moved};
+use crate::test_meshes::{cuboid, cylinder, joined, moved};
 
-fn hand() -> GripperGeometry {
+fn gripper() -> GripperGeometry {
     GripperGeometry::from_boxes(&BoxGripper::default()).unwrap()
 }
 
 fn few(n_samples: usize) -> GraspSettings {
-    GraspSettings { n_samples, spread_rounds: 0, ..GraspSettings::default() }
+    GraspSettings { n_samples, neighbour_rounds: 0, ..GraspSettings::default() }
 }
 
 fn search(mesh: &Mesh, scene: &Scene, settings: &GraspSettings) -> Grasps {
     let object = GraspObject::from_mesh(mesh, 1.0).unwrap();
     let region = vec![1.0; object.n_weights()];
-    find_grasps_with(&object, &region, &hand(), scene, settings, &Task::default()).unwrap()
+    find_grasps_with(&object, &region, &gripper(), scene, settings, &Task::default()).unwrap()
 }
 
 fn bar() -> Mesh {
@@ -43,7 +43,7 @@ fn grasps_of_a_bar_close_across_it() {
         let (y, z) = (grasp.closing().y.abs(), grasp.closing().z.abs());
         let width = if y > z { 0.03 } else { 0.05 };
         assert!(y.max(z) > 0.88, "closing along {}", grasp.closing());
-        // A tilted hand is wider by the pad's share of the tilt.
+        // A tilted gripper is wider by the pad's share of the tilt.
         assert!(grasp.width >= width && grasp.width < width + 0.012, "{}", grasp.width);
         assert!((0.0..=1.0).contains(&grasp.score) && grasp.epsilon > 0.0);
         assert!(grasp.terms.iter().all(|(_, value)| (0.0..=1.0).contains(value)));
@@ -127,7 +127,7 @@ fn pads_stay_in_the_region_and_stop_at_its_border() {
     settings.limits.pad_in_region = 0.9;
     let task = Task::default();
     let found =
-        find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task).unwrap();
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
     assert!(!found.grasps.is_empty() && found.rejected.count(Reason::Region) > 0);
     for grasp in &found.grasps {
         assert!(grasp.contacts.iter().all(|p| p.z > 0.045), "{:?}", grasp.contacts);
@@ -138,24 +138,22 @@ fn pads_stay_in_the_region_and_stop_at_its_border() {
 #[test]
 fn the_seed_decides_and_the_number_of_threads_does_not() {
     let mesh = joined(&bar(), &moved(&cylinder(0.02, 0.1, 24), |p| p + 0.06 * DVec3::Z));
-    let run = |threads, seed| {
+    let [one, three, other] = [(1, 7), (3, 7), (1, 8)].map(|(threads, seed)| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let settings = GraspSettings { seed, spread_rounds: 1, ..few(40) };
+        let settings = GraspSettings { seed, neighbour_rounds: 1, ..few(40) };
         pool.install(|| search(&mesh, &Scene::new(), &settings))
-    };
-    let (one, three, other) = (run(1, 7), run(3, 7), run(1, 8));
+    });
     assert_eq!(one.grasps, three.grasps);
     assert_eq!(one.rejected, three.rejected);
     assert!(one.grasps != other.grasps);
 }
 
 #[test]
-fn each_round_of_spreading_finds_more() {
-    let survivors = |spread_rounds| {
-        let settings = GraspSettings { spread_rounds, ..few(20) };
+fn each_round_of_neighbours_finds_more() {
+    let [none, one] = [0, 1].map(|neighbour_rounds| {
+        let settings = GraspSettings { neighbour_rounds, ..few(20) };
         search(&bar(), &Scene::new(), &settings).n_survivors
-    };
-    let (none, one) = (survivors(0), survivors(1));
+    });
     assert!(none > 0 && one > none + 5, "{none}, then {one}");
 }
 
@@ -165,20 +163,21 @@ fn a_cancelled_search_stops() {
     let (region, task) = (vec![1.0; object.n_weights()], Task::default());
     task.cancel();
     let settings = GraspSettings::default();
-    let found = find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task);
+    let found = find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task);
     assert!(matches!(found, Err(crate::Error::Geom(semfm_geom::Error::Cancelled))));
 }
 
 #[test]
-fn every_animal_of_the_zoo_is_searched_at_every_size() {
+fn every_mesh_of_the_zoo_is_searched_at_every_size() {
     for (name, mesh) in zoo::all() {
         for size in [1e-4, 0.08, 100.0] {
             let scale = size / mesh.diagonal();
             let object = GraspObject::from_mesh(&mesh, scale).unwrap();
             let region = vec![1.0; object.n_weights()];
             let task = Task::default();
-            let found = find_grasps_with(&object, &region, &hand(), &Scene::new(), &few(20), &task)
-                .unwrap();
+            let found =
+                find_grasps_with(&object, &region, &gripper(), &Scene::new(), &few(20), &task)
+                    .unwrap();
             assert_eq!(
                 found.rejected.total() + found.n_survivors,
                 found.n_candidates,
@@ -215,26 +214,29 @@ proptest! {
         let object = GraspObject::from_mesh(&bar(), 1.0).unwrap();
         let turned = GraspObject::from_mesh(&moved(&bar(), |p| motion * p), 1.0).unwrap();
         let region = vec![1.0; object.n_weights()];
-        let poses: Vec<(Pose, f64)> = (0..40)
+        let poses: Vec<PoseToExamine> = (0..40)
             .map(|i| {
                 let t = f64::from(i);
                 let about = random_rotation(0.4 * t.sin(), 0.1 * t.cos(), 0.2 * (2.0 * t).sin());
-                (Pose::from_parts(DVec3::new(0.08 * t.cos(), 0.003 * t.sin(), 0.02 * (3.0 * t).cos()), about), 0.08)
+                let place = DVec3::new(0.08 * t.cos(), 0.003 * t.sin(), 0.02 * (3.0 * t).cos());
+                PoseToExamine { object_from_tcp: Pose::from_parts(place, about), width: 0.08 }
             })
             .collect();
-        let moved_poses: Vec<(Pose, f64)> =
-            poses.iter().map(|(pose, width)| (motion * *pose, *width)).collect();
-        let (settings, hand, scene) = (GraspSettings::default(), hand(), Scene::new());
-        let here = examine_poses(&object, &region, &hand, &scene, &settings, &poses).unwrap();
-        let there = examine_poses(&turned, &region, &hand, &scene, &settings, &moved_poses).unwrap();
+        let moved_poses: Vec<PoseToExamine> = poses
+            .iter()
+            .map(|pose| PoseToExamine { object_from_tcp: motion * pose.object_from_tcp, ..*pose })
+            .collect();
+        let (settings, gripper, scene) = (GraspSettings::default(), gripper(), Scene::new());
+        let here = examine_poses(&object, &region, &gripper, &scene, &settings, &poses).unwrap();
+        let there = examine_poses(&turned, &region, &gripper, &scene, &settings, &moved_poses).unwrap();
         let mut good = 0;
         for (here, there) in here.iter().zip(&there) {
             prop_assert_eq!(here.is_ok(), there.is_ok());
             if let (Ok(here), Ok(there)) = (here, there) {
                 good += 1;
                 let expected = motion * here.object_from_tcp;
-                let (translation, rotation) = gripper_distance(&expected, &there.object_from_tcp);
-                prop_assert!(translation < 1e-7 && rotation < 1e-6);
+                let apart = GraspDistance::between(&expected, &there.object_from_tcp);
+                prop_assert!(apart.translation < 1e-7 && apart.rotation < 1e-6);
                 prop_assert!((here.width - there.width).abs() < 1e-9);
                 prop_assert!((here.score - there.score).abs() < 1e-3);
             }
@@ -258,7 +260,7 @@ proptest! {
         let region = vec![1.0; object.n_weights()];
         let task = Task::default();
         let scaled =
-            find_grasps_with(&object, &region, &hand(), &Scene::new(), &settings, &task).unwrap();
+            find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
         prop_assert!((in_metres.grasps[0].score - scaled.grasps[0].score).abs() < 0.05);
         prop_assert!((in_metres.n_candidates as f64 / scaled.n_candidates as f64 - 1.0).abs() < 0.1);
     }

@@ -1,9 +1,9 @@
 //! Candidates as in Grasp Pose Detection: a frame from the normals around a point, turned and
-//! pushed forward until the hand would touch.
+//! pushed forward until the gripper would touch.
 //!
 //! ten Pas & Platt, "Using geometry to detect grasp poses in 3D point clouds", 2015; ten Pas,
 //! Gualtieri, Saenko & Platt, "Grasp Pose Detection in Point Clouds", 2017. Departures: the
-//! neighbourhood of the normals is scaled to the hand instead of fixed at 3 cm, hands also tilt about
+//! neighbourhood of the normals is scaled to the gripper instead of fixed at 3 cm, grippers also tilt about
 //! the closing axis, both approaches are tried where the sign of a normal is unknown, and a placement
 //! is only a proposal: width, contact and collision are decided on the surface itself.
 
@@ -17,16 +17,16 @@ use crate::candidate::{Candidate, rotation};
 use crate::gripper_geometry::{GripperExtents, GripperGeometry};
 use crate::object::{GraspObject, Seed};
 
-/// Turns about the approach axis, over half a turn: the hand is symmetric.
+/// Turns about the approach axis, over half a turn: the gripper is symmetric.
 const TURNS: usize = 8;
 
 /// Tilts about the closing axis, radians.
 const TILTS: [f64; 3] = [0.0, -0.5, 0.5];
 
-/// The hand must enclose this share of the pad's length before a placement counts (initial bite).
+/// The gripper must enclose this share of the pad's length before a placement counts (initial bite).
 const INITIAL_BITE: f64 = 0.3;
 
-/// Placements of the hand along its closing axis, over the width of its opening.
+/// Placements of the gripper along its closing axis, over the width of its opening.
 const PLACEMENTS: usize = 9;
 
 /// Width of the bins in which the surface is gathered along the closing axis, metres. Finer ones
@@ -47,29 +47,33 @@ const PUSH_GAP: f64 = 2e-3;
 /// Reusable memory, and what all seeds share.
 pub(crate) struct Gpg<'a> {
     object: &'a GraspObject,
-    hand: &'a GripperGeometry,
+    gripper: &'a GripperGeometry,
     /// Cosine of the widest angle that sampled normals and closing axis may have.
     least_cosine: f64,
     /// Samples near the seed, from the seed, with their normals.
     points: Vec<(DVec3, DVec3)>,
-    /// Those that the fingers meet, in the hand's frame, each with its normal's part along y.
+    /// Those that the fingers meet, in the gripper's frame, each with its normal's part along y.
     slab: Vec<(DVec3, f64)>,
     /// For each bin along the closing axis, the least z of the surface in it.
     first: Vec<f64>,
 }
 
 impl<'a> Gpg<'a> {
-    pub(crate) fn new(object: &'a GraspObject, hand: &'a GripperGeometry, friction: f64) -> Self {
+    pub(crate) fn new(
+        object: &'a GraspObject,
+        gripper: &'a GripperGeometry,
+        friction: f64,
+    ) -> Self {
         let least_cosine = (friction.atan() + NORMAL_SLACK).cos();
         let (points, slab, first) = (Vec::new(), Vec::new(), Vec::new());
-        Self { object, hand, least_cosine, points, slab, first }
+        Self { object, gripper, least_cosine, points, slab, first }
     }
 
     /// Adds the placements around `seed` whose ends can oppose each other, and returns how many
     /// others there were.
     pub(crate) fn grow(&mut self, seed: &Seed, out: &mut Vec<Candidate>) -> usize {
         let mut refused = 0;
-        let reach = self.hand.reach();
+        let reach = self.gripper.reach();
         let depth = reach.tip - reach.palm;
         let samples = self.object.samples();
         let radius = (2.0 * reach.outer).hypot(depth);
@@ -101,7 +105,7 @@ impl<'a> Gpg<'a> {
     fn darboux(&self, seed: &Seed) -> Option<(DVec3, DVec3)> {
         let samples = self.object.samples();
         let mut spread = DMat3::ZERO;
-        let radius = 0.5 * self.hand.reach().finger_width;
+        let radius = 0.5 * self.gripper.reach().finger_width;
         for i in samples.tree.points_within(seed.point, radius) {
             let n = samples.normals[i as usize];
             spread += DMat3::from_cols(n * n.x, n * n.y, n * n.z);
@@ -120,36 +124,33 @@ impl<'a> Gpg<'a> {
         Some((normal, axis.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())))
     }
 
-    /// Slides the open hand along its closing axis and pushes it forward at each place.
+    /// Slides the open gripper along its closing axis and pushes it forward at each place.
     fn place(&mut self, seed: &Seed, turn: &Rotation, out: &mut Vec<Candidate>) -> usize {
-        let reach = self.hand.reach();
-        let opening = *self.hand.opening().end();
+        let reach = self.gripper.reach();
+        let opening = *self.gripper.opening().end();
         let span = opening / 2.0 + reach.outer; // the farthest a finger gets
         self.gather(turn, span, reach);
-        let bin = |y: f64| (((y + span) / BIN).max(0.0) as usize).min(self.first.len() - 1);
-        let least = |from: f64, to: f64| {
-            self.first[bin(from)..=bin(to)].iter().copied().fold(f64::INFINITY, f64::min)
-        };
-        let bite = INITIAL_BITE * self.hand.pad()[1];
+        let bite = INITIAL_BITE * self.gripper.pad()[1];
         let (mut last, mut refused) = (None, 0);
         for k in 0..PLACEMENTS {
             let offset = opening * ((k as f64 + 0.5) / PLACEMENTS as f64 - 0.5);
             let (left, right) = (offset - opening / 2.0, offset + opening / 2.0);
-            let fingers = least(left - reach.finger_thickness, left - BIN)
-                .min(least(right + BIN, right + reach.finger_thickness));
-            let front = least(left, right);
+            let fingers = self
+                .nearest_surface(span, left - reach.finger_thickness, left - BIN)
+                .min(self.nearest_surface(span, right + BIN, right + reach.finger_thickness));
+            let front = self.nearest_surface(span, left, right);
             // Pushed until a fingertip touches beside, or the palm in front.
             let tip = (fingers - PUSH_GAP).min(front + reach.tip - reach.palm - PUSH_GAP);
             if !(front.is_finite() && tip - front >= bite) {
                 continue;
             }
             // Deepest, and with the pads just filled.
-            let shallow = (front + (reach.tip + self.hand.pad()[1] / 2.0)).min(tip);
+            let shallow = (front + (reach.tip + self.gripper.pad()[1] / 2.0)).min(tip);
             let deeper = tip - shallow > bite;
             for tip in [Some(tip), deeper.then_some(shallow)].into_iter().flatten() {
                 let middle = tip - reach.tip;
                 let Some((held, opposed)) = self.held([left, right], middle) else { continue };
-                let key = (bin(held[0]), bin(held[1]), bin(middle.max(-span)));
+                let key = [held[0], held[1], middle.max(-span)].map(|y| self.bin(span, y));
                 if last.replace(key) == Some(key) {
                     continue;
                 }
@@ -164,24 +165,35 @@ impl<'a> Gpg<'a> {
         refused
     }
 
+    /// The bin of a place along the closing axis; the first one begins at `-span`.
+    fn bin(&self, span: f64, y: f64) -> usize {
+        (((y + span) / BIN).max(0.0) as usize).min(self.first.len() - 1)
+    }
+
+    /// Least z of the surface between two places along the closing axis.
+    fn nearest_surface(&self, span: f64, from: f64, to: f64) -> f64 {
+        let bins = self.bin(span, from)..=self.bin(span, to);
+        self.first[bins].iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// What lies between pads whose middle is at `middle` along the approach: its extent along the
     /// closing axis, and whether at both ends some normal is within reach of the friction cone.
     fn held(&self, [left, right]: [f64; 2], middle: f64) -> Option<([f64; 2], bool)> {
-        let half = self.hand.pad()[1] / 2.0;
-        let between = || {
-            self.slab
-                .iter()
-                .filter(move |(p, _)| (p.z - middle).abs() <= half && p.y > left && p.y < right)
-        };
-        let (low, high) = between()
+        let half = self.gripper.pad()[1] / 2.0;
+        let is_between = |p: DVec3| (p.z - middle).abs() <= half && p.y > left && p.y < right;
+        let between = self.slab.iter().filter(|(p, _)| is_between(*p));
+        let (low, high) = between
+            .clone()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (p, _)| (l.min(p.y), h.max(p.y)));
         if low > high {
             return None;
         }
-        let faces = |end: f64| {
-            between().any(|(p, along)| (p.y - end).abs() <= END && along.abs() >= self.least_cosine)
-        };
-        Some(([low, high], faces(low) && faces(high)))
+        let opposed = [low, high].into_iter().all(|end| {
+            between
+                .clone()
+                .any(|(p, along)| (p.y - end).abs() <= END && along.abs() >= self.least_cosine)
+        });
+        Some(([low, high], opposed))
     }
 
     fn gather(&mut self, turn: &Rotation, span: f64, reach: GripperExtents) {
@@ -209,15 +221,15 @@ mod tests {
     use super::*;
     use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
-    use crate::test_shapes::cylinder;
+    use crate::test_meshes::cylinder;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn the_frame_on_a_cylinder_knows_normal_and_axis() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
-        let gpg = Gpg::new(&object, &hand, 0.5);
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gpg = Gpg::new(&object, &gripper, 0.5);
         let seed = Seed { point: DVec3::X * 0.02, normal: DVec3::X, item: 0 };
         let (normal, axis) = gpg.darboux(&seed).unwrap();
         assert!(normal.x > 0.99 && axis.z.abs() > 0.99, "{normal} {axis}");
@@ -226,11 +238,11 @@ mod tests {
     #[test]
     fn hands_are_pushed_until_they_hold_the_cylinder() {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut candidates = Vec::new();
-        let mut gpg = Gpg::new(&object, &hand, 0.5);
+        let mut gpg = Gpg::new(&object, &gripper, 0.5);
         for _ in 0..20 {
             gpg.grow(&region.draw(&object, &mut rng), &mut candidates);
         }

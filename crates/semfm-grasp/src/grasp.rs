@@ -1,4 +1,4 @@
-//! A hand pose with its reasons.
+//! A gripper pose with its reasons.
 
 use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
@@ -11,7 +11,7 @@ pub struct Grasp {
     /// Distance between the pads when they have closed, metres: each stands a tenth of a millimetre
     /// off the object's first point, so that rounding never makes a touch a collision.
     pub width: f64,
-    /// Distance between the pads on the way in, metres: fully open, or less where a fully open hand
+    /// Distance between the pads on the way in, metres: fully open, or less where a fully open gripper
     /// would hit something.
     pub opening: f64,
     /// One contact point for each pad (the one at -y first), in the object's frame, metres. Both
@@ -30,7 +30,7 @@ pub struct Grasp {
 }
 
 impl Grasp {
-    /// The direction in which the hand comes, in the object's frame (unit).
+    /// The direction in which the gripper comes, in the object's frame (unit).
     pub fn approach(&self) -> DVec3 {
         self.object_from_tcp.rotation * DVec3::Z
     }

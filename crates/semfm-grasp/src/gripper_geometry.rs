@@ -34,7 +34,7 @@ struct Piece {
     shape: Convex,
 }
 
-/// Lengths of the open hand, metres: what GPG calls finger width, outer diameter, depth and height.
+/// Lengths of the open gripper, metres: what GPG calls finger width, outer diameter, depth and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripperExtents {
     /// How far the fingertips stand out along z, from the TCP.
@@ -49,9 +49,9 @@ pub struct GripperExtents {
     pub outer: f64,
 }
 
-/// A hand of three boxes, by its dimensions in metres: the simplest hand that grasps.
+/// A gripper of three boxes, by its dimensions in metres: the simplest gripper that grasps.
 ///
-/// The default has the dimensions of the Franka hand.
+/// The default has the dimensions of the Franka gripper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxGripper {
     /// Distances between the pads.
@@ -108,7 +108,7 @@ impl GripperGeometry {
         Self::from_pieces(gripper.opening.clone(), gripper.pad, pieces, Arc::new(motion))
     }
 
-    /// A hand of three boxes.
+    /// A gripper of three boxes.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an opening or a pad without size.
@@ -155,7 +155,7 @@ impl GripperGeometry {
         Ok(Self { opening, pad, pieces, motion, reach })
     }
 
-    /// Distances between the pads that the hand can reach, metres.
+    /// Distances between the pads that the gripper can reach, metres.
     pub fn opening(&self) -> RangeInclusive<f64> {
         self.opening.clone()
     }
@@ -165,14 +165,14 @@ impl GripperGeometry {
         self.pad
     }
 
-    /// Lengths of the open hand.
+    /// Lengths of the open gripper.
     pub fn reach(&self) -> GripperExtents {
         self.reach
     }
 
-    /// The hand with its pads `width` apart.
+    /// The gripper with its pads `width` apart.
     pub(crate) fn at(&self, width: f64) -> PosedGripper<'_> {
-        PosedGripper { hand: self, poses: (self.motion)(width) }
+        PosedGripper { gripper: self, poses: (self.motion)(width) }
     }
 }
 
@@ -201,27 +201,27 @@ impl GripperExtents {
     }
 }
 
-/// A hand at one width: its pieces with their poses in the TCP frame.
+/// A gripper at one width: its pieces with their poses in the TCP frame.
 #[derive(Clone)]
 pub(crate) struct PosedGripper<'a> {
-    hand: &'a GripperGeometry,
+    gripper: &'a GripperGeometry,
     poses: Vec<Pose>,
 }
 
 impl PosedGripper<'_> {
     /// Role, shape and pose of each piece.
     pub(crate) fn pieces(&self) -> impl Iterator<Item = (Role, &Convex, &Pose)> {
-        self.hand
+        self.gripper
             .pieces
             .iter()
             .zip(&self.poses)
             .map(|(piece, pose)| (piece.role, &piece.shape, pose))
     }
 
-    /// The same hand seen from the TCP of `other`, both having their palm in one place: where a
+    /// The same gripper seen from the TCP of `other`, both having their palm in one place: where a
     /// linkage carries the pads along z as it closes, the robot holds the flange still.
     pub(crate) fn with_palm_of(mut self, other: &Self) -> Self {
-        let palm = self.hand.pieces.iter().position(|piece| piece.role == Role::Palm);
+        let palm = self.gripper.pieces.iter().position(|piece| piece.role == Role::Palm);
         if let Some(palm) = palm {
             let shift = other.poses[palm] * self.poses[palm].inverse();
             self.poses.iter_mut().for_each(|pose| *pose = shift * *pose);

@@ -7,38 +7,39 @@
 mod antipodal;
 mod candidate;
 mod clip;
-mod closure;
 mod collision;
 mod contact;
 mod error;
-pub mod find;
+mod find;
 #[cfg(test)]
 mod find_tests;
+mod force_closure;
 mod gpg;
-pub mod grasp;
-pub mod gripper_geometry;
-pub mod object;
+mod grasp;
+mod gripper_geometry;
+mod neighbours;
+mod object;
 mod obstacle;
 mod pose_grid;
-pub mod rejection;
-pub mod scene;
+mod rejection;
+mod scene;
 mod score;
 mod search;
-pub mod select;
-pub mod settings;
+mod select;
+mod settings;
 mod solid;
-mod spread;
 #[cfg(test)]
-mod test_shapes;
+mod test_meshes;
 mod wrench_hull;
 
 pub use error::{Error, Result};
-pub use find::{Grasps, examine_poses, find_grasps, find_grasps_with};
+pub use find::{Grasps, PoseToExamine, examine_poses, find_grasps, find_grasps_with};
 pub use grasp::Grasp;
-pub use gripper_geometry::{BoxGripper, GripperGeometry};
+pub use gripper_geometry::{BoxGripper, GripperExtents, GripperGeometry};
 pub use object::GraspObject;
 pub use rejection::{Miss, Reason, Rejected};
-pub use scene::Scene;
+pub use scene::{Scene, Table};
+pub use select::GraspDistance;
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use semfm_robot::Pose;
-pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation};
+pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation, TERMS};

@@ -66,8 +66,8 @@ impl GraspObject {
     /// An object from a mesh in any unit; `scale` makes metres of it.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a scale that is not positive; an error of the ground floor for a
-    /// mesh without area.
+    /// [`Error::OutOfRange`] for a scale that is not positive; [`semfm_geom::Error::NoArea`]
+    /// for a mesh without area.
     pub fn from_mesh(mesh: &Mesh, scale: f64) -> Result<Self> {
         if !(scale > 0.0 && scale.is_finite()) {
             let expected = "a positive number of metres for a unit of the mesh".into();
@@ -103,7 +103,7 @@ impl GraspObject {
     /// where absent, and turned towards `viewpoint` where one is given; otherwise their sign is
     /// taken for unknown.
     ///
-    /// A cloud that shows one side of an object only says nothing of the other: a hand may run into
+    /// A cloud that shows one side of an object only says nothing of the other: a gripper may run into
     /// what was not seen. Complete it first, or put the unseen into the scene.
     ///
     /// # Errors
@@ -114,18 +114,15 @@ impl GraspObject {
         normals: Option<&[DVec3]>,
         viewpoint: Option<DVec3>,
     ) -> Result<Self> {
-        let bad = |what, expected: &str, found: String| {
-            Err(Error::OutOfRange { what, expected: expected.into(), found })
-        };
         if points.len() < 3 {
-            return bad("points of the cloud", "at least 3", points.len().to_string());
+            return Error::out_of_range("points of the cloud", "at least 3", points.len());
         }
         if normals.is_some_and(|normals| normals.len() != points.len()) {
-            let found = normals.map_or(0, <[DVec3]>::len).to_string();
-            return bad("normals of the cloud", "one for each point", found);
+            let found = normals.map_or(0, <[DVec3]>::len);
+            return Error::out_of_range("normals of the cloud", "one for each point", found);
         }
         if let Some(eye) = viewpoint.filter(|eye| !eye.is_finite()) {
-            return bad("viewpoint", "finite coordinates", eye.to_string());
+            return Error::out_of_range("viewpoint", "finite coordinates", eye);
         }
         for &normal in normals.unwrap_or_default() {
             direction("normal of the cloud", normal)?;
@@ -230,37 +227,37 @@ pub(crate) struct Seed {
 impl Region {
     /// Checks the weights and divides them by the largest.
     pub(crate) fn new(object: &GraspObject, weights: &[f64]) -> Result<Self> {
-        let bad = |expected: String, found: String| {
-            Err(Error::OutOfRange { what: "weights of the region", expected, found })
-        };
+        const WHAT: &str = "weights of the region";
         if weights.len() != object.n_weights() {
             let expected = format!("one for each of {} vertices or points", object.n_weights());
-            return bad(expected, weights.len().to_string());
+            return Error::out_of_range(WHAT, expected, weights.len());
         }
         if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
-            return bad("finite numbers of at least 0".into(), format!("{} at {i}", weights[i]));
+            let found = format!("{} at {i}", weights[i]);
+            return Error::out_of_range(WHAT, "finite numbers of at least 0", found);
         }
         let most = weights.iter().fold(0.0f64, |most, &w| most.max(w));
         if most <= 0.0 {
-            return bad("at least one above 0".into(), "only zeros".into());
+            return Error::out_of_range(WHAT, "at least one above 0", "only zeros");
         }
         let weights: Vec<f64> = weights.iter().map(|w| w / most).collect();
         let mut total = 0.0;
-        let mut add = |mass: f64| {
-            total += mass;
-            total
-        };
-        let cumulative: Vec<f64> = match &object.surface {
+        let mut cumulative: Vec<f64> = match &object.surface {
             Surface::Mesh { mesh, .. } => (0..mesh.n_faces())
                 .map(|face| {
                     let mean = mesh.faces()[face].iter().map(|&v| weights[v as usize]).sum::<f64>();
-                    add(mesh.face_area(face) * mean / 3.0)
+                    mesh.face_area(face) * mean / 3.0
                 })
                 .collect(),
-            Surface::Cloud { .. } => weights.iter().map(|&w| add(w)).collect(),
+            Surface::Cloud { .. } => weights.clone(),
         };
+        for mass in &mut cumulative {
+            total += *mass;
+            *mass = total;
+        }
         if !(total > 0.0 && total.is_finite()) {
-            return bad("a region with an area".into(), format!("area times weight {total}"));
+            let found = format!("area times weight {total}");
+            return Error::out_of_range(WHAT, "a region with an area", found);
         }
         Ok(Self { weights, cumulative })
     }
@@ -295,12 +292,13 @@ impl Region {
 fn outward_signs(mesh: &Mesh) -> Vec<f64> {
     let parts = components(mesh);
     let mut volumes = vec![0.0; parts.count];
-    let part_of = |face: usize| parts.of_vertex[mesh.faces()[face][0] as usize] as usize;
+    let part_of_face: Vec<usize> =
+        mesh.faces().iter().map(|corners| parts.of_vertex[corners[0] as usize] as usize).collect();
     let (origin, _) = mesh.bounds();
-    for face in 0..mesh.n_faces() {
-        volumes[part_of(face)] += cone_volume(mesh, face, origin);
+    for (face, &part) in part_of_face.iter().enumerate() {
+        volumes[part] += cone_volume(mesh, face, origin);
     }
-    (0..mesh.n_faces()).map(|face| if volumes[part_of(face)] < 0.0 { -1.0 } else { 1.0 }).collect()
+    part_of_face.iter().map(|&part| if volumes[part] < 0.0 { -1.0 } else { 1.0 }).collect()
 }
 
 /// Signed volume of the cone from `apex` over a face.
@@ -338,8 +336,11 @@ fn radius(points: &[DVec3], centre: DVec3) -> f64 {
 /// Median distance from a point to its nearest neighbour, over at most 2000 of the points.
 fn median_spacing(points: &[DVec3], index: &PointIndex) -> f64 {
     let step = points.len().div_ceil(2000);
-    let nearest = |p: &DVec3| index.k_nearest(*p, 2).get(1).map_or(0.0, |hit| hit.1);
-    let mut distances: Vec<f64> = points.iter().step_by(step).map(nearest).collect();
+    let mut distances: Vec<f64> = points
+        .iter()
+        .step_by(step)
+        .map(|&p| index.k_nearest(p, 2).get(1).map_or(0.0, |hit| hit.1))
+        .collect();
     distances.sort_by(f64::total_cmp);
     distances[distances.len() / 2].max(1e-6)
 }

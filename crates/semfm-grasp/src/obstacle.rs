@@ -1,4 +1,4 @@
-//! What a hand must not run into: triangles or points under a tree of boxes.
+//! What a gripper must not run into: triangles or points under a tree of boxes.
 
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
@@ -108,11 +108,10 @@ impl Obstacle {
         radius: f64,
     ) -> impl Iterator<Item = u32> + '_ {
         let reach = radius * radius;
-        let inside = move |node: &BvhNode| {
+        self.tree.leaves(move |node: &BvhNode| {
             let outside = (node.mins() - centre).max(centre - node.maxs()).max(DVec3::ZERO);
             outside.length_squared() <= reach
-        };
-        self.tree.leaves(inside)
+        })
     }
 
     /// Where the line `origin + t · direction`, t in (`near`, `far`), crosses triangles: t and the
@@ -125,20 +124,9 @@ impl Obstacle {
         far: f64,
     ) -> Vec<(f64, u32)> {
         let Items::Triangles(triangles) = &self.items else { return Vec::new() };
-        let slab = |node: &BvhNode| {
-            let (low, high) =
-                ((node.mins() - origin) / direction, (node.maxs() - origin) / direction);
-            // A direction with a zero makes infinities (right) or, on a face of the box, NaN, which
-            // min and max of f64 leave out.
-            let (enter, leave) = (0..3).fold((near, far), |(enter, leave), axis| {
-                let (a, b) = (low[axis], high[axis]);
-                (enter.max(a.min(b)), leave.min(a.max(b)))
-            });
-            enter <= leave + 1e-12
-        };
         let mut hits: Vec<(f64, u32)> = self
             .tree
-            .leaves(slab)
+            .leaves(|node: &BvhNode| meets_box(node, origin, direction, [near, far]))
             .filter_map(|i| Some((crossing(&triangles[i as usize], origin, direction)?, i)))
             .filter(|&(t, _)| t > near && t < far)
             .collect();
@@ -153,13 +141,28 @@ impl Obstacle {
         if !self.closed || point.cmplt(bounds.mins).any() || point.cmpgt(bounds.maxs).any() {
             return false;
         }
-        let odd = |ray: &&DVec3| self.crossings(point, **ray, 0.0, f64::MAX).len() % 2 == 1;
-        INSIDE_RAYS.iter().filter(odd).count() >= 2
+        let says_inside = INSIDE_RAYS
+            .iter()
+            .filter(|ray| self.crossings(point, **ray, 0.0, f64::MAX).len() % 2 == 1);
+        says_inside.count() >= 2
     }
 }
 
 fn tree(boxes: &[Aabb]) -> Bvh {
     Bvh::from_leaves(BvhBuildStrategy::Binned, boxes)
+}
+
+/// Whether the line `origin + t · direction`, t in `[near, far]`, meets the node's box (the slab test
+/// of Kay & Kajiya 1986).
+fn meets_box(node: &BvhNode, origin: DVec3, direction: DVec3, [near, far]: [f64; 2]) -> bool {
+    let (low, high) = ((node.mins() - origin) / direction, (node.maxs() - origin) / direction);
+    // A direction with a zero makes infinities (right) or, on a face of the box, NaN, which min and
+    // max of f64 leave out.
+    let (enter, leave) = (0..3).fold((near, far), |(enter, leave), axis| {
+        let (a, b) = (low[axis], high[axis]);
+        (enter.max(a.min(b)), leave.min(a.max(b)))
+    });
+    enter <= leave + 1e-12
 }
 
 /// Möller & Trumbore (Fast, Minimum Storage Ray/Triangle Intersection, 1997), both sides.

@@ -16,21 +16,21 @@ pub enum Reason {
     ForceClosure,
     /// Too little of a pad lies in the region (share missing).
     Region,
-    /// Wider or narrower than the hand or the limit allows (metres beyond it).
+    /// Wider or narrower than the gripper or the limit allows (metres beyond it).
     Width,
-    /// The hand would be in the table, or nearer to it than asked (metres too near).
+    /// The gripper would be in the table, or nearer to it than asked (metres too near).
     Table,
-    /// The hand runs into the object where it grasps (metres to back off until it is free).
+    /// The gripper runs into the object where it grasps (metres to back off until it is free).
     Collision,
-    /// The open hand hits the object or the scene on its way in (metres to back off).
+    /// The open gripper hits the object or the scene on its way in (metres to back off).
     ApproachPath,
     /// A finger hits something before its pad touches (metres to back off).
     Closing,
-    /// The hand runs into the scene where it grasps (metres to back off).
+    /// The gripper runs into the scene where it grasps (metres to back off).
     Scene,
-    /// The hand would be inside of something solid (metres to back off).
+    /// The gripper would be inside of something solid (metres to back off).
     Inside,
-    /// The open hand is nearer to something than asked (metres too near).
+    /// The open gripper is nearer to something than asked (metres too near).
     Clearance,
 }
 
@@ -85,18 +85,39 @@ impl Reason {
         match self {
             Self::NoContact => "no opposite surface, or nothing between the pads",
             Self::Approach => "the approach lies outside the asked cone",
-            Self::Width => "wider or narrower than the hand or the limit allows",
-            Self::Table => "the hand would be in the table or too near to it",
+            Self::Width => "wider or narrower than the gripper or the limit allows",
+            Self::Table => "the gripper would be in the table or too near to it",
             Self::Region => "too little of a pad lies in the region",
             Self::Contact => "too little of a pad touches",
             Self::ForceClosure => "the contacts would slip at this friction",
-            Self::Collision => "the hand runs into the object where it grasps",
-            Self::ApproachPath => "the open hand hits something on its way in",
+            Self::Collision => "the gripper runs into the object where it grasps",
+            Self::ApproachPath => "the open gripper hits something on its way in",
             Self::Closing => "a finger hits something before its pad touches",
-            Self::Scene => "the hand runs into the scene where it grasps",
-            Self::Inside => "the hand would be inside of something solid",
-            Self::Clearance => "the open hand is nearer to something than asked",
+            Self::Scene => "the gripper runs into the scene where it grasps",
+            Self::Inside => "the gripper would be inside of something solid",
+            Self::Clearance => "the open gripper is nearer to something than asked",
         }
+    }
+}
+
+/// What a candidate failed, and by how much in the unit of the reason.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Refusal {
+    pub(crate) reason: Reason,
+    pub(crate) by: f64,
+}
+
+impl Refusal {
+    /// `Ok` where `by` is not positive: the amount by which a limit is missed.
+    pub(crate) fn where_positive(reason: Reason, by: f64) -> Result<(), Self> {
+        if by > 0.0 { Err(Self { reason, by }) } else { Ok(()) }
+    }
+}
+
+impl From<Reason> for Refusal {
+    /// A failure whose amount is not known.
+    fn from(reason: Reason) -> Self {
+        Self { reason, by: 0.0 }
     }
 }
 

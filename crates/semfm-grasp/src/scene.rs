@@ -46,27 +46,24 @@ impl Scene {
         Ok(self)
     }
 
-    /// Adds a mesh: nothing of the hand may touch a triangle of it, nor be inside where it is
+    /// Adds a mesh: nothing of the gripper may touch a triangle of it, nor be inside where it is
     /// watertight.
     pub fn with_mesh(mut self, mesh: &Mesh) -> Self {
         self.obstacles.push(Obstacle::of_mesh(mesh));
         self
     }
 
-    /// Adds points; the hand keeps `margin` metres away from each. An empty cloud adds nothing.
+    /// Adds points; the gripper keeps `margin` metres away from each. An empty cloud adds nothing.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for numbers that are not finite and a negative margin.
     pub fn with_cloud(mut self, points: &[DVec3], margin: f64) -> Result<Self> {
-        let bad = |what, expected: &str, found| {
-            Err(Error::OutOfRange { what, expected: expected.into(), found })
-        };
         if !(margin >= 0.0 && margin.is_finite()) {
-            return bad("margin around the cloud", "at least 0 m", margin.to_string());
+            return Error::out_of_range("margin around the cloud", "at least 0 m", margin);
         }
         if let Some(i) = points.iter().position(|p| !p.is_finite()) {
             let found = format!("{} at point {i}", points[i]);
-            return bad("points of the scene", "finite coordinates", found);
+            return Error::out_of_range("points of the scene", "finite coordinates", found);
         }
         if !points.is_empty() {
             self.obstacles.push(Obstacle::of_points(points.to_vec(), margin));

@@ -2,9 +2,9 @@
 
 use semfm_geom::math::DVec3;
 
-use crate::closure::{SoftContact, ferrari_canny};
 use crate::collision::{FAR, Fit};
-use crate::contact::Closing;
+use crate::contact::{Closing, Patch};
+use crate::force_closure::{SoftContact, ferrari_canny};
 use crate::gripper_geometry::GripperGeometry;
 use crate::object::GraspObject;
 use crate::settings::GraspSettings;
@@ -22,7 +22,7 @@ const FULL_CONTACT: f64 = 0.6;
 /// | `epsilon` | ε of two full pads around the centre of mass | no force closure |
 /// | `gravity` | the weight does not turn the object about the closing axis | its arm is long against the pads (1 / (1 + arm / pad)) |
 /// | `lever` | contacts around the centre of mass | as far from it as the object reaches |
-/// | `clearance` | the open hand is 1 cm from everything | it touches |
+/// | `clearance` | the open gripper is 1 cm from everything | it touches |
 /// | `bite` | the pads are filled along their length | only a tip holds |
 /// | `approach` | as demonstrated | at a right angle to it, or against |
 /// | `region` | all contact is at full weight | none is in the region |
@@ -46,12 +46,12 @@ pub(crate) struct Score {
 impl<'a> Scorer<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
-        hand: &GripperGeometry,
+        gripper: &GripperGeometry,
         settings: &'a GraspSettings,
         down: Option<DVec3>,
     ) -> Self {
-        let pad = hand.pad();
-        let half = (*hand.opening().end() / 2.0).min(object.radius());
+        let pad = gripper.pad();
+        let half = (*gripper.opening().end() / 2.0).min(object.radius());
         let ideal = [-1.0, 1.0].map(|side| {
             let y = side * DVec3::Y;
             SoftContact::new(half * y, -y, DVec3::Z, pad[0] * pad[1], settings.friction)
@@ -61,7 +61,7 @@ impl<'a> Scorer<'a> {
         Self { object, settings, down, pad, best_epsilon }
     }
 
-    /// Scores a grasp whose widest contact angle (radians, see `closure`) is `angle`.
+    /// Scores a grasp whose widest contact angle (radians, see `force_closure`) is `angle`.
     pub(crate) fn score(&self, closing: &Closing, fit: &Fit, angle: f64) -> Score {
         let [left, right] = &closing.patches;
         let com = self.object.centre_of_mass();
@@ -73,7 +73,6 @@ impl<'a> Scorer<'a> {
         });
         let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
         let arm = com - left.contact.midpoint(right.contact);
-        let bite = |depth: [f64; 2]| (depth[1] - depth[0]) / self.pad[1];
         let weights = &self.settings.weights;
         let mut weighted = vec![
             ("contact", weights.contact, self.pad_share(closing) / FULL_CONTACT),
@@ -86,7 +85,7 @@ impl<'a> Scorer<'a> {
             ),
             ("lever", weights.lever, 1.0 - arm.length() / self.object.radius()),
             ("clearance", weights.clearance, fit.clearance / FAR),
-            ("bite", weights.bite, bite(left.depth).min(bite(right.depth))),
+            ("bite", weights.bite, self.bite(left).min(self.bite(right))),
             ("region", weights.region, left.region.midpoint(right.region)),
         ];
         if let Some(demonstrated) = self.settings.demonstrated_approach {
@@ -102,6 +101,11 @@ impl<'a> Scorer<'a> {
             epsilon,
             terms: weighted.into_iter().map(|(n, _, value)| (n, value)).collect(),
         }
+    }
+
+    /// Share of the pad's length that a patch fills.
+    fn bite(&self, patch: &Patch) -> f64 {
+        (patch.depth[1] - patch.depth[0]) / self.pad[1]
     }
 
     /// Share of its pad that the smaller patch covers.
@@ -129,20 +133,20 @@ mod tests {
     use crate::contact::close;
     use crate::gripper_geometry::BoxGripper;
     use crate::object::Region;
-    use crate::test_shapes::cuboid;
+    use crate::test_meshes::cuboid;
     use parry3d_f64::math::Pose;
 
     #[test]
     fn the_middle_of_a_bar_is_best_and_each_term_tells_why() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::new(0.2, 0.03, 0.03)), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let settings = GraspSettings::default();
-        let scorer = Scorer::new(&object, &hand, &settings, Some(DVec3::NEG_Z));
+        let scorer = Scorer::new(&object, &gripper, &settings, Some(DVec3::NEG_Z));
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 0.02 };
         let at = |x: f64, z: f64| {
             let tcp = Pose::new(DVec3::new(x, 0.0, z), DVec3::X * PI);
-            let closing = close(&object, &region, &hand, &tcp, [-0.015, 0.015], 1.5e-3).unwrap();
+            let closing = close(&object, &region, &gripper, &tcp, [-0.015, 0.015], 1.5e-3).unwrap();
             scorer.score(&closing, &fit, 0.0)
         };
         let value = |score: &Score, name: &str| {
@@ -165,14 +169,14 @@ mod tests {
     fn the_demonstrated_approach_counts_where_it_is_given() {
         let object = GraspObject::from_mesh(&cuboid(DVec3::splat(0.03)), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
-        let hand = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
+        let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let closing =
-            close(&object, &region, &hand, &Pose::IDENTITY, [-0.015, 0.015], 1.5e-3).unwrap();
+            close(&object, &region, &gripper, &Pose::IDENTITY, [-0.015, 0.015], 1.5e-3).unwrap();
         let fit = Fit { width: 0.03, opening: 0.08, clearance: 1.0 };
         let scores = [DVec3::Z, DVec3::X].map(|approach| {
             let demonstrated_approach = Some(approach);
             let settings = GraspSettings { demonstrated_approach, ..GraspSettings::default() };
-            Scorer::new(&object, &hand, &settings, None).score(&closing, &fit, 0.0).score
+            Scorer::new(&object, &gripper, &settings, None).score(&closing, &fit, 0.0).score
         });
         assert!(scores[0] > scores[1] + 0.1);
     }

@@ -14,19 +14,19 @@ use semfm_geom::math::DVec3;
 use crate::Result;
 use crate::antipodal::antipodal;
 use crate::candidate::Candidate;
-use crate::closure::widest_angle;
 use crate::collision::{Collision, Fit};
 use crate::contact::{Closing, TOUCH_GAP, close};
+use crate::force_closure::widest_angle;
 use crate::gpg::Gpg;
 use crate::grasp::Grasp;
 use crate::gripper_geometry::GripperGeometry;
+use crate::neighbours::neighbours;
 use crate::object::{GraspObject, Region, Surface};
-use crate::rejection::{Miss, Reason, Rejected};
+use crate::rejection::{Miss, Reason, Refusal, Rejected};
 use crate::scene::Scene;
 use crate::score::Scorer;
 use crate::select::suppress;
 use crate::settings::GraspSettings;
-use crate::spread::neighbours;
 
 /// Contacts must lie inside the friction cone by this share of its half-angle: another program
 /// computes other normals.
@@ -51,16 +51,21 @@ pub(crate) struct Found {
 /// A refused candidate, as far as it came.
 #[derive(Clone)]
 pub(crate) struct Near {
-    reason: Reason,
-    by: f64,
+    refusal: Refusal,
     candidate: Candidate,
     closing: Option<Closing>,
+}
+
+impl Near {
+    fn boxed(refusal: Refusal, candidate: &Candidate, closing: Option<&Closing>) -> Box<Self> {
+        Box::new(Self { refusal, candidate: *candidate, closing: closing.cloned() })
+    }
 }
 
 pub(crate) struct Search<'a> {
     object: &'a GraspObject,
     region: &'a Region,
-    hand: &'a GripperGeometry,
+    gripper: &'a GripperGeometry,
     settings: &'a GraspSettings,
     collision: Collision<'a>,
     scorer: Scorer<'a>,
@@ -70,14 +75,14 @@ impl<'a> Search<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
         region: &'a Region,
-        hand: &'a GripperGeometry,
+        gripper: &'a GripperGeometry,
         scene: &'a Scene,
         settings: &'a GraspSettings,
     ) -> Self {
         let down = scene.table().map(|table| -table.normal);
-        let scorer = Scorer::new(object, hand, settings, down);
-        let collision = Collision::new(object, scene, hand, settings);
-        Self { object, region, hand, settings, collision, scorer }
+        let scorer = Scorer::new(object, gripper, settings, down);
+        let collision = Collision::new(object, scene, gripper, settings);
+        Self { object, region, gripper, settings, collision, scorer }
     }
 
     pub(crate) fn run(&self, task: &Task) -> Result<Sampled> {
@@ -87,7 +92,7 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .map_init(
                 || {
-                    let gpg = Gpg::new(self.object, self.hand, self.settings.friction);
+                    let gpg = Gpg::new(self.object, self.gripper, self.settings.friction);
                     (gpg, Vec::new())
                 },
                 |(gpg, candidates), i| {
@@ -112,7 +117,7 @@ impl<'a> Search<'a> {
         let mut sampled = Sampled::default();
         if on_mesh && i.is_multiple_of(2) {
             let friction = self.settings.friction;
-            antipodal(self.object, self.hand, &seed, friction, &mut rng, candidates);
+            antipodal(self.object, self.gripper, &seed, friction, &mut rng, candidates);
         } else {
             let refused = gpg.grow(&seed, candidates);
             sampled.n_candidates += refused;
@@ -124,18 +129,18 @@ impl<'a> Search<'a> {
         }
         sampled.n_candidates += candidates.len();
         for candidate in candidates.iter() {
-            sampled.settle(self.examine(candidate));
+            sampled.record(self.examine(candidate));
         }
         sampled
     }
 
     /// Merges near grasps and tries the neighbours of those that stay, and theirs again.
-    pub(crate) fn spread(&self, mut sampled: Sampled, task: &Task) -> Result<Found> {
+    pub(crate) fn add_neighbours(&self, mut sampled: Sampled, task: &Task) -> Result<Found> {
         let separation = self.settings.separation;
         let mut n_survivors = sampled.grasps.len();
         let mut kept = suppress(std::mem::take(&mut sampled.grasps), separation);
         let mut frontier = kept.clone();
-        let rounds = self.settings.spread_rounds;
+        let rounds = self.settings.neighbour_rounds;
         for round in 0..rounds {
             task.step("spread", round, rounds)?;
             let mut part = Sampled::default();
@@ -145,17 +150,13 @@ impl<'a> Search<'a> {
                 .par_iter()
                 .map(|candidate| task.check().map(|()| self.examine(candidate)))
                 .collect::<std::result::Result<_, _>>()?;
-            results.into_iter().for_each(|result| part.settle(result));
+            results.into_iter().for_each(|result| part.record(result));
             n_survivors += part.grasps.len();
-            let bits = |grasp: &Grasp| {
-                let Pose { translation, rotation } = grasp.object_from_tcp;
-                (translation.to_array().map(f64::to_bits), rotation.to_array().map(f64::to_bits))
-            };
-            let before: HashSet<_> = kept.iter().map(bits).collect();
+            let before: HashSet<PoseBits> = kept.iter().map(pose_bits).collect();
             kept.append(&mut part.grasps);
             kept = suppress(kept, separation);
             frontier =
-                kept.iter().filter(|grasp| !before.contains(&bits(grasp))).cloned().collect();
+                kept.iter().filter(|grasp| !before.contains(&pose_bits(grasp))).cloned().collect();
             sampled.absorb(part);
         }
         Ok(Found { kept, n_survivors, sampled })
@@ -163,54 +164,53 @@ impl<'a> Search<'a> {
 
     /// The stages, cheap ones first.
     pub(crate) fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
-        let near = |closing: Option<&Closing>| {
-            let closing = closing.cloned();
-            move |(reason, by)| Box::new(Near { reason, by, candidate: *candidate, closing })
-        };
-        self.approach(candidate).map_err(near(None))?;
+        self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
         let compliance = self.settings.compliance;
         let Candidate { tcp, seed } = candidate;
-        let closing = close(self.object, self.region, self.hand, tcp, *seed, compliance)
-            .ok_or((Reason::NoContact, 0.0))
-            .map_err(near(None))?;
-        let some = || near(Some(&closing));
-        let angle = self.contacts(&closing).map_err(some())?;
-        self.width(&closing).map_err(some())?;
-        self.collision.above_table(&closing).map_err(some())?;
-        let fit = self.collision.fit(&closing).map_err(some())?;
-        Ok(self.grasp(&closing, &fit, angle))
+        let closing = close(self.object, self.region, self.gripper, tcp, *seed, compliance)
+            .ok_or_else(|| Near::boxed(Reason::NoContact.into(), candidate, None))?;
+        self.examine_closed(&closing)
+            .map_err(|refusal| Near::boxed(refusal, candidate, Some(&closing)))
     }
 
-    fn approach(&self, candidate: &Candidate) -> std::result::Result<(), (Reason, f64)> {
+    /// The stages after the pads have closed.
+    fn examine_closed(&self, closing: &Closing) -> std::result::Result<Grasp, Refusal> {
+        let angle = self.contacts(closing)?;
+        self.width(closing)?;
+        self.collision.above_table(closing)?;
+        let fit = self.collision.fit(closing)?;
+        Ok(self.grasp(closing, &fit, angle))
+    }
+
+    fn approach(&self, candidate: &Candidate) -> std::result::Result<(), Refusal> {
         let Some(cone) = self.settings.limits.approach else { return Ok(()) };
         let beyond = (candidate.tcp.rotation * DVec3::Z).angle_between(cone.axis) - cone.half_angle;
-        if beyond > 0.0 { Err((Reason::Approach, beyond)) } else { Ok(()) }
+        Refusal::where_positive(Reason::Approach, beyond)
     }
 
-    fn width(&self, closing: &Closing) -> std::result::Result<(), (Reason, f64)> {
-        let opening = self.hand.opening();
+    fn width(&self, closing: &Closing) -> std::result::Result<(), Refusal> {
+        let opening = self.gripper.opening();
         let asked = self.settings.limits.width.clone().unwrap_or(0.0..=f64::INFINITY);
         let least = opening.start().max(*asked.start());
         let most = (opening.end() - 2.0 * TOUCH_GAP).min(*asked.end());
         let beyond = (least - closing.width).max(closing.width - most);
-        if beyond > 0.0 { Err((Reason::Width, beyond)) } else { Ok(()) }
+        Refusal::where_positive(Reason::Width, beyond)
     }
 
     /// Patches, force closure and region; returns the widest contact angle.
-    fn contacts(&self, closing: &Closing) -> std::result::Result<f64, (Reason, f64)> {
+    fn contacts(&self, closing: &Closing) -> std::result::Result<f64, Refusal> {
         let limits = &self.settings.limits;
         let bare = limits.pad_in_contact - self.scorer.pad_share(closing);
-        if bare > 0.0 {
-            return Err((Reason::Contact, bare));
-        }
+        Refusal::where_positive(Reason::Contact, bare)?;
         let angle = widest_angle(&closing.patches, closing.tcp.rotation * DVec3::Y);
         let beyond = angle - CONE_SHARE * self.settings.friction.atan();
-        if beyond > 0.0 {
-            return Err((Reason::ForceClosure, beyond));
-        }
+        Refusal::where_positive(Reason::ForceClosure, beyond)?;
         let [left, right] = &closing.patches;
         let outside = limits.pad_in_region - left.region.min(right.region);
-        if outside > 1e-9 { Err((Reason::Region, outside)) } else { Ok(angle) }
+        if outside > 1e-9 {
+            return Err(Refusal { reason: Reason::Region, by: outside });
+        }
+        Ok(angle)
     }
 
     fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
@@ -229,8 +229,8 @@ impl<'a> Search<'a> {
 
     /// A refused candidate as a grasp, with what is known of it.
     pub(crate) fn miss(&self, near: Near) -> Miss {
-        let Near { reason, by, candidate, closing } = near;
-        let widest = *self.hand.opening().end();
+        let Near { refusal: Refusal { reason, by }, candidate, closing } = near;
+        let widest = *self.gripper.opening().end();
         let by = match (&closing, reason) {
             (Some(closing), reason)
                 if reason >= Reason::Collision && reason != Reason::Clearance =>
@@ -240,11 +240,10 @@ impl<'a> Search<'a> {
             _ => by,
         };
         let seed = candidate.seed;
-        let at = |y: f64| candidate.tcp * (DVec3::Y * y);
         let closing_axis = candidate.tcp.rotation * DVec3::Y;
         let (tcp, width, contacts, normals) = closing.map_or_else(
             || {
-                let ends = [at(seed[0]), at(seed[1])];
+                let ends = seed.map(|y| candidate.tcp * (DVec3::Y * y));
                 (candidate.tcp, seed[1] - seed[0], ends, [-closing_axis, closing_axis])
             },
             |closing| {
@@ -266,12 +265,20 @@ impl<'a> Search<'a> {
     }
 }
 
+/// A pose to the last bit, for a set.
+type PoseBits = ([u64; 3], [u64; 4]);
+
+fn pose_bits(grasp: &Grasp) -> PoseBits {
+    let Pose { translation, rotation } = grasp.object_from_tcp;
+    (translation.to_array().map(f64::to_bits), rotation.to_array().map(f64::to_bits))
+}
+
 impl Sampled {
-    fn settle(&mut self, result: std::result::Result<Grasp, Box<Near>>) {
+    fn record(&mut self, result: std::result::Result<Grasp, Box<Near>>) {
         match result {
             Ok(grasp) => self.grasps.push(grasp),
             Err(near) => {
-                self.rejected.add(near.reason, 1);
+                self.rejected.add(near.refusal.reason, 1);
                 self.consider(*near);
             }
         }
@@ -289,7 +296,8 @@ impl Sampled {
     /// Keeps what came farthest, of that what missed by least, of that the first.
     fn consider(&mut self, near: Near) {
         let nearer = self.nearest.as_ref().is_none_or(|best| {
-            near.reason > best.reason || (near.reason == best.reason && near.by < best.by)
+            let (this, that) = (near.refusal, best.refusal);
+            this.reason > that.reason || (this.reason == that.reason && this.by < that.by)
         });
         if nearer {
             self.nearest = Some(near);

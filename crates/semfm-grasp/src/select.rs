@@ -7,15 +7,38 @@ use crate::grasp::Grasp;
 use crate::pose_grid::PoseGrid;
 use crate::settings::Separation;
 
-/// Half a turn about the approach: a gripper with two equal fingers is the same hand.
+/// Half a turn about the approach: a gripper with two equal fingers is the same gripper.
 const HALF_TURN: DQuat = DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0);
 
-/// Distance between the TCPs (metres) and the angle between the hands (radians), a hand and the same
-/// hand with its fingers exchanged being one.
-pub fn gripper_distance(a: &Pose, b: &Pose) -> (f64, f64) {
-    let turn = a.rotation.inverse() * b.rotation;
-    let angle = |q: DQuat| 2.0 * q.xyz().length().atan2(q.w.abs());
-    (a.translation.distance(b.translation), angle(turn).min(angle(HALF_TURN * turn)))
+/// How far two grasps are from each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspDistance {
+    /// Between the TCPs, metres.
+    pub translation: f64,
+    /// Between the grippers, radians in [0, π].
+    pub rotation: f64,
+}
+
+impl GraspDistance {
+    /// The distance of two poses of the TCP. A gripper and the same gripper with its fingers exchanged
+    /// are one.
+    pub fn between(a: &Pose, b: &Pose) -> Self {
+        let turn = a.rotation.inverse() * b.rotation;
+        Self {
+            translation: a.translation.distance(b.translation),
+            rotation: angle(turn).min(angle(HALF_TURN * turn)),
+        }
+    }
+
+    /// In [0, 1]: the mean of the translation against `far` (metres) and of the rotation against π.
+    fn relative(self, far: f64) -> f64 {
+        ((self.translation / far).min(1.0) + self.rotation / std::f64::consts::PI) / 2.0
+    }
+}
+
+/// The angle of a rotation, radians in [0, π].
+fn angle(q: DQuat) -> f64 {
+    2.0 * q.xyz().length().atan2(q.w.abs())
 }
 
 /// Keeps a grasp where no better one is within the separation in both translation and rotation;
@@ -40,10 +63,6 @@ pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f6
     if grasps.len() <= top {
         return grasps;
     }
-    let apart = |a: &Grasp, b: &Grasp| {
-        let (translation, rotation) = gripper_distance(&a.object_from_tcp, &b.object_from_tcp);
-        ((translation / radius).min(1.0) + rotation / std::f64::consts::PI) / 2.0
-    };
     let mut distance = vec![1.0; grasps.len()];
     let mut chosen = vec![false; grasps.len()];
     for _ in 0..top {
@@ -54,7 +73,9 @@ pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f6
         };
         chosen[next] = true;
         for (d, grasp) in distance.iter_mut().zip(&grasps) {
-            *d = d.min(apart(grasp, &grasps[next]));
+            let apart =
+                GraspDistance::between(&grasp.object_from_tcp, &grasps[next].object_from_tcp);
+            *d = d.min(apart.relative(radius));
         }
     }
     grasps.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(grasp, _)| grasp).collect()
@@ -81,12 +102,13 @@ mod tests {
     #[test]
     fn exchanged_fingers_are_the_same_hand() {
         let (a, b) = (grasp(0.0, 0.1, 1.0), grasp(0.003, 0.1 + std::f64::consts::PI, 1.0));
-        let (translation, rotation) = gripper_distance(&a.object_from_tcp, &b.object_from_tcp);
-        assert!((translation - 0.003).abs() < 1e-12 && rotation < 1e-7, "{rotation}");
+        let near = GraspDistance::between(&a.object_from_tcp, &b.object_from_tcp);
+        assert!((near.translation - 0.003).abs() < 1e-12 && near.rotation < 1e-7, "{near:?}");
         let c = grasp(0.0, 0.6, 1.0);
-        assert!((gripper_distance(&a.object_from_tcp, &c.object_from_tcp).1 - 0.5).abs() < 1e-12);
+        let turned = GraspDistance::between(&a.object_from_tcp, &c.object_from_tcp).rotation;
+        assert!((turned - 0.5).abs() < 1e-12);
         let upside_down = Pose::new(DVec3::ZERO, DVec3::X * std::f64::consts::PI);
-        let (_, turned) = gripper_distance(&Pose::IDENTITY, &upside_down);
+        let turned = GraspDistance::between(&Pose::IDENTITY, &upside_down).rotation;
         assert!((turned - std::f64::consts::PI).abs() < 1e-9);
     }
 
@@ -104,12 +126,11 @@ mod tests {
 
     #[test]
     fn diversity_trades_score_for_distance() {
-        let all = || vec![grasp(0.0, 0.0, 0.9), grasp(0.011, 0.0, 0.8), grasp(0.1, 1.5, 0.6)];
-        let scores = |diversity| -> Vec<f64> {
-            diverse(all(), 2, diversity, 0.1).iter().map(|g| g.score).collect()
-        };
-        assert_eq!(scores(0.0), [0.9, 0.8]);
-        assert_eq!(scores(0.5), [0.9, 0.6]);
-        assert_eq!(diverse(all(), 9, 0.5, 0.1).len(), 3);
+        let all = vec![grasp(0.0, 0.0, 0.9), grasp(0.011, 0.0, 0.8), grasp(0.1, 1.5, 0.6)];
+        for (diversity, expected) in [(0.0, [0.9, 0.8]), (0.5, [0.9, 0.6])] {
+            let chosen = diverse(all.clone(), 2, diversity, 0.1);
+            assert_eq!(chosen.iter().map(|g| g.score).collect::<Vec<_>>(), expected);
+        }
+        assert_eq!(diverse(all, 9, 0.5, 0.1).len(), 3);
     }
 }

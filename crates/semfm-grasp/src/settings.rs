@@ -6,22 +6,22 @@ use semfm_geom::math::DVec3;
 
 use crate::{Error, Result};
 
-/// Settings of [`find_grasps`](crate::find_grasps); the default fits hands and objects of the size
-/// of a human hand.
+/// Settings of [`find_grasps`](crate::find_grasps); the default fits grippers and objects of the size
+/// of a human gripper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraspSettings {
     /// Surface points from which candidates are grown; each gives some twenty.
     pub n_samples: usize,
     /// Rounds in which neighbours of the grasps found are tried: each finds what the samples missed
     /// one step farther out.
-    pub spread_rounds: usize,
+    pub neighbour_rounds: usize,
     /// The same seed gives the same grasps at every thread count.
     pub seed: u64,
     /// Coulomb friction coefficient μ between pad and object.
     pub friction: f64,
     /// Depth within which the pads give way and touch, metres.
     pub compliance: f64,
-    /// How far the hand comes straight from behind, along its approach, metres.
+    /// How far the gripper comes straight from behind, along its approach, metres.
     pub retreat: f64,
     /// Grasps to return.
     pub top: usize,
@@ -31,7 +31,7 @@ pub struct GraspSettings {
     pub separation: Separation,
     /// What a grasp must satisfy.
     pub limits: Limits,
-    /// The direction in which the demonstrator's hand came, in the object's frame.
+    /// The direction in which the demonstrator's gripper came, in the object's frame.
     pub demonstrated_approach: Option<DVec3>,
     /// Direction of gravity in the object's frame; without it, away from the scene's table, and
     /// without that, the worst direction.
@@ -43,13 +43,13 @@ pub struct GraspSettings {
 /// What a grasp must satisfy to be returned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// Distances between the closed pads, metres; the whole opening of the hand where absent.
+    /// Distances between the closed pads, metres; the whole opening of the gripper where absent.
     pub width: Option<RangeInclusive<f64>>,
     /// Directions of approach.
     pub approach: Option<ApproachCone>,
-    /// Least distance of the open hand to object and scene, metres.
+    /// Least distance of the open gripper to object and scene, metres.
     pub clearance: f64,
-    /// Least distance of the hand to the table, metres.
+    /// Least distance of the gripper to the table, metres.
     pub table_clearance: f64,
     /// Share of each pad's contact that must lie in the region, 0 to 1.
     pub pad_in_region: f64,
@@ -97,11 +97,11 @@ pub struct ScoreWeights {
     pub friction: f64,
     /// `epsilon`: Ferrari & Canny's ε against that of two full pads around the centre of mass.
     pub epsilon: f64,
-    /// `gravity`: how little the object's weight turns it in the hand.
+    /// `gravity`: how little the object's weight turns it in the gripper.
     pub gravity: f64,
     /// `lever`: how near the contacts are to the centre of mass.
     pub lever: f64,
-    /// `clearance`: how far the open hand stays from everything.
+    /// `clearance`: how far the open gripper stays from everything.
     pub clearance: f64,
     /// `bite`: how much of the pads' length is filled.
     pub bite: f64,
@@ -115,7 +115,7 @@ impl Default for GraspSettings {
     fn default() -> Self {
         Self {
             n_samples: 1000,
-            spread_rounds: 2,
+            neighbour_rounds: 2,
             seed: 0,
             friction: 0.5,
             compliance: 1.5e-3,
@@ -168,8 +168,6 @@ impl GraspSettings {
     /// # Errors
     /// [`Error::OutOfRange`].
     pub fn check(&self) -> Result<()> {
-        let share = |what, x: f64| within(what, x, 0.0, 1.0, "0 to 1");
-        let length = |what, x: f64| within(what, x, 0.0, 10.0, "0 to 10 m");
         share("diversity", self.diversity)?;
         share("limits.pad_in_region", self.limits.pad_in_region)?;
         share("limits.pad_in_contact", self.limits.pad_in_contact)?;
@@ -227,6 +225,14 @@ impl ScoreWeights {
             self.region,
         ]
     }
+}
+
+fn share(what: &'static str, x: f64) -> Result<()> {
+    within(what, x, 0.0, 1.0, "0 to 1")
+}
+
+fn length(what: &'static str, x: f64) -> Result<()> {
+    within(what, x, 0.0, 10.0, "0 to 10 m")
 }
 
 fn within(what: &'static str, x: f64, least: f64, most: f64, expected: &str) -> Result<()> {

@@ -23,20 +23,10 @@ impl Convex {
     /// without bounds. Boxes and convex polyhedra are kept exactly, compounds piece by piece, a
     /// triangle mesh becomes its convex hull and anything round its box: never less than the shape.
     pub(crate) fn pieces(shape: TypedShape<'_>) -> Option<Vec<(Pose, Self)>> {
-        let hull = |points: &[DVec3]| {
-            let (low, high) = bounds(points)?;
-            let (centre, half) = (low.midpoint(high), (high - low) / 2.0);
-            let piece = Self { centre, half, corners: Some(points.to_vec()) };
-            Some(vec![(Pose::IDENTITY, piece)])
-        };
-        let aligned = |centre: DVec3, half: DVec3| {
-            (centre.is_finite() && half.is_finite() && half.max_element() < 1e6)
-                .then(|| vec![(Pose::IDENTITY, Self { centre, half, corners: None })])
-        };
         match shape {
-            TypedShape::Cuboid(cuboid) => aligned(DVec3::ZERO, cuboid.half_extents),
-            TypedShape::ConvexPolyhedron(polyhedron) => hull(polyhedron.points()),
-            TypedShape::TriMesh(mesh) => hull(mesh.vertices()),
+            TypedShape::Cuboid(cuboid) => Self::single_box(DVec3::ZERO, cuboid.half_extents),
+            TypedShape::ConvexPolyhedron(polyhedron) => Self::single_hull(polyhedron.points()),
+            TypedShape::TriMesh(mesh) => Self::single_hull(mesh.vertices()),
             TypedShape::Compound(compound) => {
                 let mut pieces = Vec::new();
                 for (pose, shape) in compound.shapes() {
@@ -46,22 +36,38 @@ impl Convex {
                 Some(pieces)
             }
             TypedShape::HalfSpace(_) => None,
-            TypedShape::Ball(shape) => aligned(DVec3::ZERO, DVec3::splat(shape.radius)),
+            TypedShape::Ball(shape) => Self::single_box(DVec3::ZERO, DVec3::splat(shape.radius)),
             TypedShape::Capsule(shape) => {
                 let bounds = shape.local_aabb();
-                aligned(bounds.center(), bounds.half_extents())
+                Self::single_box(bounds.center(), bounds.half_extents())
             }
-            TypedShape::Cylinder(shape) => {
-                aligned(DVec3::ZERO, DVec3::new(shape.radius, shape.half_height, shape.radius))
-            }
-            TypedShape::Cone(shape) => {
-                aligned(DVec3::ZERO, DVec3::new(shape.radius, shape.half_height, shape.radius))
-            }
+            TypedShape::Cylinder(shape) => Self::single_box(
+                DVec3::ZERO,
+                DVec3::new(shape.radius, shape.half_height, shape.radius),
+            ),
+            TypedShape::Cone(shape) => Self::single_box(
+                DVec3::ZERO,
+                DVec3::new(shape.radius, shape.half_height, shape.radius),
+            ),
             TypedShape::RoundCuboid(shape) => {
-                aligned(DVec3::ZERO, shape.inner_shape.half_extents + shape.border_radius)
+                Self::single_box(DVec3::ZERO, shape.inner_shape.half_extents + shape.border_radius)
             }
             _ => None,
         }
+    }
+
+    /// The hull of points as the only piece.
+    fn single_hull(points: &[DVec3]) -> Option<Vec<(Pose, Self)>> {
+        let (low, high) = bounds(points)?;
+        let (centre, half) = (low.midpoint(high), (high - low) / 2.0);
+        let piece = Self { centre, half, corners: Some(points.to_vec()) };
+        Some(vec![(Pose::IDENTITY, piece)])
+    }
+
+    /// A box as the only piece; `None` where it has no bounds to speak of.
+    fn single_box(centre: DVec3, half: DVec3) -> Option<Vec<(Pose, Self)>> {
+        (centre.is_finite() && half.is_finite() && half.max_element() < 1e6)
+            .then(|| vec![(Pose::IDENTITY, Self { centre, half, corners: None })])
     }
 
     /// The box with this centre and these half extents.
@@ -71,13 +77,9 @@ impl Convex {
 
     /// Corners of the shape in its own frame.
     fn corners(&self) -> Vec<DVec3> {
-        self.corners.clone().unwrap_or_else(|| {
-            let corner = |i: usize| {
-                let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-                self.centre + self.half * DVec3::new(sign(0), sign(1), sign(2))
-            };
-            (0..8).map(corner).collect()
-        })
+        self.corners
+            .clone()
+            .unwrap_or_else(|| (0..8).map(|i| self.centre + self.half * corner_signs(i)).collect())
     }
 
     /// Bounds of the shape at `pose`, in the frame that `pose` leads to.
@@ -262,6 +264,11 @@ fn closest(body: &impl SupportMap, triangle: &Triangle, max: f64, exact: bool) -
     let mut simplex = VoronoiSimplex::new();
     simplex.reset(CsoPoint::from_shapes(&Pose::IDENTITY, body, triangle, direction));
     gjk::closest_points(&Pose::IDENTITY, body, triangle, max, exact, &mut simplex)
+}
+
+/// The signs of the corner of a box with this number (0 to 7).
+fn corner_signs(i: usize) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|bit| if i >> bit & 1 == 0 { -1.0 } else { 1.0 }))
 }
 
 #[cfg(test)]

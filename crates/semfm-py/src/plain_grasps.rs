@@ -1,7 +1,7 @@
 //! Grasps as plain numbers and names, for pickles.
 
 use semfm::geom::math::{DQuat, DVec3};
-use semfm::grasp::settings::TERMS;
+use semfm::grasp::TERMS;
 use semfm::grasp::{Grasp, Grasps, Miss, Pose, Reason};
 use serde::{Deserialize, Serialize};
 

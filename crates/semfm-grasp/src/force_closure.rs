@@ -19,7 +19,7 @@ pub(crate) struct SoftContact {
     /// Unit normal, into the object.
     pub(crate) inward: DVec3,
     /// A direction from which the edges of the friction pyramid are counted, so that they turn with
-    /// the hand; not along the normal.
+    /// the gripper; not along the normal.
     pub(crate) tangent: DVec3,
     /// Torque about the normal that friction can hold, metres (per unit of force).
     pub(crate) torsion: f64,

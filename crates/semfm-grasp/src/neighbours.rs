@@ -1,4 +1,4 @@
-//! Neighbours of grasps: where one hand fits, one a little beside it often does.
+//! Neighbours of grasps: where one gripper fits, one a little beside it often does.
 
 use parry3d_f64::math::{Pose, Rotation};
 use semfm_geom::math::{DQuat, DVec3};
@@ -56,11 +56,10 @@ fn turned(angle: f64, axis: DVec3) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::select::gripper_distance;
+    use crate::select::GraspDistance;
 
-    #[test]
-    fn neighbours_keep_their_distance_from_all() {
-        let grasp = |x: f64| Grasp {
+    fn grasp(x: f64) -> Grasp {
+        Grasp {
             object_from_tcp: Pose::from_translation(DVec3::X * x),
             width: 0.02,
             opening: 0.08,
@@ -69,7 +68,11 @@ mod tests {
             epsilon: 0.0,
             score: 1.0,
             terms: Vec::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn neighbours_keep_their_distance_from_all() {
         let separation = Separation { translation: 0.01, rotation: 0.25 };
         let alone = [grasp(0.0)];
         assert_eq!(neighbours(&alone, &alone, separation).len(), 10);
@@ -78,9 +81,8 @@ mod tests {
         assert!(found.len() < 20);
         for candidate in &found {
             for other in &two {
-                let (translation, rotation) =
-                    gripper_distance(&other.object_from_tcp, &candidate.tcp);
-                assert!(translation >= 0.01 || rotation >= 0.25);
+                let apart = GraspDistance::between(&other.object_from_tcp, &candidate.tcp);
+                assert!(apart.translation >= 0.01 || apart.rotation >= 0.25);
             }
         }
     }
