@@ -774,20 +774,29 @@ class Gripper:
     Parameters
     ----------
     name_or_path : path
-        ``"franka"``, ``"robotiq-2f85"``, ``"robotiq-2f140"``, or a URDF file.
+        A built-in gripper (see `Gripper.builtin_names`) or a URDF file.
     packages : dict, optional
         Folders of the packages that a URDF names (``package://NAME/…``).
 
     Examples
     --------
     >>> import semfm
-    >>> hand = semfm.Gripper("franka")
-    >>> hand.opening
+    >>> gripper = semfm.Gripper("franka")
+    >>> gripper.opening
     (0.0, 0.08)
-    >>> hand.joints_at(0.04)
+    >>> gripper.joints_at(0.04)
     {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
     """
     def __init__(self, name_or_path: _Path, *, packages: Optional[Mapping[str, Any]] = None) -> None: ...
+    @staticmethod
+    def builtin_names() -> list[str]:
+        """Names of the built-in grippers.
+
+        Returns
+        -------
+        list of str
+        """
+        ...
     def flange_from_tcp(self, width: float) -> NDArray[numpy.float64]:
         """The TCP in the flange's frame.
 
@@ -802,7 +811,7 @@ class Gripper:
         """
         ...
     def joints_at(self, width: float) -> dict[str, Any]:
-        """Positions of the joints that open and close the hand.
+        """Positions of the joints that open and close the gripper.
 
         Parameters
         ----------

@@ -10,7 +10,7 @@ use crate::rejection::{Reason, Refusal};
 use crate::scene::Scene;
 use crate::settings::GraspSettings;
 use crate::solid::Solid;
-use semfm_robot::gripper::Role;
+use semfm_robot::Role;
 
 /// The gripper keeps at least this away from everything but at its pads, metres.
 const MARGIN: f64 = TOUCH_GAP / 2.0;

@@ -10,7 +10,7 @@ use semfm_geom::math::DVec3;
 
 use crate::solid::Convex;
 use crate::{Error, Result};
-use semfm_robot::{Gripper, gripper::Role};
+use semfm_robot::{Gripper, Role};
 
 type Motion = Arc<dyn Fn(f64) -> Vec<Pose> + Send + Sync>;
 
@@ -103,7 +103,7 @@ impl GripperGeometry {
         let owned = gripper.clone();
         let motion = move |width: f64| {
             let parts = owned.parts_at(width);
-            places.iter().map(|&(part, local)| parts[part].0 * local).collect()
+            places.iter().map(|&(part, local)| parts[part].tcp_from_part * local).collect()
         };
         Self::from_pieces(gripper.opening.clone(), gripper.pad, pieces, Arc::new(motion))
     }

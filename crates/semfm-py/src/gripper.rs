@@ -1,10 +1,10 @@
-//! `Gripper`: a two-finger hand.
+//! `Gripper`: a two-finger gripper.
 
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use semfm::robot::{self, Pose, gripper::GripperSettings};
+use semfm::robot::{self, GripperSettings, JointPosition, Pose};
 
 use crate::held::Held;
 use crate::lend;
@@ -16,17 +16,17 @@ use crate::work::run;
 /// Parameters
 /// ----------
 /// name_or_path : path
-///     ``"franka"``, ``"robotiq-2f85"``, ``"robotiq-2f140"``, or a URDF file.
+///     A built-in gripper (see `Gripper.builtin_names`) or a URDF file.
 /// packages : dict, optional
 ///     Folders of the packages that a URDF names (``package://NAME/…``).
 ///
 /// Examples
 /// --------
 /// >>> import semfm
-/// >>> hand = semfm.Gripper("franka")
-/// >>> hand.opening
+/// >>> gripper = semfm.Gripper("franka")
+/// >>> gripper.opening
 /// (0.0, 0.08)
-/// >>> hand.joints_at(0.04)
+/// >>> gripper.joints_at(0.04)
 /// {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
 #[pyclass(frozen, module = "semfm")]
 pub struct Gripper {
@@ -57,6 +57,16 @@ impl Gripper {
             Ok(robot::Gripper::open(&name_or_path.to_string_lossy(), &settings)?)
         })?;
         Ok(Self { held: Held::new(gripper), source, packages })
+    }
+
+    /// Names of the built-in grippers.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    #[staticmethod]
+    fn builtin_names() -> Vec<&'static str> {
+        robot::BUILTIN_GRIPPERS.iter().map(|gripper| gripper.name).collect()
     }
 
     /// str: as in the URDF, or of the built-in set.
@@ -97,7 +107,7 @@ impl Gripper {
         matrix(py, self.held.flange_from_tcp_at(width))
     }
 
-    /// Positions of the joints that open and close the hand.
+    /// Positions of the joints that open and close the gripper.
     ///
     /// Parameters
     /// ----------
@@ -110,7 +120,7 @@ impl Gripper {
     ///     Metres or radians; empty where the joints are not known by name.
     fn joints_at<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyDict>> {
         let joints = PyDict::new(py);
-        for (name, position) in self.held.joints_at(width) {
+        for JointPosition { name, position } in self.held.joints_at(width) {
             joints.set_item(name, position)?;
         }
         Ok(joints)
@@ -138,7 +148,7 @@ impl Gripper {
     }
 }
 
-/// A hand that was pickled: read again from where it came.
+/// A gripper that was pickled: read again from where it came.
 #[pyfunction]
 pub fn _restore_gripper(
     py: Python<'_>,

@@ -19,7 +19,7 @@ pub enum Error {
         /// What was given.
         found: String,
     },
-    /// A robot description that is not what it should be, or that we will not follow.
+    /// A robot description that is not what it should be, or that names what is not allowed.
     #[error("{}: {place}: expected {expected}, found {found}", path.display())]
     Urdf {
         /// The file.
@@ -34,7 +34,7 @@ pub enum Error {
         found: String,
     },
     /// A description that is sound, but in which no parallel-jaw gripper was found.
-    #[error("{}: no gripper to be had: expected {expected}, found {found}", path.display())]
+    #[error("{}: no gripper found: expected {expected}, found {found}", path.display())]
     NoGripper {
         /// The file.
         path: PathBuf,

@@ -1,15 +1,53 @@
 //! Robot descriptions and parallel-jaw grippers.
 //!
-//! [`urdf`] reads robot descriptions under limits and gives links and joints as plain data. A
-//! [`Gripper`] comes from such a description or from a built-in parameter set. Its frame (TCP) has
-//! its origin between the finger pads, +z along the approach and y along the closing direction;
-//! lengths are metres, angles radians.
+//! [`RobotDescription`] reads URDF files under limits and gives a [`Robot`]: links and joints as
+//! plain data, with forward kinematics. A [`Gripper`] comes from such a description or from the
+//! table of built-in ones. Its frame (TCP) has its origin between the finger pads, +z along the
+//! approach and y along the closing direction. Lengths are metres, angles radians.
+//!
+//! ```
+//! use semfm_robot::Gripper;
+//! let gripper = Gripper::builtin("robotiq-2f85")?;
+//! assert_eq!(gripper.opening, 0.0..=0.085);
+//! // A linkage carries the pads away from the flange as it closes.
+//! let [closed, open] = [0.0, 0.085].map(|width| gripper.flange_from_tcp_at(width).translation.z);
+//! assert!(closed > open);
+//! # Ok::<(), semfm_robot::Error>(())
+//! ```
 
 mod error;
-pub mod gripper;
-pub mod urdf;
+mod gripper;
+mod joint;
+mod link;
+mod robot;
+mod urdf;
 
 pub use error::{Error, Result};
-pub use gripper::Gripper;
+pub use gripper::{
+    BUILTIN_GRIPPERS, BuiltinGripper, DriveJoint, Gripper, GripperPart, GripperSettings,
+    JointPosition, Motion, PosedPart, Role,
+};
+pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
+pub use link::{Geometry, Inertial, Link, LinkGeometry};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use parry3d_f64::math::Pose;
+pub use robot::Robot;
+pub use urdf::{MeshPaths, MeshPlace, MeshUse, RobotDescription};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_send_sync<T: Send + Sync>() {}
+
+    #[test]
+    fn public_types_can_be_shared_between_threads() {
+        assert_send_sync::<BuiltinGripper>();
+        assert_send_sync::<Error>();
+        assert_send_sync::<Gripper>();
+        assert_send_sync::<GripperSettings>();
+        assert_send_sync::<MeshPaths>();
+        assert_send_sync::<Robot>();
+        assert_send_sync::<RobotDescription>();
+    }
+}

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm_robot::urdf::{Description, MeshPaths, MeshPlace};
+use semfm_robot::{MeshPaths, MeshPlace, RobotDescription};
 
 fn shared(what: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
@@ -32,7 +32,7 @@ fn every_description_gets_its_verdict_and_the_reason_for_it() {
 }
 
 fn fault(path: &Path, expected: &str) -> Option<String> {
-    let read = Description::read(path).and_then(|description| {
+    let read = RobotDescription::read(path).and_then(|description| {
         let meshes = description.meshes(&MeshPaths::new(path, &Default::default()))?;
         Ok((description, meshes))
     });

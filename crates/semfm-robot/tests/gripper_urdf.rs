@@ -7,8 +7,7 @@ use parry3d_f64::math::Pose;
 use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::Cuboid;
 use semfm_geom::math::DVec3;
-use semfm_robot::gripper::{Gripper, GripperSettings, Role};
-use semfm_robot::urdf::Description;
+use semfm_robot::{Gripper, GripperSettings, PosedPart, RobotDescription, Role};
 
 const BASE: &str = r#"<link name="palm"><collision><origin xyz="0 0 0.03"/>
     <geometry><box size="0.06 0.2 0.06"/></geometry></collision></link>"#;
@@ -71,8 +70,12 @@ fn sliding_fingers_are_found_with_opening_pads_and_tcp() {
         assert_eq!(roles, [("palm", Role::Palm), ("a", Role::Left), ("b", Role::Right)]);
         // By hand: at 40 mm the right finger's box is centred 20 + 5 mm from the middle.
         let parts = hand.parts_at(0.04);
-        assert!((parts[2].0.translation - DVec3::new(0.0, 0.025, 0.0)).length() < 1e-12);
-        assert!((parts[0].0.translation - DVec3::new(0.0, 0.0, -0.05)).length() < 1e-12);
+        assert!(
+            (parts[2].tcp_from_part.translation - DVec3::new(0.0, 0.025, 0.0)).length() < 1e-12
+        );
+        assert!(
+            (parts[0].tcp_from_part.translation - DVec3::new(0.0, 0.0, -0.05)).length() < 1e-12
+        );
     }
 }
 
@@ -113,7 +116,7 @@ fn a_linkage_keeps_the_tcp_between_the_pads_and_moves_the_palm() {
         let tcp = hand.flange_from_tcp_at(width).translation;
         // Chords of a table of 65 steps: 0.05 · (0.5 / 64)² / 8 = 0.4 µm.
         assert!((tcp - DVec3::Z * height).length() < 5e-7, "{angle}: {tcp}");
-        let (palm, _) = hand.parts_at(width)[0];
+        let palm = hand.parts_at(width)[0].tcp_from_part;
         assert!((palm.translation.z - (0.03 - height)).abs() < 5e-7);
     }
     assert!((hand.flange_from_tcp.translation.z - 0.13).abs() < 1e-9);
@@ -133,7 +136,7 @@ fn the_caller_may_name_fingers_flange_tcp_and_pad() {
     };
     let hand = open(&settings).unwrap();
     assert_eq!((hand.pad, hand.flange_from_tcp), ([0.01, 0.02], tcp));
-    assert!((hand.parts_at(0.0)[1].0.translation.z + 0.01).abs() < 1e-12);
+    assert!((hand.parts_at(0.0)[1].tcp_from_part.translation.z + 0.01).abs() < 1e-12);
     let turned = Pose::from_parts(
         DVec3::Z * 0.08,
         parry3d_f64::math::Rotation::from_rotation_z(std::f64::consts::PI),
@@ -280,7 +283,7 @@ fn nothing_of_the_hand_reaches_between_open_pads() {
         for share in [0.1, 0.5, 1.0] {
             let width = share * hand.opening.end();
             let half = (DVec3::new(hand.pad[0], width, hand.pad[1]) - DVec3::splat(1e-5)) / 2.0;
-            for (pose, part) in hand.parts_at(width) {
+            for PosedPart { tcp_from_part: pose, part } in hand.parts_at(width) {
                 let gap = Cuboid::new(half);
                 let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
                     .unwrap()
@@ -328,17 +331,17 @@ fn hostile_descriptions_are_refused_with_code_and_place() {
         ("size", " ".repeat((32 << 20) + 1)),
     ];
     for (code, text) in cases {
-        let error = Description::parse(text.as_bytes(), "r.urdf").unwrap_err();
+        let error = RobotDescription::parse(text.as_bytes(), "r.urdf").unwrap_err();
         assert_eq!(error.code(), code, "{error}");
         assert!(error.place().is_some());
     }
     let error =
-        Description::parse(joint("<axis xyz=\"inf 0 1\"/>").as_bytes(), "r.urdf").unwrap_err();
+        RobotDescription::parse(joint("<axis xyz=\"inf 0 1\"/>").as_bytes(), "r.urdf").unwrap_err();
     assert!(error.to_string().starts_with("r.urdf: line 3: axis: xyz"), "{error}");
     // Sound as a fragment, refused as a tree.
     let twice = format!(
         "<robot name=\"r\">{links}<link name=\"a\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint></robot>"
     );
-    let description = Description::parse(twice.as_bytes(), "r.urdf");
+    let description = RobotDescription::parse(twice.as_bytes(), "r.urdf");
     assert_eq!(description.and_then(|d| d.tree()).unwrap_err().code(), "tree");
 }

@@ -3,11 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::Pose;
 use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::Cuboid;
 use semfm_geom::math::DVec3;
-use semfm_robot::gripper::{Gripper, GripperSettings, Role};
+use semfm_robot::{Gripper, GripperSettings, PosedPart, Role};
 
 fn shared(what: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
@@ -76,6 +77,15 @@ fn openings_and_tcps_are_those_that_the_makers_publish() {
     }
 }
 
+/// The box around all parts of a role, 60 mm open.
+fn bounds_of(gripper: &Gripper, role: Role) -> Aabb {
+    let parts = gripper.parts_at(0.06).into_iter().filter(|posed| posed.part.role == role);
+    parts
+        .map(|posed| posed.part.shape.compute_aabb(&posed.tcp_from_part))
+        .reduce(|a, b| a.merged(&b))
+        .unwrap()
+}
+
 #[test]
 fn the_built_in_hands_agree_with_the_descriptions() {
     for (published, hand) in hands().unwrap_or_default() {
@@ -96,14 +106,7 @@ fn the_built_in_hands_agree_with_the_descriptions() {
         // Outer size at a common width, finger by finger and palm by palm: our boxes neither miss
         // a centimetre of the hand nor add two.
         for role in [Role::Palm, Role::Left, Role::Right] {
-            let reach = |hand: &Gripper| {
-                let parts = hand.parts_at(0.06);
-                let of = parts.iter().filter(|(_, part)| part.role == role);
-                of.map(|(pose, part)| part.shape.compute_aabb(pose))
-                    .reduce(|a, b| parry3d_f64::bounding_volume::BoundingVolume::merged(&a, &b))
-                    .unwrap()
-            };
-            let (found, ours) = (reach(&hand), reach(&ours));
+            let [found, ours] = [&hand, &ours].map(|gripper| bounds_of(gripper, role));
             let low = (found.mins - ours.mins).abs().max_element();
             let high = (found.maxs - ours.maxs).abs().max_element();
             assert!(low < 0.012 && high < 0.012, "{name} {role:?}: {found:?} {ours:?}");
@@ -118,7 +121,7 @@ fn the_space_between_open_pads_is_free() {
             let width = share * hand.opening.end();
             let half = DVec3::new(hand.pad[0], width - 1e-4, hand.pad[1]) / 2.0;
             let gap = Cuboid::new(half);
-            for (pose, part) in hand.parts_at(width) {
+            for PosedPart { tcp_from_part: pose, part } in hand.parts_at(width) {
                 let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
                     .unwrap()
                     .intersecting;

@@ -8,7 +8,7 @@ use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
 use semfm::geom::io::write_atomically;
 use semfm::geom::math::DVec3;
-use semfm::robot::gripper::{Gripper, GripperPart, GripperSettings, Role};
+use semfm::robot::{BuiltinGripper, Gripper, GripperPart, GripperSettings, PosedPart, Role};
 use semfm_show::html::escape;
 
 /// Pixels per metre.
@@ -21,7 +21,8 @@ const ABOVE: f64 = 0.075;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, picture] = arguments.as_slice() else {
-        eprintln!("usage: draw_gripper franka|robotiq-2f85|robotiq-2f140|HAND.urdf PICTURE.svg");
+        let names = BuiltinGripper::names();
+        eprintln!("usage: draw_gripper NAME|ROBOT.urdf PICTURE.svg, NAME being one of {names}");
         std::process::exit(2);
     };
     let gripper = Gripper::open(name, &GripperSettings::default())?;
@@ -51,8 +52,8 @@ fn draw(gripper: &Gripper) -> Result<String, std::fmt::Error> {
             panel as f64 * width,
             opening * 1e3
         )?;
-        for (pose, part) in gripper.parts_at(opening) {
-            polygon(&mut svg, &pose, part, front)?;
+        for PosedPart { tcp_from_part, part } in gripper.parts_at(opening) {
+            polygon(&mut svg, &tcp_from_part, part, front)?;
         }
         pads(&mut svg, gripper, opening, front)?;
         svg.push_str("</g>\n");

@@ -10,7 +10,7 @@ use semfm::geom::math::DVec3;
 use semfm::grasp::{ApproachCone, GraspObject, GraspSettings, Grasps, Pose, Scene, find_grasps};
 use semfm::grasps::{GraspAnswer, write_grasps, write_isaac, write_ros2};
 use semfm::region_file::read_region;
-use semfm::robot::gripper::{Gripper, GripperSettings};
+use semfm::robot::{BuiltinGripper, Gripper, GripperSettings};
 use semfm::{Task, aligned::read_aligned};
 use semfm_show::write_grasp_picture;
 use serde_json::{Map, Value, json};
@@ -40,8 +40,7 @@ pub struct FindGrasps {
     /// Where to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The hand: franka, robotiq-2f85, robotiq-2f140, or a URDF
-    #[arg(long, value_name = "NAME|URDF")]
+    #[arg(long, value_name = "NAME|URDF", help = gripper_help("The gripper"))]
     gripper: String,
     /// File format
     #[arg(long, value_enum, default_value_t = Format::Json)]
@@ -54,6 +53,11 @@ pub struct FindGrasps {
     seed: u64,
     #[command(flatten)]
     options: GraspOptions,
+}
+
+/// What `--gripper` takes, after the words that lead the help.
+pub fn gripper_help(lead: &str) -> String {
+    format!("{lead}: {}, or a URDF", BuiltinGripper::names())
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

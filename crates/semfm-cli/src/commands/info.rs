@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{MeshFormat, read_mesh};
-use semfm::robot::urdf::{Description, MeshPaths, MeshPlace};
+use semfm::robot::{MeshPaths, MeshPlace, RobotDescription};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
 
@@ -88,7 +88,7 @@ fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Valu
 
 /// The report on a robot: counts, what keeps it from being one tree, and meshes that are missing.
 fn look_at_urdf(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Value> {
-    let description = Description::read(path)?;
+    let description = RobotDescription::read(path)?;
     let meshes = description.meshes(&MeshPaths::new(path, packages))?;
     let missing: Vec<Value> = meshes
         .iter()

@@ -19,7 +19,7 @@ use serde_json::{Map, Value, json};
 
 use super::Outcome;
 use super::embed::{Encoder, announce};
-use super::grasp::{GraspJob, GraspOptions, grasps_summary, tell as tell_grasps};
+use super::grasp::{GraspJob, GraspOptions, grasps_summary, gripper_help, tell as tell_grasps};
 use crate::options::Common;
 use crate::{load, talk};
 
@@ -50,8 +50,7 @@ pub struct Carry {
     meaning: MeaningOptions,
     #[command(flatten)]
     matching: MatchingOptions,
-    /// Go on to grasps with this hand: franka, robotiq-2f85, robotiq-2f140, or a URDF
-    #[arg(long, value_name = "NAME|URDF", help_heading = "Gripper")]
+    #[arg(long, value_name = "NAME|URDF", help_heading = "Gripper", help = gripper_help("Go on to grasps with this gripper"))]
     gripper: Option<String>,
     #[command(flatten)]
     grasps: GraspOptions,

@@ -1,26 +1,28 @@
-//! Two-finger hands: what moves, what is rigid, how wide it opens.
+//! Two-finger grippers: what moves, what is rigid, how wide it opens.
 //!
-//! A hand comes from a built-in parameter set ([`Gripper::builtin`]) or from a robot description
-//! ([`Gripper::from_urdf`]); [`Gripper::open`] takes the name of either. Both give the same thing:
-//! convex parts, and for each width between the pads the pose of every part in the frame between
-//! the pads (TCP).
+//! A gripper comes from the table of built-in ones ([`Gripper::builtin`]) or from a robot
+//! description ([`Gripper::from_urdf`]); [`Gripper::open`] takes the name of either. Both give the
+//! same thing: convex parts, and for each width between the pads the pose of every part in the
+//! frame between the pads (TCP).
 
 mod builtin;
-mod drive;
-mod jaws;
-mod load;
+mod drive_joint;
+mod finger_pair;
+mod from_urdf;
+mod link_shape;
 mod motion;
 mod pads;
-mod solids;
+mod part;
 
 use std::ops::RangeInclusive;
 
 use parry3d_f64::math::Pose;
-use parry3d_f64::shape::SharedShape;
 
-pub use self::drive::DriveJoint;
-pub use self::load::GripperSettings;
+pub use self::builtin::{BUILTIN_GRIPPERS, BuiltinGripper};
+pub use self::drive_joint::{DriveJoint, JointPosition};
+pub use self::from_urdf::GripperSettings;
 pub use self::motion::Motion;
+pub use self::part::{GripperPart, PosedPart, Role};
 use crate::{Error, Result};
 
 /// A parallel-jaw gripper. Its frame (TCP): origin between the finger pads, +z along the approach,
@@ -48,30 +50,6 @@ pub struct Gripper {
     flange_motion: Motion,
 }
 
-/// A rigid convex or boxed part of the gripper.
-#[derive(Clone, Debug)]
-pub struct GripperPart {
-    /// The link it belongs to.
-    pub link: String,
-    /// Whether it moves with a finger.
-    pub role: Role,
-    /// Its collision shape, in its own frame.
-    pub shape: SharedShape,
-    /// Its pose in the TCP frame, by width between the pads.
-    pub motion: Motion,
-}
-
-/// What a part moves with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// Fixed to the palm.
-    Palm,
-    /// Moves with the finger whose pad lies at negative y.
-    Left,
-    /// Moves with the finger whose pad lies at positive y.
-    Right,
-}
-
 impl Gripper {
     /// A gripper of parts that bring their own motion. `flange` gives the TCP in the flange's frame
     /// by width.
@@ -86,18 +64,17 @@ impl Gripper {
         flange: Motion,
         parts: Vec<GripperPart>,
     ) -> Result<Self> {
-        let out = |what, expected: &str, found: String| {
-            Err(Error::OutOfRange { what, expected: expected.into(), found })
-        };
         let (closed, open) = (*opening.start(), *opening.end());
         if !(closed >= 0.0 && open > closed && open.is_finite()) {
-            return out("opening", "0 ≤ closed < open", format!("{closed} to {open}"));
+            let found = format!("{closed} to {open}");
+            return Err(out_of_range("opening", "0 ≤ closed < open", found));
         }
         if !pad.iter().all(|&side| side > 0.0 && side.is_finite()) {
-            return out("pad", "two lengths above zero", format!("{pad:?}"));
+            let [x, z] = pad;
+            return Err(out_of_range("pad", "two lengths above zero", format!("{x}, {z}")));
         }
         if parts.is_empty() {
-            return out("parts", "at least one", "none".into());
+            return Err(out_of_range("parts", "at least one", "none".into()));
         }
         let flange_from_tcp = flange.at(closed);
         let (name, joints, notes) = (name.into(), Vec::new(), Vec::new());
@@ -105,33 +82,25 @@ impl Gripper {
         Ok(Self { name, opening, pad, flange_from_tcp, parts, joints, notes, flange_motion })
     }
 
-    /// A built-in hand by its name, see [`Gripper::BUILTIN`].
-    ///
-    /// # Errors
-    /// [`Error::UnknownGripper`] with the names there are.
-    pub fn builtin(name: &str) -> Result<Self> {
-        builtin::by_name(name).unwrap_or_else(|| {
-            let known = Self::BUILTIN.join(", ");
-            Err(Error::UnknownGripper { name: name.into(), known })
-        })
-    }
-
-    /// Names of the built-in hands.
-    pub const BUILTIN: [&str; 3] = ["franka", "robotiq-2f85", "robotiq-2f140"];
-
     /// Each part with its pose in the TCP frame when the pads are `width` metres apart; a width
     /// outside [`Gripper::opening`] counts as the nearest inside. The TCP stays between the pads:
     /// where a linkage carries the pads along z as it closes, palm and flange move instead.
-    pub fn parts_at(&self, width: f64) -> Vec<(Pose, &GripperPart)> {
+    pub fn parts_at(&self, width: f64) -> Vec<PosedPart<'_>> {
         let width = self.reachable(width);
-        self.parts.iter().map(|part| (part.motion.at(width), part)).collect()
+        self.parts
+            .iter()
+            .map(|part| PosedPart { tcp_from_part: part.motion.at(width), part })
+            .collect()
     }
 
     /// Names and positions (metres or radians) of the joints when the pads are `width` metres apart;
     /// empty where they are not known.
-    pub fn joints_at(&self, width: f64) -> Vec<(&str, f64)> {
+    pub fn joints_at(&self, width: f64) -> Vec<JointPosition<'_>> {
         let width = self.reachable(width);
-        self.joints.iter().map(|joint| (joint.name.as_str(), joint.at(width))).collect()
+        self.joints
+            .iter()
+            .map(|joint| JointPosition { name: &joint.name, position: joint.at(width) })
+            .collect()
     }
 
     /// The TCP's pose in the flange's frame when the pads are `width` metres apart.
@@ -147,99 +116,78 @@ impl Gripper {
     }
 }
 
-impl GripperPart {
-    /// A part that moves with the width as `motion` says.
-    pub fn new(
-        link: impl Into<String>,
-        role: Role,
-        shape: SharedShape,
-        motion: impl Into<Motion>,
-    ) -> Self {
-        Self { link: link.into(), role, shape, motion: motion.into() }
-    }
-
-    /// A part of a finger that slides apart along y: `closed` is its pose in the TCP frame at width
-    /// 0, and it moves by half of the width towards its own side. A part of the palm stays.
-    pub fn sliding(
-        link: impl Into<String>,
-        role: Role,
-        shape: SharedShape,
-        closed: Pose,
-        widest: f64,
-    ) -> Self {
-        let side = match role {
-            Role::Palm => 0.0,
-            Role::Left => -1.0,
-            Role::Right => 1.0,
-        };
-        let mut open = closed;
-        open.translation.y += side * widest / 2.0;
-        Self::new(link, role, shape, Motion::new([(0.0, closed), (widest, open)]))
-    }
+fn out_of_range(what: &'static str, expected: &str, found: String) -> Error {
+    Error::OutOfRange { what, expected: expected.into(), found }
 }
 
 #[cfg(test)]
 mod tests {
+    use parry3d_f64::bounding_volume::Aabb;
     use parry3d_f64::math::Vector;
     use parry3d_f64::query::{PointQuery, distance, intersection_test};
-    use parry3d_f64::shape::Cuboid;
+    use parry3d_f64::shape::{Cuboid, SharedShape};
     use proptest::prelude::*;
 
     use super::*;
 
-    fn hands() -> impl Iterator<Item = Gripper> {
-        Gripper::BUILTIN.iter().map(|name| Gripper::builtin(name).unwrap())
+    fn grippers() -> impl Iterator<Item = Gripper> {
+        BUILTIN_GRIPPERS.iter().map(|row| row.gripper().unwrap())
     }
 
-    fn pad_distance(hand: &Gripper, width: f64) -> f64 {
-        let parts = hand.parts_at(width);
-        let of = |role| parts.iter().filter(move |(_, p)| p.role == role && p.link == "pad");
+    fn pads(gripper: &Gripper, width: f64, role: Role) -> Vec<PosedPart<'_>> {
+        let mut parts = gripper.parts_at(width);
+        parts.retain(|posed| posed.part.role == role && posed.part.link == "pad");
+        parts
+    }
+
+    fn pad_distance(gripper: &Gripper, width: f64) -> f64 {
         let mut least = f64::INFINITY;
-        for (left, a) in of(Role::Left) {
-            for (right, b) in of(Role::Right) {
-                least = least.min(distance(left, &*a.shape, right, &*b.shape).unwrap().distance);
+        for left in pads(gripper, width, Role::Left) {
+            for right in pads(gripper, width, Role::Right) {
+                let (a, b) = (&*left.part.shape, &*right.part.shape);
+                let found = distance(&left.tcp_from_part, a, &right.tcp_from_part, b).unwrap();
+                least = least.min(found.distance);
             }
         }
         least
     }
 
-    #[test]
-    fn an_unknown_name_is_told_the_known_ones() {
-        let error = Gripper::builtin("barrett").unwrap_err().to_string();
-        assert!(Gripper::BUILTIN.iter().all(|name| error.contains(name)), "{error}");
+    fn bounds_of(gripper: &Gripper, width: f64, role: Role) -> Vec<Aabb> {
+        let parts = gripper.parts_at(width).into_iter().filter(|posed| posed.part.role == role);
+        parts.map(|posed| posed.part.shape.compute_aabb(&posed.tcp_from_part)).collect()
     }
 
     #[test]
     fn closed_pads_touch_at_the_origin() {
-        for hand in hands() {
+        for gripper in grippers() {
             let touch = 1e-6; // interpolation between the table's widths
-            assert!(pad_distance(&hand, 0.0) < touch, "{}", hand.name);
-            for (pose, part) in hand.parts_at(0.0).iter().filter(|(_, part)| part.link == "pad") {
-                let reach = part.shape.compute_aabb(pose);
-                assert!(reach.distance_to_local_point(Vector::ZERO, true) < touch, "{}", hand.name);
+            assert!(pad_distance(&gripper, 0.0) < touch, "{}", gripper.name);
+            for role in [Role::Left, Role::Right] {
+                for pad in pads(&gripper, 0.0, role) {
+                    let bounds = pad.part.shape.compute_aabb(&pad.tcp_from_part);
+                    let off = bounds.distance_to_local_point(Vector::ZERO, true);
+                    assert!(off < touch, "{}", gripper.name);
+                }
             }
         }
     }
 
     #[test]
     fn left_is_the_mirror_of_right() {
-        for hand in hands() {
-            let count = |role| hand.parts.iter().filter(|part| part.role == role).count();
-            assert_eq!(count(Role::Left), count(Role::Right), "{}", hand.name);
-            for width in [0.0, 0.03, *hand.opening.end()] {
-                let parts = hand.parts_at(width);
-                let boxes = |role| {
-                    let of = parts.iter().filter(move |(_, part)| part.role == role);
-                    of.map(|(pose, part)| part.shape.compute_aabb(pose)).collect::<Vec<_>>()
-                };
-                for (left, right) in boxes(Role::Left).iter().zip(boxes(Role::Right)) {
+        for gripper in grippers() {
+            for width in [0.0, 0.03, *gripper.opening.end()] {
+                let lefts = bounds_of(&gripper, width, Role::Left);
+                let rights = bounds_of(&gripper, width, Role::Right);
+                assert_eq!(lefts.len(), rights.len(), "{}", gripper.name);
+                for (left, right) in lefts.iter().zip(&rights) {
                     let mirrored = [
                         (left.mins.x - right.mins.x).abs(),
                         (left.mins.z - right.mins.z).abs(),
                         (left.mins.y + right.maxs.y).abs(),
                         (left.maxs.y + right.mins.y).abs(),
                     ];
-                    assert!(mirrored.iter().all(|&off| off < 1e-12), "{}: {mirrored:?}", hand.name);
+                    let name = &gripper.name;
+                    assert!(mirrored.iter().all(|&off| off < 1e-12), "{name}: {mirrored:?}");
                 }
             }
         }
@@ -247,43 +195,57 @@ mod tests {
 
     proptest! {
         #[test]
-        fn fingers_are_as_far_apart_as_the_width_says(share in 0.0..1.0f64, hand in 0..3usize) {
-            let hand = Gripper::builtin(Gripper::BUILTIN[hand]).unwrap();
-            let width = share * hand.opening.end();
-            prop_assert!((pad_distance(&hand, width) - width).abs() < 2e-6);
+        fn fingers_are_as_far_apart_as_the_width_says(
+            share in 0.0..1.0f64,
+            row in 0..BUILTIN_GRIPPERS.len(),
+        ) {
+            let gripper = BUILTIN_GRIPPERS[row].gripper().unwrap();
+            let width = share * gripper.opening.end();
+            prop_assert!((pad_distance(&gripper, width) - width).abs() < 2e-6);
         }
 
         #[test]
-        fn nothing_stands_between_the_pads(share in 0.01..1.0f64, hand in 0..3usize) {
-            let hand = Gripper::builtin(Gripper::BUILTIN[hand]).unwrap();
-            let width = share * hand.opening.end();
-            let half = Vector::new(hand.pad[0] / 2.0, width / 2.0 - 1e-5, hand.pad[1] / 2.0);
-            let gap = Cuboid::new(half);
-            for (pose, part) in hand.parts_at(width) {
-                let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap).unwrap().intersecting;
-                prop_assert!(!hit, "{}: {} at {width}", hand.name, part.link);
+        fn nothing_stands_between_the_pads(
+            share in 0.01..1.0f64,
+            row in 0..BUILTIN_GRIPPERS.len(),
+        ) {
+            let gripper = BUILTIN_GRIPPERS[row].gripper().unwrap();
+            let width = share * gripper.opening.end();
+            let [x, z] = gripper.pad;
+            let gap = Cuboid::new(Vector::new(x / 2.0, width / 2.0 - 1e-5, z / 2.0));
+            for PosedPart { tcp_from_part, part } in gripper.parts_at(width) {
+                let hit =
+                    intersection_test(&tcp_from_part, &*part.shape, &Pose::IDENTITY, &gap).unwrap();
+                prop_assert!(!hit.intersecting, "{}: {} at {width}", gripper.name, part.link);
             }
         }
     }
 
+    fn poses(gripper: &Gripper, width: f64) -> Vec<Pose> {
+        gripper.parts_at(width).iter().map(|posed| posed.tcp_from_part).collect()
+    }
+
     #[test]
     fn a_width_out_of_reach_counts_as_the_nearest() {
-        let hand = Gripper::builtin("franka").unwrap();
-        let poses = |width| hand.parts_at(width).iter().map(|(pose, _)| *pose).collect::<Vec<_>>();
-        assert_eq!(poses(9.0), poses(*hand.opening.end()));
-        assert_eq!(poses(-1.0), poses(*hand.opening.start()));
-        assert_eq!(poses(f64::NAN), poses(*hand.opening.end()));
+        let gripper = Gripper::builtin("franka").unwrap();
+        let (closed, open) = (*gripper.opening.start(), *gripper.opening.end());
+        assert_eq!(poses(&gripper, 9.0), poses(&gripper, open));
+        assert_eq!(poses(&gripper, -1.0), poses(&gripper, closed));
+        assert_eq!(poses(&gripper, f64::NAN), poses(&gripper, open));
     }
 
     #[test]
     fn nonsense_is_no_gripper() {
-        let part = || GripperPart::new("p", Role::Palm, SharedShape::ball(0.1), Pose::IDENTITY);
-        let new =
-            |opening, pad, parts| Gripper::new("x", opening, pad, Pose::IDENTITY.into(), parts);
-        assert!(new(0.0..=0.1, [0.01, 0.01], vec![part()]).is_ok());
-        assert!(new(0.1..=0.1, [0.01, 0.01], vec![part()]).is_err());
-        assert!(new(0.0..=f64::NAN, [0.01, 0.01], vec![part()]).is_err());
-        assert!(new(0.0..=0.1, [0.0, 0.01], vec![part()]).is_err());
-        assert!(new(0.0..=0.1, [0.01, 0.01], vec![]).is_err());
+        let part = GripperPart::new("p", Role::Palm, SharedShape::ball(0.1), Pose::IDENTITY);
+        for (opening, pad, parts, sound) in [
+            (0.0..=0.1, [0.01, 0.01], vec![part.clone()], true),
+            (0.1..=0.1, [0.01, 0.01], vec![part.clone()], false),
+            (0.0..=f64::NAN, [0.01, 0.01], vec![part.clone()], false),
+            (0.0..=0.1, [0.0, 0.01], vec![part], false),
+            (0.0..=0.1, [0.01, 0.01], vec![], false),
+        ] {
+            let made = Gripper::new("x", opening, pad, Pose::IDENTITY.into(), parts);
+            assert_eq!(made.is_ok(), sound);
+        }
     }
 }

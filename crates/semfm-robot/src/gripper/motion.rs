@@ -2,10 +2,11 @@
 
 use parry3d_f64::math::Pose;
 
-/// Poses at ascending widths, and in between by straight lines and the shortest turn.
+/// Poses at ascending widths; in between, translations are interpolated linearly and rotations along
+/// the shortest arc.
 ///
-/// Jaws that slide need two entries and are exact. For a crank of 0.1 m sampled at 65 angles over
-/// 0.8 rad, the chord leaves the circle by at most 2 µm (L·δ²/8).
+/// Fingers that slide need two entries and are exact. For a crank of length L = 0.1 m sampled at 65
+/// angles over 0.8 rad, δ apart, the chord leaves the circle by at most L δ²/8 = 2 µm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     /// Never empty; widths ascend.

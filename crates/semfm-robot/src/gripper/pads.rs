@@ -1,4 +1,4 @@
-//! The flat face of a finger that looks at the other finger.
+//! The pad of a finger: its flat face towards the other finger.
 
 use semfm_geom::math::DVec3;
 
@@ -11,8 +11,23 @@ const DEPTH: f64 = 1e-3;
 /// screw heads have some hundredths.
 const MIN_SHARE: f64 = 0.15;
 
+/// A triangle that is perpendicular to the closing direction, nearly.
+struct FlatTriangle<'a> {
+    /// Of its innermost corner, along the inward direction.
+    height: f64,
+    area: f64,
+    corners: &'a [DVec3; 3],
+}
+
+/// The triangles whose innermost corners lie within [`DEPTH`] of one's.
+struct Slice {
+    area: f64,
+    /// One past the last of them, in the order of heights.
+    end: usize,
+}
+
 /// A pad: how far its face stands towards the other finger, and which points belong to it.
-pub(super) struct Face {
+pub(super) struct PadFace {
     /// Along the inward direction, metres.
     pub height: f64,
     /// Corners of its triangles.
@@ -21,34 +36,37 @@ pub(super) struct Face {
 
 /// The innermost flat face of a finger's surface that is large enough; `inward` is a unit vector
 /// towards the other finger. The winding of triangles is not trusted.
-pub(super) fn innermost(triangles: &[[DVec3; 3]], inward: DVec3) -> Option<Face> {
-    let mut flat: Vec<(f64, f64, &[DVec3; 3])> = triangles
-        .iter()
-        .filter_map(|triangle| {
-            let [a, b, c] = *triangle;
-            let normal = (b - a).cross(c - a) / 2.0;
-            let area = normal.length();
-            let height = triangle.map(|p| p.dot(inward)).into_iter().fold(f64::MIN, f64::max);
-            (area > 0.0 && normal.dot(inward).abs() >= COS_TILT * area)
-                .then_some((height, area, triangle))
-        })
-        .collect();
-    flat.sort_by(|a, b| b.0.total_cmp(&a.0));
-    // Area of each slice of depth DEPTH that begins at a triangle, by two running ends.
+pub(super) fn innermost(triangles: &[[DVec3; 3]], inward: DVec3) -> Option<PadFace> {
+    let mut flat: Vec<FlatTriangle<'_>> =
+        triangles.iter().filter_map(|corners| FlatTriangle::new(corners, inward)).collect();
+    flat.sort_by(|a, b| b.height.total_cmp(&a.height));
+    // The slice that begins at each triangle, by two running ends.
     let (mut end, mut area) = (0, 0.0);
     let mut slices = Vec::with_capacity(flat.len());
     for start in 0..flat.len() {
-        while end < flat.len() && flat[end].0 >= flat[start].0 - DEPTH {
-            area += flat[end].1;
+        while end < flat.len() && flat[end].height >= flat[start].height - DEPTH {
+            area += flat[end].area;
             end += 1;
         }
-        slices.push((area, end));
-        area -= flat[start].1;
+        slices.push(Slice { area, end });
+        area -= flat[start].area;
     }
-    let largest = slices.iter().map(|slice| slice.0).fold(0.0, f64::max);
-    let start = slices.iter().position(|slice| slice.0 >= MIN_SHARE * largest)?;
-    let points = flat[start..slices[start].1].iter().flat_map(|(_, _, corners)| **corners);
-    Some(Face { height: flat[start].0, points: points.collect() })
+    let largest = slices.iter().map(|slice| slice.area).fold(0.0, f64::max);
+    let start = slices.iter().position(|slice| slice.area >= MIN_SHARE * largest)?;
+    let points = flat[start..slices[start].end].iter().flat_map(|triangle| *triangle.corners);
+    Some(PadFace { height: flat[start].height, points: points.collect() })
+}
+
+impl<'a> FlatTriangle<'a> {
+    /// `None` for a triangle that is degenerate or tilted.
+    fn new(corners: &'a [DVec3; 3], inward: DVec3) -> Option<Self> {
+        let [a, b, c] = *corners;
+        let normal = (b - a).cross(c - a) / 2.0;
+        let area = normal.length();
+        let height = corners.map(|p| p.dot(inward)).into_iter().fold(f64::MIN, f64::max);
+        let flat = area > 0.0 && normal.dot(inward).abs() >= COS_TILT * area;
+        flat.then_some(Self { height, area, corners })
+    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
-//! What the parser does not look at: before it, whether this is a URDF at all; after it, names,
+//! What `urdf-rs` does not check: before it, whether this is a URDF at all; after it, names,
 //! references, cycles, limits and masses.
 
 use std::collections::{HashMap, HashSet};
 
-use super::Fault;
-use super::outline::{Element, Outline, short};
+use super::fault::{Fault, quoted, short};
+use super::xml::{Element, XmlElements};
 
 /// What keeps a sound description from being one tree.
 #[derive(Clone, Debug, Default)]
@@ -25,26 +25,27 @@ const MIN_AXIS: f64 = 1e-9;
 // ---- before the parser
 
 /// Checks root, version, xacro, materials and transmissions; gives notes.
-pub(crate) fn before(outline: &Outline) -> Result<Vec<String>> {
-    let Some(root) = outline.root() else {
+pub(crate) fn before(elements: &XmlElements) -> Result<Vec<String>> {
+    let Some(root) = elements.root() else {
         return Err(Fault::new("root", "whole file", "an element `robot`", "no element"));
     };
     if root.name != "robot" {
-        let found = format!("`{}`", short(&root.name));
+        let found = quoted(&root.name);
         return Err(Fault::new("root", root.place(), "an element `robot`", found));
     }
     check_version(root)?;
     let mut notes = Vec::new();
-    for child in outline.children(root) {
+    for child in elements.children(root) {
         match child.name.as_str() {
             "material" => {
-                let defines = |name| outline.child(child, name).is_some();
-                if !defines("color") && !defines("texture") {
+                let (color, texture) =
+                    (elements.child(child, "color"), elements.child(child, "texture"));
+                if color.is_none() && texture.is_none() {
                     let expected = "a colour or a texture";
                     return Err(Fault::new("material", child.place(), expected, "neither"));
                 }
             }
-            "transmission" => check_transmission(outline, child)?,
+            "transmission" => check_transmission(elements, child)?,
             name => check_xacro(name, child, &mut notes)?,
         }
     }
@@ -54,23 +55,22 @@ pub(crate) fn before(outline: &Outline) -> Result<Vec<String>> {
 /// `1.0`, `1.1` or `1.2`, as urdfdom reads it: two numbers and a dot.
 fn check_version(root: &Element) -> Result<()> {
     let Some(version) = root.attribute("version") else { return Ok(()) };
-    let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
-    match version.split_once('.') {
-        Some(("1", minor)) if digits(minor) && minor.len() < 4 => Ok(()),
-        _ => {
-            let found = format!("`{}`", short(version));
-            Err(Fault::new("version", root.place(), "version 1.x", found))
-        }
+    if let Some(("1", minor)) = version.split_once('.')
+        && (1..4).contains(&minor.len())
+        && minor.bytes().all(|byte| byte.is_ascii_digit())
+    {
+        return Ok(());
     }
+    Err(Fault::new("version", root.place(), "version 1.x", quoted(version)))
 }
 
 /// A transmission in the present form (its type an element) connects joints with actuators.
-fn check_transmission(outline: &Outline, transmission: &Element) -> Result<()> {
-    if outline.child(transmission, "type").is_none() {
+fn check_transmission(elements: &XmlElements, transmission: &Element) -> Result<()> {
+    if elements.child(transmission, "type").is_none() {
         return Ok(());
     }
     for need in ["joint", "actuator"] {
-        if outline.child(transmission, need).is_none() {
+        if elements.child(transmission, need).is_none() {
             let expected = format!("at least one `{need}`");
             return Err(Fault::new("transmission", transmission.place(), expected, "none"));
         }
@@ -85,7 +85,7 @@ fn check_xacro(name: &str, element: &Element, notes: &mut Vec<String>) -> Result
         ["include", "macro", "property", "arg", "if", "unless", "insert_block", "call"];
     let Some(rest) = name.strip_prefix("xacro:") else { return Ok(()) };
     if DIRECTIVES.contains(&rest) {
-        let found = format!("`{}`", short(name));
+        let found = quoted(name);
         return Err(Fault::new("xacro", element.place(), "a URDF that xacro has expanded", found));
     }
     notes.push(format!("line {}: `{}` was never expanded", element.line, short(name)));
@@ -94,18 +94,14 @@ fn check_xacro(name: &str, element: &Element, notes: &mut Vec<String>) -> Result
 
 // ---- after the parser
 
-/// Checks joints and links of the parsed robot; line numbers come from the outline, which has them
-/// in the same order.
+/// Checks joints and links of the parsed robot; line numbers come from the elements, which are in
+/// the same order.
 pub(crate) fn after(
-    outline: &Outline,
+    elements: &XmlElements,
     robot: &urdf_rs::Robot,
     notes: &mut Vec<String>,
 ) -> Result<Findings> {
-    let places = |name: &str| -> Vec<String> {
-        let children = outline.root().into_iter().flat_map(|root| outline.children(root));
-        children.filter(|child| child.name == name).map(Element::place).collect()
-    };
-    let (links, joints) = (places("link"), places("joint"));
+    let [links, joints] = ["link", "joint"].map(|name| places(elements, name));
     if (links.len(), joints.len()) != (robot.links.len(), robot.joints.len()) {
         let expected = format!("{} links, {} joints", links.len(), joints.len());
         let found = format!("{}, {}", robot.links.len(), robot.joints.len());
@@ -124,19 +120,22 @@ pub(crate) fn after(
     Ok(Findings { link_places: links, ..findings })
 }
 
+/// Where each element of that name in the robot stands.
+fn places(elements: &XmlElements, name: &str) -> Vec<String> {
+    let children = elements.root().into_iter().flat_map(|root| elements.children(root));
+    children.filter(|child| child.name == name).map(Element::place).collect()
+}
+
 fn check_mass(inertial: &urdf_rs::Inertial, place: &str, notes: &mut Vec<String>) -> Result<()> {
     let (mass, i) = (inertial.mass.value, &inertial.inertia);
-    let refuse = |what: &str, value: f64| {
-        let expected = format!("{what} not below zero");
-        Err(Fault::new("inertia", place, expected, value))
-    };
     if mass < 0.0 {
-        return refuse("a mass", mass);
+        return Err(Fault::new("inertia", place, "a mass not below zero", mass));
     }
     if let Some(&moment) = [i.ixx, i.iyy, i.izz].iter().find(|&&moment| moment < 0.0) {
-        return refuse("a moment of inertia", moment);
+        return Err(Fault::new("inertia", place, "a moment of inertia not below zero", moment));
     }
-    // Sylvester: a tensor of a body has no negative principal moment.
+    // Sylvester's criterion: the tensor of a body is positive semidefinite, so no leading minor is
+    // negative (to rounding).
     let minor = i.ixx * i.iyy - i.ixy * i.ixy;
     let determinant = i.ixx * (i.iyy * i.izz - i.iyz * i.iyz)
         - i.ixy * (i.ixy * i.izz - i.iyz * i.ixz)
@@ -155,7 +154,8 @@ fn check_scales(link: &urdf_rs::Link, place: &str) -> Result<()> {
         if let urdf_rs::Geometry::Mesh { scale: Some(scale), .. } = geometry
             && scale.contains(&0.0)
         {
-            let found = format!("{:?}", scale.0);
+            let [x, y, z] = scale.0;
+            let found = format!("{x} {y} {z}");
             return Err(Fault::new("geometry", place, "a scale without a zero", found));
         }
     }
@@ -167,7 +167,8 @@ fn check_motion(joint: &urdf_rs::Joint, place: &str, notes: &mut Vec<String>) ->
     let turns = matches!(joint.joint_type, Revolute | Continuous | Prismatic | Planar);
     let axis = joint.axis.xyz.0;
     if turns && axis.iter().map(|x| x * x).sum::<f64>().sqrt() < MIN_AXIS {
-        let found = format!("{axis:?}");
+        let [x, y, z] = axis;
+        let found = format!("{x} {y} {z}");
         return Err(Fault::new("axis", place, "an axis with a direction", found));
     }
     if matches!(joint.joint_type, Revolute | Prismatic) {
@@ -198,17 +199,16 @@ fn check_names(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
 fn check_mimics(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
     let index: HashMap<&str, usize> =
         robot.joints.iter().enumerate().map(|(i, joint)| (joint.name.as_str(), i)).collect();
-    let leader = |i: usize| robot.joints[i].mimic.as_ref().map(|mimic| mimic.joint.as_str());
     for (i, place) in places.iter().enumerate() {
         let (mut at, mut steps) = (i, 0);
-        while let Some(name) = leader(at) {
-            let Some(&next) = index.get(name) else {
-                let found = format!("`{}`", short(name));
+        while let Some(mimic) = &robot.joints[at].mimic {
+            let Some(&next) = index.get(mimic.joint.as_str()) else {
+                let found = quoted(&mimic.joint);
                 return Err(Fault::new("reference", place, "a mimic of a joint there is", found));
             };
             (at, steps) = (next, steps + 1);
             if steps > places.len() {
-                return Err(Fault::new("cycle", place, "a mimic that ends", "a circle"));
+                return Err(Fault::new("cycle", place, "a mimic that ends", "a cycle"));
             }
         }
     }
@@ -227,7 +227,7 @@ fn check_tree(robot: &urdf_rs::Robot, places: &[String]) -> Result<Findings> {
     let mut parents: HashMap<&str, usize> = HashMap::new();
     for (joint, place) in robot.joints.iter().zip(places) {
         if !names.contains(joint.child.link.as_str()) {
-            let found = format!("`{}`", short(&joint.child.link));
+            let found = quoted(&joint.child.link);
             return Err(Fault::new("reference", place, "a child that is a link", found));
         }
         if !names.contains(joint.parent.link.as_str()) {
@@ -242,8 +242,9 @@ fn check_tree(robot: &urdf_rs::Robot, places: &[String]) -> Result<Findings> {
         }
     }
     check_cycles(robot, places)?;
-    let is_root = |link: &&urdf_rs::Link| !parents.contains_key(link.name.as_str());
-    let roots: Vec<&urdf_rs::Link> = robot.links.iter().filter(is_root).collect();
+    let links = robot.links.iter();
+    let roots: Vec<&urdf_rs::Link> =
+        links.filter(|link| !parents.contains_key(link.name.as_str())).collect();
     check_roots(robot, &roots, &mut findings)?;
     findings.roots = roots.iter().map(|link| link.name.clone()).collect();
     Ok(findings)
@@ -263,7 +264,7 @@ fn check_cycles(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
     }
     match left.first() {
         Some(&joint) => {
-            Err(Fault::new("cycle", places[joint].clone(), "joints without a circle", "a circle"))
+            Err(Fault::new("cycle", places[joint].clone(), "joints without a cycle", "a cycle"))
         }
         None => Ok(()),
     }
@@ -276,30 +277,31 @@ fn check_roots(
     roots: &[&urdf_rs::Link],
     findings: &mut Findings,
 ) -> Result<()> {
-    let bare = |link: &urdf_rs::Link| {
-        link.visual.is_empty()
-            && link.collision.is_empty()
-            && link.inertial.mass.value == 0.0
-            && robot.joints.iter().all(|joint| joint.parent.link != link.name)
-    };
     match roots {
         [_] => Ok(()),
         [] => {
             findings.tree.push("no root: no link that no joint leads to".into());
             Ok(())
         }
-        _ if roots.iter().filter(|link| !bare(link)).count() == 1 => {
-            for link in roots.iter().filter(|link| bare(link)) {
+        _ if roots.iter().filter(|link| !is_bare(link, robot)).count() == 1 => {
+            for link in roots.iter().filter(|link| is_bare(link, robot)) {
                 let name = short(&link.name);
                 findings.tree.push(format!("link `{name}` is bare and connected to nothing"));
             }
             Ok(())
         }
         _ => {
-            let shown: Vec<String> =
-                roots.iter().take(4).map(|link| format!("`{}`", short(&link.name))).collect();
+            let shown: Vec<String> = roots.iter().take(4).map(|link| quoted(&link.name)).collect();
             let found = format!("{}: {}", roots.len(), shown.join(", "));
             Err(Fault::new("tree", "robot", "one root", found))
         }
     }
+}
+
+/// A frame without a body, and without links on it.
+fn is_bare(link: &urdf_rs::Link, robot: &urdf_rs::Robot) -> bool {
+    link.visual.is_empty()
+        && link.collision.is_empty()
+        && link.inertial.mass.value == 0.0
+        && robot.joints.iter().all(|joint| joint.parent.link != link.name)
 }

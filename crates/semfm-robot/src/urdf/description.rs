@@ -4,13 +4,16 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::check::{self, Findings};
-use super::outline::{MAX_BYTES, Outline, short};
-use super::{Fault, MeshPaths, MeshPlace, Robot, robot, schema};
+use super::fault::{Fault, short};
+use super::mesh_paths::{MeshPaths, MeshPlace};
+use super::xml::{MAX_BYTES, XmlElements};
+use super::{schema, tree};
+use crate::robot::Robot;
 use crate::{Error, Result};
 
 /// A robot description that passed the checks of its text, numbers and references.
 #[derive(Clone, Debug)]
-pub struct Description {
+pub struct RobotDescription {
     path: PathBuf,
     robot: urdf_rs::Robot,
     findings: Findings,
@@ -28,7 +31,7 @@ pub struct MeshUse {
     pub place: MeshPlace,
 }
 
-impl Description {
+impl RobotDescription {
     /// Reads a URDF file.
     ///
     /// # Errors
@@ -39,24 +42,23 @@ impl Description {
     /// nothing or of itself, or several unconnected robots.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let io = |source| Error::Io { path: path.to_owned(), source };
-        let file = std::fs::File::open(path).map_err(io)?;
-        if !file.metadata().map_err(io)?.is_file() {
-            let fault = Fault::new("io", "file system", "a regular file", "a folder or a device");
-            return Err(fault.in_file(path));
-        }
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+        let bytes = read_limited(path)
+            .map_err(|source| Error::Io { path: path.to_owned(), source })?
+            .ok_or_else(|| {
+                let found = "a folder or a device";
+                Fault::new("io", "file system", "a regular file", found).in_file(path)
+            })?;
         Self::parse(&bytes, path)
     }
 
     /// Reads the bytes of a URDF; `path` names it in messages and is where relative meshes start.
     ///
     /// # Errors
-    /// As [`Description::read`], without [`Error::Io`].
+    /// [`Error::Urdf`], see [`RobotDescription::read`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let (robot, findings, notes) = parse(bytes).map_err(|fault| fault.in_file(path))?;
+        let Parsed { robot, findings, notes } =
+            parse(bytes).map_err(|fault| fault.in_file(path))?;
         Ok(Self { path: path.to_owned(), robot, findings, notes })
     }
 
@@ -82,10 +84,9 @@ impl Description {
 
     /// Number of joints that move by themselves: neither fixed nor a mimic.
     pub fn n_movable(&self) -> usize {
-        let moves = |joint: &&urdf_rs::Joint| {
-            joint.joint_type != urdf_rs::JointType::Fixed && joint.mimic.is_none()
-        };
-        self.robot.joints.iter().filter(moves).count()
+        let fixed = urdf_rs::JointType::Fixed;
+        let joints = self.robot.joints.iter();
+        joints.filter(|joint| joint.joint_type != fixed && joint.mimic.is_none()).count()
     }
 
     /// Names of the links that no joint leads to.
@@ -106,7 +107,7 @@ impl Description {
     /// Every mesh that a visual or collision names, each name once for a link.
     ///
     /// # Errors
-    /// [`Error::Urdf`] where a name leads out of the folders that are allowed or asks for another
+    /// [`Error::Urdf`] where a name leads out of the folders that are allowed or has another
     /// protocol.
     pub fn meshes(&self, paths: &MeshPaths) -> Result<Vec<MeshUse>> {
         let mut uses: Vec<MeshUse> = Vec::new();
@@ -131,43 +132,62 @@ impl Description {
     /// The kinematic tree.
     ///
     /// # Errors
-    /// [`Error::Urdf`] with the first of [`Description::tree_findings`]: a fragment is no tree.
+    /// [`Error::Urdf`] with the first of [`RobotDescription::tree_findings`]: a fragment is no tree.
     pub fn tree(&self) -> Result<Robot> {
         if let Some(finding) = self.findings.tree.first() {
             let fault = Fault::new("tree", "robot", "one tree of links", finding);
             return Err(fault.in_file(&self.path));
         }
-        robot::build(&self.robot).map_err(|fault| fault.in_file(&self.path))
+        tree::build(&self.robot).map_err(|fault| fault.in_file(&self.path))
     }
 }
 
-fn parse(bytes: &[u8]) -> std::result::Result<(urdf_rs::Robot, Findings, Vec<String>), Fault> {
+/// A file's bytes, one more than allowed at most; `None` for what is no regular file.
+fn read_limited(path: &Path) -> std::io::Result<Option<Vec<u8>>> {
+    let file = std::fs::File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(Some(bytes))
+}
+
+/// What the checks left of a description.
+struct Parsed {
+    robot: urdf_rs::Robot,
+    findings: Findings,
+    notes: Vec<String>,
+}
+
+fn parse(bytes: &[u8]) -> std::result::Result<Parsed, Fault> {
     if bytes.len() as u64 > MAX_BYTES {
         let expected = format!("at most {} MB", MAX_BYTES >> 20);
         return Err(Fault::new("size", "whole file", expected, "more"));
     }
-    let outline = Outline::read(bytes)?;
-    let mut notes = check::before(&outline)?;
-    let clean = clean_copy(&outline)?;
+    let elements = XmlElements::read(bytes)?;
+    let mut notes = check::before(&elements)?;
+    let clean = clean_copy(&elements)?;
     let mut robot = urdf_rs::read_from_string(&clean)
         .map_err(|error| Fault::new("urdf", "robot", "a URDF", short(&error.to_string())))?;
-    robot.name = outline.root().and_then(|root| root.attribute("name")).unwrap_or_default().into();
-    let findings = check::after(&outline, &robot, &mut notes)?;
-    Ok((robot, findings, notes))
+    robot.name = elements.root().and_then(|root| root.attribute("name")).unwrap_or_default().into();
+    let findings = check::after(&elements, &robot, &mut notes)?;
+    Ok(Parsed { robot, findings, notes })
 }
 
 /// What the parser reads: links and joints as they passed the schema, nothing else.
-fn clean_copy(outline: &Outline) -> std::result::Result<String, Fault> {
+fn clean_copy(elements: &XmlElements) -> std::result::Result<String, Fault> {
     let mut out = String::from("<robot");
-    let Some(root) = outline.root() else { return Ok(out + "/>") };
+    let Some(root) = elements.root() else { return Ok(out + "/>") };
     if let Some(version) = root.attribute("version") {
         // Digits and one dot: the version was checked.
         out.push_str(&format!(" version=\"{version}\""));
     }
     out.push('>');
-    let known = |name: &str| name == "link" || name == "joint";
-    for child in outline.children(root).filter(|child| known(&child.name)) {
-        schema::write(outline, child, &mut out)?;
+    for child in elements.children(root) {
+        if child.name == "link" || child.name == "joint" {
+            schema::write(elements, child, &mut out)?;
+        }
     }
     out.push_str("</robot>");
     Ok(out)

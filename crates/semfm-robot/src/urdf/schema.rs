@@ -1,10 +1,10 @@
 //! The part of URDF that we read: elements, their attributes, what each value must be.
 //!
-//! One table serves twice: values are checked by it, with line numbers, and the text that the
-//! parser gets is written by it, so that nothing unchecked and nothing foreign reaches the parser.
+//! One table serves twice: values are checked by it, with line numbers, and the text that `urdf-rs`
+//! parses is written by it, so that nothing unchecked and nothing unknown is parsed.
 
-use super::Fault;
-use super::outline::{Element, Outline, short};
+use super::fault::{Fault, quoted};
+use super::xml::{Element, XmlElements};
 
 /// What an attribute's text must be.
 #[derive(Clone, Copy)]
@@ -21,9 +21,36 @@ enum Value {
     Text,
 }
 
-/// An attribute: its name, its value, and what is written where it is absent (`None`: it must be
-/// there; `Some("")`: it stays absent).
-type Attribute = (&'static str, Value, Option<&'static str>);
+/// What is written where an attribute is absent.
+#[derive(Clone, Copy)]
+enum Absent {
+    /// It must be there.
+    Refuse,
+    /// Nothing: it stays absent.
+    Omit,
+    /// This text.
+    Write(&'static str),
+}
+
+/// An attribute of an element.
+#[derive(Clone, Copy)]
+struct Attribute {
+    name: &'static str,
+    value: Value,
+    absent: Absent,
+}
+
+const fn required(name: &'static str, value: Value) -> Attribute {
+    Attribute { name, value, absent: Absent::Refuse }
+}
+
+const fn optional(name: &'static str, value: Value) -> Attribute {
+    Attribute { name, value, absent: Absent::Omit }
+}
+
+const fn defaulted(name: &'static str, value: Value, text: &'static str) -> Attribute {
+    Attribute { name, value, absent: Absent::Write(text) }
+}
 
 /// An element of URDF as we read it.
 struct Rule {
@@ -33,14 +60,12 @@ struct Rule {
     children: &'static [&'static str],
 }
 
-const OPTIONAL: Option<&str> = Some("");
-
-/// `velocity` and `effort` of a limit are demanded by the specification and left out by many; no
-/// grasp depends on them.
+/// `velocity` and `effort` of a limit, and `k_velocity` of a safety controller, are demanded by the
+/// specification and left out by many; no grasp depends on them.
 const RULES: &[Rule] = &[
     Rule {
         name: "link",
-        attributes: &[("name", Value::Name, None)],
+        attributes: &[required("name", Value::Name)],
         children: &["inertial", "visual", "collision"],
     },
     Rule { name: "inertial", attributes: &[], children: &["origin", "mass", "inertia"] },
@@ -49,22 +74,22 @@ const RULES: &[Rule] = &[
     Rule {
         name: "origin",
         attributes: &[
-            ("xyz", Value::Finite(3), OPTIONAL),
-            ("rpy", Value::Finite(3), OPTIONAL),
-            ("quat_xyzw", Value::Finite(4), OPTIONAL),
+            optional("xyz", Value::Finite(3)),
+            optional("rpy", Value::Finite(3)),
+            optional("quat_xyzw", Value::Finite(4)),
         ],
         children: &[],
     },
-    Rule { name: "mass", attributes: &[("value", Value::Finite(1), None)], children: &[] },
+    Rule { name: "mass", attributes: &[required("value", Value::Finite(1))], children: &[] },
     Rule {
         name: "inertia",
         attributes: &[
-            ("ixx", Value::Finite(1), Some("0")),
-            ("ixy", Value::Finite(1), Some("0")),
-            ("ixz", Value::Finite(1), Some("0")),
-            ("iyy", Value::Finite(1), Some("0")),
-            ("iyz", Value::Finite(1), Some("0")),
-            ("izz", Value::Finite(1), Some("0")),
+            defaulted("ixx", Value::Finite(1), "0"),
+            defaulted("ixy", Value::Finite(1), "0"),
+            defaulted("ixz", Value::Finite(1), "0"),
+            defaulted("iyy", Value::Finite(1), "0"),
+            defaulted("iyz", Value::Finite(1), "0"),
+            defaulted("izz", Value::Finite(1), "0"),
         ],
         children: &[],
     },
@@ -73,47 +98,61 @@ const RULES: &[Rule] = &[
         attributes: &[],
         children: &["box", "cylinder", "capsule", "sphere", "mesh"],
     },
-    Rule { name: "box", attributes: &[("size", Value::Size(3), None)], children: &[] },
+    Rule { name: "box", attributes: &[required("size", Value::Size(3))], children: &[] },
     Rule {
         name: "cylinder",
-        attributes: &[("radius", Value::Size(1), None), ("length", Value::Size(1), None)],
+        attributes: &[required("radius", Value::Size(1)), required("length", Value::Size(1))],
         children: &[],
     },
     Rule {
         name: "capsule",
-        attributes: &[("radius", Value::Size(1), None), ("length", Value::Size(1), None)],
+        attributes: &[required("radius", Value::Size(1)), required("length", Value::Size(1))],
         children: &[],
     },
-    Rule { name: "sphere", attributes: &[("radius", Value::Size(1), None)], children: &[] },
+    Rule { name: "sphere", attributes: &[required("radius", Value::Size(1))], children: &[] },
     Rule {
         name: "mesh",
-        attributes: &[("filename", Value::Text, None), ("scale", Value::Finite(3), OPTIONAL)],
+        attributes: &[required("filename", Value::Text), optional("scale", Value::Finite(3))],
         children: &[],
     },
     Rule {
         name: "joint",
-        attributes: &[("name", Value::Name, None), ("type", Value::Name, None)],
-        children: &["origin", "parent", "child", "axis", "limit", "mimic"],
+        attributes: &[required("name", Value::Name), required("type", Value::Name)],
+        children: &["origin", "parent", "child", "axis", "limit", "mimic", "safety_controller"],
     },
-    Rule { name: "parent", attributes: &[("link", Value::Name, None)], children: &[] },
-    Rule { name: "child", attributes: &[("link", Value::Name, None)], children: &[] },
-    Rule { name: "axis", attributes: &[("xyz", Value::Finite(3), Some("1 0 0"))], children: &[] },
+    Rule { name: "parent", attributes: &[required("link", Value::Name)], children: &[] },
+    Rule { name: "child", attributes: &[required("link", Value::Name)], children: &[] },
+    Rule {
+        name: "axis",
+        attributes: &[defaulted("xyz", Value::Finite(3), "1 0 0")],
+        children: &[],
+    },
     Rule {
         name: "limit",
         attributes: &[
-            ("lower", Value::Limit, OPTIONAL),
-            ("upper", Value::Limit, OPTIONAL),
-            ("effort", Value::Limit, Some("0")),
-            ("velocity", Value::Limit, Some("0")),
+            optional("lower", Value::Limit),
+            optional("upper", Value::Limit),
+            defaulted("effort", Value::Limit, "0"),
+            defaulted("velocity", Value::Limit, "0"),
+        ],
+        children: &[],
+    },
+    Rule {
+        name: "safety_controller",
+        attributes: &[
+            optional("soft_lower_limit", Value::Finite(1)),
+            optional("soft_upper_limit", Value::Finite(1)),
+            optional("k_position", Value::Finite(1)),
+            defaulted("k_velocity", Value::Finite(1), "0"),
         ],
         children: &[],
     },
     Rule {
         name: "mimic",
         attributes: &[
-            ("joint", Value::Name, None),
-            ("multiplier", Value::Finite(1), OPTIONAL),
-            ("offset", Value::Finite(1), OPTIONAL),
+            required("joint", Value::Name),
+            optional("multiplier", Value::Finite(1)),
+            optional("offset", Value::Finite(1)),
         ],
         children: &[],
     },
@@ -123,7 +162,11 @@ const JOINT_TYPES: [&str; 7] =
     ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
 
 /// Checks a link or joint with all inside it and writes what the parser is to read.
-pub(crate) fn write(outline: &Outline, element: &Element, out: &mut String) -> Result<(), Fault> {
+pub(crate) fn write(
+    elements: &XmlElements,
+    element: &Element,
+    out: &mut String,
+) -> Result<(), Fault> {
     let Some(rule) = RULES.iter().find(|rule| rule.name == element.name) else { return Ok(()) };
     out.push('<');
     out.push_str(rule.name);
@@ -135,14 +178,14 @@ pub(crate) fn write(outline: &Outline, element: &Element, out: &mut String) -> R
         return Ok(());
     }
     out.push('>');
-    check_children(outline, element)?;
+    check_children(elements, element)?;
     for name in rule.children {
-        for child in outline.children(element).filter(|child| child.name == *name) {
+        for child in elements.children(element).filter(|child| child.name == *name) {
             // Mass without a tensor says nothing about the body; urdfdom's Python reader takes it.
-            if *name == "inertial" && outline.child(child, "inertia").is_none() {
+            if *name == "inertial" && elements.child(child, "inertia").is_none() {
                 continue;
             }
-            write(outline, child, out)?;
+            write(elements, child, out)?;
         }
     }
     out.push_str("</");
@@ -151,16 +194,13 @@ pub(crate) fn write(outline: &Outline, element: &Element, out: &mut String) -> R
     Ok(())
 }
 
-fn write_attribute(
-    element: &Element,
-    (name, value, absent): Attribute,
-    out: &mut String,
-) -> Result<(), Fault> {
+fn write_attribute(element: &Element, attribute: Attribute, out: &mut String) -> Result<(), Fault> {
+    let Attribute { name, value, absent } = attribute;
     let text = match (element.attribute(name), absent) {
         (Some(text), _) => check_value(element, name, value, text)?,
-        (None, Some("")) => return Ok(()),
-        (None, Some(default)) => default.to_owned(),
-        (None, None) => {
+        (None, Absent::Omit) => return Ok(()),
+        (None, Absent::Write(text)) => text.to_owned(),
+        (None, Absent::Refuse) => {
             let expected = format!("an attribute `{name}`");
             return Err(Fault::new("attribute", element.place(), expected, "none"));
         }
@@ -183,11 +223,11 @@ fn write_attribute(
 
 /// The value as it is handed on.
 fn check_value(element: &Element, name: &str, value: Value, text: &str) -> Result<String, Fault> {
-    let place = || format!("{}: {name}", element.place());
+    let place = format!("{}: {name}", element.place());
     let (count, code) = match value {
         Value::Text => return Ok(text.to_owned()),
         Value::Name if text.trim().is_empty() => {
-            return Err(Fault::new("name", place(), "a name", "none"));
+            return Err(Fault::new("name", place, "a name", "none"));
         }
         Value::Name => return Ok(text.to_owned()),
         Value::Finite(count) => (count, "number"),
@@ -197,61 +237,65 @@ fn check_value(element: &Element, name: &str, value: Value, text: &str) -> Resul
     let numbers: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
     if numbers.len() != count || text.split_whitespace().count() != count {
         let expected = if count == 1 { "a number".into() } else { format!("{count} numbers") };
-        return Err(Fault::new(code, place(), expected, format!("`{}`", short(text))));
+        return Err(Fault::new(code, place, expected, quoted(text)));
     }
     let infinite = matches!(value, Value::Limit);
     if numbers.iter().any(|x| x.is_nan() || !(infinite || x.is_finite())) {
-        return Err(Fault::new("non-finite", place(), "finite", format!("`{}`", short(text))));
+        return Err(Fault::new("non-finite", place, "finite", quoted(text)));
     }
     if matches!(value, Value::Size(_)) && numbers.iter().any(|&x| x < 0.0) {
-        return Err(Fault::new("geometry", place(), "not negative", format!("`{}`", short(text))));
+        return Err(Fault::new("geometry", place, "not negative", quoted(text)));
     }
     Ok(text.to_owned())
 }
 
 /// What must be inside an element exactly or at most once.
-fn check_children(outline: &Outline, element: &Element) -> Result<(), Fault> {
-    let count = |name: &str| outline.children(element).filter(|child| child.name == name).count();
-    let need = |name: &str, range: std::ops::RangeInclusive<usize>| {
-        let found = count(name);
-        if range.contains(&found) {
-            return Ok(());
-        }
-        let expected = if *range.start() == 1 { "one" } else { "at most one" };
-        let found = format!("{found} of them");
-        Err(Fault::new("element", element.place(), format!("{expected} `{name}`"), found))
-    };
-    match element.name.as_str() {
-        "link" => need("inertial", 0..=1),
+fn check_children(elements: &XmlElements, element: &Element) -> Result<(), Fault> {
+    let (once, at_most_once): (&[&str], &[&str]) = match element.name.as_str() {
+        "link" => (&[], &["inertial"]),
         "joint" => {
-            need("parent", 1..=1)?;
-            need("child", 1..=1)?;
-            ["origin", "axis", "limit", "mimic"].iter().try_for_each(|name| need(name, 0..=1))?;
-            let kind = element.attribute("type").unwrap_or_default();
-            if JOINT_TYPES.contains(&kind) {
-                return Ok(());
-            }
-            let (expected, found) = (JOINT_TYPES.join(", "), format!("`{}`", short(kind)));
-            Err(Fault::new("joint-type", element.place(), expected, found))
+            (&["parent", "child"], &["origin", "axis", "limit", "mimic", "safety_controller"])
         }
-        "inertial" => {
-            need("origin", 0..=1)?;
-            need("mass", 1..=1)?;
-            need("inertia", 0..=1)
+        "inertial" => (&["mass"], &["origin", "inertia"]),
+        "visual" | "collision" => (&["geometry"], &["origin"]),
+        "geometry" => return check_geometry(elements, element),
+        _ => return Ok(()),
+    };
+    for name in once {
+        let found = count(elements, element, name);
+        if found != 1 {
+            return Err(wrong_count(element, format!("one `{name}`"), found));
         }
-        "visual" | "collision" => {
-            need("origin", 0..=1)?;
-            need("geometry", 1..=1)
-        }
-        "geometry" => {
-            let shapes = ["box", "cylinder", "capsule", "sphere", "mesh"];
-            let found: usize = shapes.iter().map(|shape| count(shape)).sum();
-            if found == 1 {
-                return Ok(());
-            }
-            let expected = format!("one of {}", shapes.join(", "));
-            Err(Fault::new("geometry", element.place(), expected, format!("{found} of them")))
-        }
-        _ => Ok(()),
     }
+    for name in at_most_once {
+        let found = count(elements, element, name);
+        if found > 1 {
+            return Err(wrong_count(element, format!("at most one `{name}`"), found));
+        }
+    }
+    let kind = element.attribute("type").unwrap_or_default();
+    if element.name == "joint" && !JOINT_TYPES.contains(&kind) {
+        let expected = JOINT_TYPES.join(", ");
+        return Err(Fault::new("joint-type", element.place(), expected, quoted(kind)));
+    }
+    Ok(())
+}
+
+fn check_geometry(elements: &XmlElements, element: &Element) -> Result<(), Fault> {
+    const SHAPES: [&str; 5] = ["box", "cylinder", "capsule", "sphere", "mesh"];
+    let found: usize = SHAPES.iter().map(|shape| count(elements, element, shape)).sum();
+    if found == 1 {
+        return Ok(());
+    }
+    let expected = format!("one of {}", SHAPES.join(", "));
+    Err(Fault::new("geometry", element.place(), expected, format!("{found} of them")))
+}
+
+/// Number of elements of that name directly inside one.
+fn count(elements: &XmlElements, element: &Element, name: &str) -> usize {
+    elements.children(element).filter(|child| child.name == name).count()
+}
+
+fn wrong_count(element: &Element, expected: String, found: usize) -> Fault {
+    Fault::new("element", element.place(), expected, format!("{found} of them"))
 }

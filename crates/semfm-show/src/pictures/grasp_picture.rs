@@ -9,7 +9,7 @@ use parry3d_f64::shape::{Shape, TypedShape};
 use semfm::geom::math::DVec3;
 use semfm::geom::{Mesh, Task};
 use semfm::grasp::Grasp;
-use semfm::robot::Gripper;
+use semfm::robot::{Gripper, PosedPart};
 use semfm::views::{RenderSettings, SurfaceColor, View, render};
 
 use super::sheet::{Entry, PICTURE_SIDE, Row, Sheet};
@@ -73,7 +73,7 @@ fn pictures(
     let mut surface = Surface::of(object.mesh);
     let mut colors = weight_colors(object.weights);
     for (rank, grasp) in grasps.iter().enumerate() {
-        for (tcp_from_part, part) in gripper.parts_at(grasp.width) {
+        for PosedPart { tcp_from_part, part } in gripper.parts_at(grasp.width) {
             surface.add_shape(&*part.shape, grasp.object_from_tcp * tcp_from_part);
         }
         colors.resize(surface.vertices.len(), grasp_color(rank, N_SHOWN));

@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use semfm_geom::io::write_atomically;
+use semfm_robot::JointPosition;
 
 use super::{GraspAnswer, position_and_rotation};
 use crate::Result;
@@ -44,8 +45,8 @@ fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
         {
             let joints = answer.gripper.joints_at(width);
             let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });
-            for (joint, value) in joints {
-                let _ = writeln!(text, "      {}: {}", quoted(joint), number(value));
+            for JointPosition { name: joint, position } in joints {
+                let _ = writeln!(text, "      {}: {}", quoted(joint), number(position));
             }
         }
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
 use semfm_grasp::Grasp;
-use semfm_robot::gripper::{Gripper, GripperPart, Role};
+use semfm_robot::{Gripper, GripperPart, Role};
 use serde_json::{Map, Value, json};
 
 use super::{GraspAnswer, position_and_rotation};
@@ -79,7 +79,7 @@ fn grasp_json(answer: &GraspAnswer<'_>, grasp: &Grasp) -> Value {
     let hand = |width: f64| -> Vec<Value> {
         let shift = flange_from_tcp(grasp.width).inverse() * flange_from_tcp(width);
         let parts = answer.gripper.parts_at(width).into_iter();
-        parts.map(|(tcp_from_part, _)| json!(rows(shift * tcp_from_part))).collect()
+        parts.map(|posed| json!(rows(shift * posed.tcp_from_part))).collect()
     };
     json!({
         "object_from_tcp": rows(grasp.object_from_tcp),

@@ -1,4 +1,4 @@
-//! The solids of a link: what collides, as convex parts, and the triangles that pads are sought in.
+//! The shape of a link: what collides, as convex pieces, and the triangles that pads are sought in.
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, SharedShape};
@@ -8,7 +8,8 @@ use semfm_geom::Mesh;
 use semfm_geom::io::{MeshFormat, read_mesh};
 use semfm_geom::math::{DQuat, DVec3, bounds};
 
-use crate::urdf::{Geometry, Link, MeshPaths, MeshPlace, Solid};
+use crate::link::{Geometry, Inertial, Link, LinkGeometry};
+use crate::urdf::{MeshPaths, MeshPlace};
 use crate::{Error, Result};
 
 /// Most triangles of a collision mesh; hands in the wild have some thousands.
@@ -24,22 +25,29 @@ const MIN_HALF: f64 = 1e-5;
 /// Segments of a circle where round shapes are cut into triangles.
 const N_SEGMENTS: u32 = 32;
 
+/// A convex shape at its place in a link.
+#[derive(Clone, Debug)]
+pub(super) struct ConvexPiece {
+    pub link_from_piece: Pose,
+    pub shape: SharedShape,
+}
+
 /// The shape of a link in its own frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LinkShape {
-    /// Convex parts at their places.
-    pub parts: Vec<(Pose, SharedShape)>,
+    /// What collides.
+    pub pieces: Vec<ConvexPiece>,
     /// All surfaces.
     pub triangles: Vec<[DVec3; 3]>,
-    /// Meshes that could not be had, and why.
+    /// Meshes that cannot be read, and why.
     pub missing: Vec<String>,
     /// Whether visuals stand in for collisions.
     pub from_visuals: bool,
 }
 
 impl LinkShape {
-    /// Reads the collisions of a link; where it has none, or one of their meshes cannot be had, its
-    /// visuals.
+    /// Reads the collisions of a link; where it has none, or one of their meshes cannot be
+    /// read, its visuals.
     pub fn new(link: &Link, paths: &MeshPaths) -> Result<Self> {
         let collisions = Self::of(&link.collisions, link, paths)?;
         if collisions.missing.is_empty() && !link.collisions.is_empty() || link.visuals.is_empty() {
@@ -52,20 +60,20 @@ impl LinkShape {
         Ok(if link.collisions.is_empty() { visuals } else { collisions })
     }
 
-    fn of(solids: &[Solid], link: &Link, paths: &MeshPaths) -> Result<Self> {
+    fn of(geometries: &[LinkGeometry], link: &Link, paths: &MeshPaths) -> Result<Self> {
         let mut shape = Self::default();
-        for solid in solids {
-            shape.add(solid, link, paths)?;
+        for geometry in geometries {
+            shape.add(geometry, link, paths)?;
         }
         Ok(shape)
     }
 
-    fn add(&mut self, solid: &Solid, link: &Link, paths: &MeshPaths) -> Result<()> {
-        let place = solid.link_from_solid;
+    fn add(&mut self, placed: &LinkGeometry, link: &Link, paths: &MeshPaths) -> Result<()> {
+        let place = placed.link_from_geometry;
         // parry's cylinders stand along y, those of URDF along z.
         let upright =
             place * Pose::from_rotation(DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
-        let (place, shape, surface) = match &solid.geometry {
+        let (place, shape, surface) = match &placed.geometry {
             Geometry::Box { size } => {
                 let cuboid = Cuboid::new((*size / 2.0).max(DVec3::splat(MIN_HALF)));
                 (place, SharedShape::new(cuboid), cuboid.to_trimesh())
@@ -86,7 +94,7 @@ impl LinkShape {
                 return self.add_mesh(filename, *scale, place, link, paths);
             }
         };
-        self.parts.push((place, shape));
+        self.pieces.push(ConvexPiece { link_from_piece: place, shape });
         self.add_surface(place, &surface.0, &surface.1);
         Ok(())
     }
@@ -124,34 +132,30 @@ impl LinkShape {
             });
         }
         let points: Vec<DVec3> = mesh.vertices().iter().map(|&point| point * scale).collect();
-        for shape in convex_parts(&points, &mesh) {
-            self.parts.push((place, shape));
-        }
+        let pieces = convex_pieces(&points, &mesh);
+        self.pieces
+            .extend(pieces.into_iter().map(|shape| ConvexPiece { link_from_piece: place, shape }));
         self.add_surface(place, &points, mesh.faces());
         Ok(())
     }
 
+    /// Whether there is anything to it, be it a mesh that cannot be read.
+    pub fn has_any(&self) -> bool {
+        !self.pieces.is_empty() || !self.missing.is_empty()
+    }
+
     fn add_surface(&mut self, place: Pose, points: &[DVec3], faces: &[[u32; 3]]) {
-        let corner = |i: u32| place.transform_point(points[i as usize]);
-        self.triangles.extend(faces.iter().map(|face| face.map(corner)));
+        let corners = faces.iter().map(|face| face.map(|i| points[i as usize]));
+        self.triangles.extend(corners.map(|t| t.map(|p| place.transform_point(p))));
     }
 }
 
 /// The hull of a mesh, or several where one hull would fill what is free.
-fn convex_parts(points: &[DVec3], mesh: &Mesh) -> Vec<SharedShape> {
+fn convex_pieces(points: &[DVec3], mesh: &Mesh) -> Vec<SharedShape> {
     let hull = convex_hull(points);
-    let volume = |points: &[DVec3], faces: &[[u32; 3]]| -> f64 {
-        let signed = |f: &[u32; 3]| {
-            let [a, b, c] = f.map(|i| points[i as usize]);
-            a.dot(b.cross(c)) / 6.0
-        };
-        faces.iter().map(signed).sum::<f64>().abs()
-    };
-    let Some((hull_points, hull_faces)) = hull else { return vec![bounding_box(points)] };
-    let filled = volume(&hull_points, &hull_faces);
-    if filled <= MAX_HULL_RATIO * volume(points, mesh.faces()) {
-        return SharedShape::convex_mesh(hull_points, &hull_faces)
-            .map_or_else(|| vec![bounding_box(points)], |shape| vec![shape]);
+    let Some(hull) = hull else { return vec![bounding_box(points)] };
+    if volume(&hull.points, &hull.faces) <= MAX_HULL_RATIO * volume(points, mesh.faces()) {
+        return vec![hull.into_shape().unwrap_or_else(|| bounding_box(points))];
     }
     let parameters = VHACDParameters { max_convex_hulls: MAX_PIECES, ..Default::default() };
     let decomposition = VHACD::decompose(&parameters, points, mesh.faces(), true);
@@ -160,20 +164,40 @@ fn convex_parts(points: &[DVec3], mesh: &Mesh) -> Vec<SharedShape> {
         .iter()
         .filter(|piece| !piece.is_empty())
         .map(|piece| {
-            convex_hull(piece)
-                .and_then(|(points, faces)| SharedShape::convex_mesh(points, &faces))
-                .unwrap_or_else(|| bounding_box(piece))
+            convex_hull(piece).and_then(Hull::into_shape).unwrap_or_else(|| bounding_box(piece))
         })
         .collect()
 }
 
+/// Volume of a closed mesh: the sum of its tetrahedra with the origin.
+///
+/// > V = |Σ a · (b × c)| / 6
+fn volume(points: &[DVec3], faces: &[[u32; 3]]) -> f64 {
+    let corners = faces.iter().map(|face| face.map(|i| points[i as usize]));
+    corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum::<f64>().abs()
+}
+
+/// A convex hull as a mesh.
+struct Hull {
+    points: Vec<DVec3>,
+    faces: Vec<[u32; 3]>,
+}
+
+impl Hull {
+    /// `None` where it is degenerate after all.
+    fn into_shape(self) -> Option<SharedShape> {
+        SharedShape::convex_mesh(self.points, &self.faces)
+    }
+}
+
 /// The convex hull, `None` for points in a plane.
-fn convex_hull(points: &[DVec3]) -> Option<(Vec<DVec3>, Vec<[u32; 3]>)> {
+fn convex_hull(points: &[DVec3]) -> Option<Hull> {
     let (low, high) = bounds(points)?;
     if (high - low).min_element() < MIN_HALF {
         return None;
     }
-    try_convex_hull(points).ok()
+    let (points, faces) = try_convex_hull(points).ok()?;
+    Some(Hull { points, faces })
 }
 
 /// The box around points with the axes of their frame, as a hull of its eight corners.
@@ -186,15 +210,18 @@ fn bounding_box(points: &[DVec3]) -> SharedShape {
         .unwrap_or_else(|| SharedShape::cuboid(half.x, half.y, half.z))
 }
 
-/// The box of equal mass and moments: edge² = 6 (sum of the other two moments − own) / mass.
-pub(super) fn inertia_box(link: &Link) -> Option<(Pose, SharedShape)> {
-    let [x, y, z] = link.moments;
-    let squares = DVec3::new(y + z - x, x + z - y, x + y - z) * 6.0 / link.mass;
-    if !(link.mass > 0.0 && squares.min_element() > 0.0 && squares.is_finite()) {
+/// The box of equal mass m and moments I. Its edge along x, and the others alike, is
+///
+/// > a² = 6 (I_yy + I_zz − I_xx) / m
+pub(super) fn inertia_box(inertial: &Inertial) -> Option<ConvexPiece> {
+    let [x, y, z] = inertial.moments;
+    let squares = DVec3::new(y + z - x, x + z - y, x + y - z) * 6.0 / inertial.mass;
+    if !(inertial.mass > 0.0 && squares.min_element() > 0.0 && squares.is_finite()) {
         return None;
     }
     let half = DVec3::new(squares.x.sqrt(), squares.y.sqrt(), squares.z.sqrt()) / 2.0;
-    Some((link.link_from_inertia, SharedShape::cuboid(half.x, half.y, half.z)))
+    let shape = SharedShape::cuboid(half.x, half.y, half.z);
+    Some(ConvexPiece { link_from_piece: inertial.link_from_inertial, shape })
 }
 
 #[cfg(test)]
@@ -230,7 +257,7 @@ mod tests {
     #[test]
     fn a_bay_stays_free() {
         let mesh = bay();
-        let parts = convex_parts(mesh.vertices(), &mesh);
+        let parts = convex_pieces(mesh.vertices(), &mesh);
         assert!(parts.len() > 1 && parts.len() <= MAX_PIECES as usize, "{}", parts.len());
         let probe = Cuboid::new(DVec3::new(0.25, 0.3, 0.1));
         let middle = Pose::translation(0.0, 0.6, 0.15);
@@ -245,7 +272,7 @@ mod tests {
     fn a_flat_mesh_becomes_a_thin_box() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)];
         let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [2, 1, 3]]).unwrap();
-        let parts = convex_parts(mesh.vertices(), &mesh);
+        let parts = convex_pieces(mesh.vertices(), &mesh);
         assert_eq!(parts.len(), 1);
         let bounds = parts[0].compute_aabb(&Pose::IDENTITY);
         assert!((bounds.extents() - DVec3::new(1.0, 1.0, 2.0 * MIN_HALF)).length() < 1e-12);
@@ -256,21 +283,12 @@ mod tests {
         let size = DVec3::new(0.1, 0.2, 0.3);
         let mass = 2.0;
         let square = size * size;
-        let moment = |a: f64, b: f64| mass * (a + b) / 12.0;
-        let link = Link {
-            name: "l".into(),
-            collisions: vec![],
-            visuals: vec![],
-            mass,
-            link_from_inertia: Pose::IDENTITY,
-            moments: [
-                moment(square.y, square.z),
-                moment(square.x, square.z),
-                moment(square.x, square.y),
-            ],
-        };
-        let (_, shape) = inertia_box(&link).unwrap();
-        assert!((shape.compute_aabb(&Pose::IDENTITY).extents() - size).length() < 1e-12);
-        assert!(inertia_box(&Link { mass: 0.0, ..link }).is_none());
+        let moments = [square.y + square.z, square.x + square.z, square.x + square.y]
+            .map(|s| mass * s / 12.0);
+        let link_from_inertial = Pose::IDENTITY;
+        let inertial = Inertial { mass, link_from_inertial, moments, products: [0.0; 3] };
+        let piece = inertia_box(&inertial).unwrap();
+        assert!((piece.shape.compute_aabb(&Pose::IDENTITY).extents() - size).length() < 1e-12);
+        assert!(inertia_box(&Inertial { mass: 0.0, ..inertial }).is_none());
     }
 }

@@ -1,13 +1,13 @@
 //! The elements of an XML file as a flat list with line numbers, read under limits.
 //!
-//! The parser behind us builds a tree by recursion, expands whatever a document type declares and
-//! forgets where things stood. So the text is first read here, by a streaming reader and without
-//! recursion: no document type, no entities beyond the five of XML, bounded depth and counts.
+//! `urdf-rs` builds a tree by recursion, expands whatever a document type declares and forgets where
+//! things stood. So the text is first read here, by a streaming reader and without recursion: no
+//! document type, no entities beyond the five of XML, bounded depth and counts.
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Decoder, Reader};
 
-use super::Fault;
+use super::fault::{Fault, quoted, short};
 
 /// Largest file that is read: the largest of 160 robots in the wild has 148 kB.
 pub(crate) const MAX_BYTES: u64 = 32 << 20;
@@ -48,28 +48,26 @@ impl Element {
 
 /// All elements of a file in order, the root first.
 #[derive(Debug)]
-pub(crate) struct Outline {
+pub(crate) struct XmlElements {
     elements: Vec<Element>,
 }
 
-impl Outline {
+impl XmlElements {
     /// Reads a file's bytes.
     pub fn read(bytes: &[u8]) -> Result<Self, Fault> {
         let text = decode(bytes)?;
         let mut reader = Reader::from_str(text);
-        let mut outline = Self { elements: Vec::new() };
+        let mut found = Self { elements: Vec::new() };
         let (mut open, mut lines) = (Vec::new(), Lines { text, position: 0, line: 1 });
         loop {
             let line = lines.at(reader.buffer_position() as usize);
-            let event = reader.read_event().map_err(|error| {
-                Fault::new("xml", format!("line {line}"), "well-formed XML", error)
-            })?;
+            let event = reader.read_event().map_err(|error| malformed(line, error))?;
             match event {
                 Event::Start(start) => {
-                    outline.push(&start, reader.decoder(), line, &open)?;
-                    open.push(outline.elements.len() - 1);
+                    found.push(&start, reader.decoder(), line, &open)?;
+                    open.push(found.elements.len() - 1);
                 }
-                Event::Empty(start) => outline.push(&start, reader.decoder(), line, &open)?,
+                Event::Empty(start) => found.push(&start, reader.decoder(), line, &open)?,
                 Event::End(_) => drop(open.pop()),
                 Event::DocType(_) => {
                     let found = "a document type declaration";
@@ -82,10 +80,10 @@ impl Outline {
             }
         }
         if let Some(&last) = open.last() {
-            let place = outline.elements[last].place();
+            let place = found.elements[last].place();
             return Err(Fault::new("xml", place, "an end tag", "the end of the file"));
         }
-        Ok(outline)
+        Ok(found)
     }
 
     /// The outermost element.
@@ -110,36 +108,30 @@ impl Outline {
         line: usize,
         open: &[usize],
     ) -> Result<(), Fault> {
-        let limit = |code, what: &str, most: usize| {
-            let found = format!("more {what}");
-            Err(Fault::new(code, format!("line {line}"), format!("at most {most} {what}"), found))
-        };
         if open.len() >= MAX_DEPTH {
-            return limit("depth", "nested elements", MAX_DEPTH);
+            return Err(too_many("depth", line, "nested elements", MAX_DEPTH));
         }
         if self.elements.len() >= MAX_ELEMENTS {
-            return limit("size", "elements", MAX_ELEMENTS);
+            return Err(too_many("size", line, "elements", MAX_ELEMENTS));
         }
-        let bad = |error: &dyn std::fmt::Display| {
-            Fault::new("xml", format!("line {line}"), "well-formed XML", error)
-        };
         let name = String::from_utf8_lossy(start.name().as_ref()).into_owned();
         let mut attributes = Vec::new();
         for attribute in start.attributes() {
             if attributes.len() >= MAX_ATTRIBUTES {
-                return limit("size", "attributes of an element", MAX_ATTRIBUTES);
+                return Err(too_many("size", line, "attributes of an element", MAX_ATTRIBUTES));
             }
-            let attribute = attribute.map_err(|error| bad(&error))?;
+            let attribute = attribute.map_err(|error| malformed(line, error))?;
             let key = String::from_utf8_lossy(attribute.key.as_ref()).into_owned();
-            let value =
-                attribute.decode_and_unescape_value(decoder).map_err(|error| bad(&error))?;
+            let value = attribute
+                .decode_and_unescape_value(decoder)
+                .map_err(|error| malformed(line, error))?;
             attributes.push((key, value.into_owned()));
         }
         let here = self.elements.len();
         match open.last() {
             Some(&parent) => self.elements[parent].children.push(here),
             None if here > 0 => {
-                let found = format!("a second outermost element `{}`", short(&name));
+                let found = format!("a second outermost element {}", quoted(&name));
                 return Err(Fault::new("xml", format!("line {line}"), "one robot", found));
             }
             None => {}
@@ -149,17 +141,29 @@ impl Outline {
     }
 }
 
+fn malformed(line: usize, error: impl std::fmt::Display) -> Fault {
+    Fault::new("xml", format!("line {line}"), "well-formed XML", error)
+}
+
+fn too_many(code: &'static str, line: usize, what: &str, most: usize) -> Fault {
+    let (expected, found) = (format!("at most {most} {what}"), format!("more {what}"));
+    Fault::new(code, format!("line {line}"), expected, found)
+}
+
+fn not_utf8(place: String, found: &str) -> Fault {
+    Fault::new("encoding", place, "UTF-8", found)
+}
+
 /// The bytes as UTF-8, without a byte order mark.
 fn decode(bytes: &[u8]) -> Result<&str, Fault> {
-    let fault = |place: String, found: &str| Fault::new("encoding", place, "UTF-8", found);
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(fault("byte 0".into(), "a byte order mark of UTF-16"));
+        return Err(not_utf8("byte 0".into(), "a byte order mark of UTF-16"));
     }
     let text = std::str::from_utf8(bytes).map_err(|error| {
-        fault(format!("byte {}", error.valid_up_to()), "bytes that are not UTF-8")
+        not_utf8(format!("byte {}", error.valid_up_to()), "bytes that are not UTF-8")
     })?;
     if let Some(byte) = text.find('\0') {
-        return Err(fault(format!("byte {byte}"), "a zero byte"));
+        return Err(not_utf8(format!("byte {byte}"), "a zero byte"));
     }
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim().is_empty() {
@@ -178,7 +182,7 @@ fn check_encoding(
     if name == "utf-8" || name == "utf8" || bytes.is_ascii() && !name.starts_with("utf-16") {
         return Ok(());
     }
-    Err(Fault::new("encoding", "XML declaration", "UTF-8", format!("`{}`", short(&name))))
+    Err(Fault::new("encoding", "XML declaration", "UTF-8", quoted(&name)))
 }
 
 /// References in text: to characters and to the five names that XML itself defines.
@@ -187,7 +191,7 @@ fn check_entity(entity: &quick_xml::events::BytesRef<'_>, line: usize) -> Result
     if entity.is_char_ref() || [&b"lt"[..], b"gt", b"amp", b"quot", b"apos"].contains(&name) {
         return Ok(());
     }
-    let found = format!("the entity `{}`", short(&String::from_utf8_lossy(name)));
+    let found = format!("the entity {}", quoted(&String::from_utf8_lossy(name)));
     Err(Fault::new("xml", format!("line {line}"), "no entities", found))
 }
 
@@ -208,35 +212,28 @@ impl Lines<'_> {
     }
 }
 
-/// A piece of the file for a message: printable and short.
-pub(crate) fn short(text: &str) -> String {
-    const SHOWN: usize = 60;
-    let escaped: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
-    if text.chars().count() > SHOWN { escaped + "…" } else { escaped }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn code(text: &str) -> &'static str {
-        Outline::read(text.as_bytes()).unwrap_err().code
+        XmlElements::read(text.as_bytes()).unwrap_err().code
     }
 
     #[test]
     fn elements_keep_order_line_and_attributes() {
         let text =
             "<?xml version=\"1.0\"?>\n<robot name=\"a&amp;b\">\n  <link name='l'/>\n</robot>";
-        let outline = Outline::read(text.as_bytes()).unwrap();
-        let root = outline.root().unwrap();
+        let elements = XmlElements::read(text.as_bytes()).unwrap();
+        let root = elements.root().unwrap();
         assert_eq!((root.line, root.attribute("name")), (2, Some("a&b")));
-        let link = outline.child(root, "link").unwrap();
+        let link = elements.child(root, "link").unwrap();
         assert_eq!((link.line, link.attribute("name")), (3, Some("l")));
         assert_eq!(link.place(), "line 3: link `l`");
     }
 
     #[test]
-    fn laughs_depth_and_foreign_entities_are_refused() {
+    fn nested_entities_depth_and_unknown_entities_are_refused() {
         let laughs =
             "<!DOCTYPE r [<!ENTITY a \"lol\"><!ENTITY b \"&a;&a;\">]><robot name=\"&b;\"/>";
         assert_eq!(code(laughs), "dtd");
@@ -253,9 +250,9 @@ mod tests {
     #[test]
     fn other_encodings_are_named_as_such() {
         let utf16: Vec<u8> = [0xff, 0xfe, b'<', 0].into();
-        assert_eq!(Outline::read(&utf16).unwrap_err().code, "encoding");
-        assert_eq!(Outline::read(b"<robot name='\xe9'/>").unwrap_err().code, "encoding");
+        assert_eq!(XmlElements::read(&utf16).unwrap_err().code, "encoding");
+        assert_eq!(XmlElements::read(b"<robot name='\xe9'/>").unwrap_err().code, "encoding");
         assert_eq!(code("<?xml version='1.0' encoding='latin1'?><robot name='é'/>"), "encoding");
-        assert!(Outline::read(b"<?xml version='1.0' encoding='latin1'?><robot/>").is_ok());
+        assert!(XmlElements::read(b"<?xml version='1.0' encoding='latin1'?><robot/>").is_ok());
     }
 }

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use super::Fault;
-use super::outline::short;
+use super::fault::{Fault, quoted};
 
 /// Folder names of ROS packages that hold descriptions; meshes stand beside them.
 const DESCRIPTION_FOLDERS: [&str; 3] = ["urdf", "robots", "robot"];
@@ -55,38 +54,37 @@ impl MeshPaths {
 
     /// Looks for a mesh by its name in the file; `place` is where the name stands.
     pub(crate) fn find(&self, name: &str, place: &str) -> Result<MeshPlace, Fault> {
-        let fault = |code, expected: &str| {
-            Err(Fault::new(code, place, expected, format!("`{}`", short(name))))
-        };
         if name.trim().is_empty() || name.contains(['\0', '\\']) {
-            return fault("filename", "the name of a mesh file");
+            return Err(Fault::new("filename", place, "the name of a mesh file", quoted(name)));
         }
+        let outside = |expected| Fault::new("path-outside", place, expected, quoted(name));
         if let Some(rest) = name.strip_prefix("package://") {
             let (package, inside) = rest.split_once('/').unwrap_or((rest, ""));
             let inside = Path::new(inside);
             if package.is_empty() || package == ".." || !is_plain(inside) {
-                return fault("path-outside", "a file inside its package");
+                return Err(outside("a file inside its package"));
             }
             let Some(folder) = self.packages.get(package) else {
                 return Ok(MeshPlace::Missing(format!(
-                    "package `{}` is not mapped",
-                    short(package)
+                    "package {} is not mapped",
+                    quoted(package)
                 )));
             };
             return match resolve(folder, folder, inside) {
                 Some(place) => Ok(place),
-                None => fault("path-outside", "a file inside its package"),
+                None => Err(outside("a file inside its package")),
             };
         }
         if name.contains(':') {
-            return fault("scheme", "a relative path or package://");
+            let expected = "a relative path or package://";
+            return Err(Fault::new("scheme", place, expected, quoted(name)));
         }
         if !self.stays_inside(Path::new(name)) {
-            return fault("path-outside", "a file inside the robot's folder");
+            return Err(outside("a file inside the robot's folder"));
         }
         match resolve(&self.folder, &self.root, Path::new(name)) {
             Some(place) => Ok(place),
-            None => fault("path-outside", "a file inside the robot's folder"),
+            None => Err(outside("a file inside the robot's folder")),
         }
     }
 
@@ -152,10 +150,13 @@ mod tests {
         }
     }
 
+    fn refusal(paths: &MeshPaths, name: &str) -> &'static str {
+        paths.find(name, "x").unwrap_err().code
+    }
+
     #[test]
     fn no_name_leads_out() {
         let (_folder, paths) = package();
-        let code = |name: &str| paths.find(name, "x").unwrap_err().code;
         for name in [
             "../../secret.stl",
             "/etc/passwd",
@@ -164,12 +165,12 @@ mod tests {
             "package://../secret.stl",
             "package:///etc/passwd",
         ] {
-            assert_eq!(code(name), "path-outside", "{name}");
+            assert_eq!(refusal(&paths, name), "path-outside", "{name}");
         }
-        assert_eq!(code("http://169.254.169.254/a.stl"), "scheme");
-        assert_eq!(code("file:///etc/passwd"), "scheme");
-        assert_eq!(code(" "), "filename");
-        assert_eq!(code("..\\a.stl"), "filename");
+        assert_eq!(refusal(&paths, "http://169.254.169.254/a.stl"), "scheme");
+        assert_eq!(refusal(&paths, "file:///etc/passwd"), "scheme");
+        assert_eq!(refusal(&paths, " "), "filename");
+        assert_eq!(refusal(&paths, "..\\a.stl"), "filename");
     }
 
     #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! The joints that open and close a hand.
+//! The joints that open and close a gripper.
 
 /// A joint's position by the width between the pads.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,6 +7,15 @@ pub struct DriveJoint {
     pub name: String,
     /// Widths (metres, ascending) and positions (metres or radians); never empty.
     entries: Vec<(f64, f64)>,
+}
+
+/// A joint's position at one width between the pads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointPosition<'a> {
+    /// Name of the joint.
+    pub name: &'a str,
+    /// Metres or radians.
+    pub position: f64,
 }
 
 impl DriveJoint {
@@ -20,7 +29,7 @@ impl DriveJoint {
         (!entries.is_empty()).then(|| Self { name: name.into(), entries })
     }
 
-    /// The position at a width, by straight lines between the entries and as the nearest outside.
+    /// The position at a width, linear between the entries and that of the nearest outside.
     pub fn at(&self, width: f64) -> f64 {
         let above = self.entries.partition_point(|entry| entry.0 <= width);
         if above == 0 {
@@ -37,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn positions_are_met_and_lie_between() {
+    fn positions_are_met_at_the_entries_and_interpolated_between() {
         let joint = DriveJoint::new("finger", [(0.08, 0.0), (0.0, 0.8)]).unwrap();
         for (width, position) in [(-1.0, 0.8), (0.0, 0.8), (0.02, 0.6), (0.08, 0.0), (1.0, 0.0)] {
             assert!((joint.at(width) - position).abs() < 1e-12);

@@ -1,0 +1,332 @@
+//! Two fingers of a robot that close on each other: which joints move them, along which axis, where
+//! their pads are.
+
+use parry3d_f64::math::Pose;
+use semfm_geom::math::{DVec3, bounds};
+
+use super::link_shape::LinkShape;
+use super::pads;
+use crate::robot::Robot;
+
+/// Samples of a drive in which fingers are compared.
+const N_SAMPLES: usize = 17;
+/// Fingers keep their direction within this angle, radians.
+const MAX_TURN: f64 = 0.02;
+/// Links that come less than this closer are not fingers, metres.
+const MIN_STROKE: f64 = 2e-3;
+/// How far the fingers may drift apart across the closing direction, metres.
+const MAX_DRIFT: f64 = 1e-3;
+/// Smallest side of a pad, metres.
+const MIN_PAD: f64 = 1e-3;
+/// Two joints are alike where their ranges differ by less than this share.
+const SAME_RANGE: f64 = 1e-3;
+
+/// A joint that a drive moves from one end of its range to the other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DrivenJoint {
+    pub joint: usize,
+    /// Position at share 0.
+    pub from: f64,
+    /// Position at share 1.
+    pub to: f64,
+}
+
+impl DrivenJoint {
+    /// Position at a share of the drive's way.
+    pub fn at(&self, share: f64) -> f64 {
+        self.from + (self.to - self.from) * share
+    }
+
+    fn reversed(self) -> Self {
+        Self { from: self.to, to: self.from, ..self }
+    }
+}
+
+/// Joints that one motor moves, or two that move alike.
+#[derive(Clone, Debug)]
+pub(super) struct Drive {
+    pub joints: Vec<DrivenJoint>,
+}
+
+impl Drive {
+    /// Every link's pose in the frame of `base` when the drive is at `share` of its way.
+    pub fn poses(&self, robot: &Robot, base: usize, share: f64) -> Vec<Pose> {
+        let mut positions = vec![0.0; robot.joints.len()];
+        for driven in &self.joints {
+            positions[driven.joint] = driven.at(share);
+        }
+        let poses = robot.link_poses(&robot.with_mimics(&positions));
+        let base_from_root = poses[base].inverse();
+        poses.into_iter().map(|pose| base_from_root * pose).collect()
+    }
+
+    /// Whether a joint is one of the drive's or follows one.
+    fn moves(&self, robot: &Robot, mut joint: usize) -> bool {
+        while let Some(mimic) = robot.joints[joint].mimic {
+            joint = mimic.joint;
+        }
+        self.joints.iter().any(|driven| driven.joint == joint)
+    }
+
+    /// For each link, the drive's joint nearest the root above it.
+    fn branches(&self, robot: &Robot) -> Vec<Option<usize>> {
+        let mut branches = vec![None; robot.links.len()];
+        // Joints stand in order from the root outwards.
+        for (i, joint) in robot.joints.iter().enumerate() {
+            let own = (joint.kind.has_position() && self.moves(robot, i)).then_some(i);
+            branches[joint.child] = branches[joint.parent].or(own);
+        }
+        branches
+    }
+}
+
+/// A pair of opposing fingers.
+#[derive(Clone, Debug)]
+pub(super) struct FingerPair {
+    pub drive: Drive,
+    /// The link that the fingers' first joints sit on.
+    pub palm: usize,
+    /// For each link, the first joint of the finger it belongs to.
+    pub branches: Vec<Option<usize>>,
+    /// The body with the pad at −y, then that at +y: the link at the top of each.
+    pub fingers: [usize; 2],
+    /// Closing axis in the palm's frame, from the first finger to the second.
+    pub closing: DVec3,
+    /// Approach axis in the palm's frame.
+    pub approach: DVec3,
+    /// The pads at share 0.
+    pub pads: PadGap,
+    /// The pad's sides across and along the approach, metres.
+    pub pad: [f64; 2],
+}
+
+/// The space between two pads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PadGap {
+    /// Distance between their faces; negative where they overlap.
+    pub width: f64,
+    /// Middle between their faces, in the palm's frame.
+    pub middle: DVec3,
+}
+
+impl FingerPair {
+    /// All pairs of fingers in a robot with the shapes of its links, best pad first. `only` names the
+    /// links that bear the pads.
+    pub fn find(robot: &Robot, shapes: &[LinkShape], only: Option<[usize; 2]>) -> Vec<Self> {
+        let mut found: Vec<Self> = drives(robot)
+            .into_iter()
+            .filter_map(|drive| SampledDrive::new(robot, shapes, drive))
+            .flat_map(|drive| drive.pairs(only))
+            .collect();
+        found.sort_by(|a, b| b.pad_area().total_cmp(&a.pad_area()));
+        found
+    }
+
+    fn pad_area(&self) -> f64 {
+        self.pad[0] * self.pad[1]
+    }
+
+    /// The pads where links have these poses in the palm's frame.
+    pub fn pads_at(&self, robot: &Robot, poses: &[Pose]) -> PadGap {
+        let start = self.drive.poses(robot, self.palm, 0.0);
+        let moved = self.fingers.map(|link| poses[link].translation - start[link].translation);
+        PadGap {
+            width: self.pads.width + (moved[1] - moved[0]).dot(self.closing),
+            middle: self.pads.middle + (moved[0] + moved[1]) / 2.0,
+        }
+    }
+}
+
+/// Joints with a range that lead others or only themselves, then pairs of equal ones on one body:
+/// some descriptions leave the coupling of the fingers to the controller.
+fn drives(robot: &Robot) -> Vec<Drive> {
+    let ranges: Vec<DrivenJoint> = robot
+        .joints
+        .iter()
+        .enumerate()
+        .filter(|(_, joint)| joint.mimic.is_none() && joint.kind.has_position())
+        .filter_map(|(i, joint)| {
+            let [low, high] = joint.limits.position?;
+            let range = DrivenJoint { joint: i, from: low, to: high };
+            (low.is_finite() && high.is_finite() && low < high).then_some(range)
+        })
+        .collect();
+    let mut drives: Vec<Drive> =
+        ranges.iter().map(|&range| Drive { joints: vec![range] }).collect();
+    for (n, &a) in ranges.iter().enumerate() {
+        for &b in &ranges[n + 1..] {
+            let (first, second) = (&robot.joints[a.joint], &robot.joints[b.joint]);
+            let alike = first.kind == second.kind
+                && robot.body_of(first.parent) == robot.body_of(second.parent)
+                && ((a.to - a.from) - (b.to - b.from)).abs() < SAME_RANGE * (a.to - a.from);
+            if alike {
+                drives.push(Drive { joints: vec![a, b] });
+                drives.push(Drive { joints: vec![a, b.reversed()] });
+            }
+        }
+    }
+    drives
+}
+
+/// A drive whose fingers sit on one palm, with the poses of all links on its way.
+struct SampledDrive<'a> {
+    robot: &'a Robot,
+    shapes: &'a [LinkShape],
+    drive: Drive,
+    palm: usize,
+    branches: Vec<Option<usize>>,
+    /// In the palm's frame, at equal steps of the drive.
+    samples: Vec<Vec<Pose>>,
+}
+
+impl<'a> SampledDrive<'a> {
+    /// `None` for a drive that moves fewer than two fingers, or fingers on several palms.
+    fn new(robot: &'a Robot, shapes: &'a [LinkShape], drive: Drive) -> Option<Self> {
+        let branches = drive.branches(robot);
+        let mut tops: Vec<usize> = branches.iter().flatten().copied().collect();
+        tops.sort_unstable();
+        tops.dedup();
+        let palm = robot.joints[*tops.first()?].parent;
+        let one_palm =
+            tops.iter().all(|&top| robot.body_of(robot.joints[top].parent) == robot.body_of(palm));
+        if tops.len() < 2 || !one_palm {
+            return None;
+        }
+        let samples = (0..N_SAMPLES)
+            .map(|i| drive.poses(robot, palm, i as f64 / (N_SAMPLES - 1) as f64))
+            .collect();
+        Some(Self { robot, shapes, drive, palm, branches, samples })
+    }
+
+    /// The pairs of fingers that it moves.
+    fn pairs(&self, only: Option<[usize; 2]>) -> Vec<FingerPair> {
+        let robot = self.robot;
+        let only = only.map(|links| links.map(|link| robot.body_of(link)));
+        let bodies: Vec<usize> = (0..robot.links.len())
+            .filter(|&link| self.branches[link].is_some() && robot.body_of(link) == link)
+            .filter(|&link| self.keeps_direction(link))
+            .collect();
+        let mut found = Vec::new();
+        for (n, &a) in bodies.iter().enumerate() {
+            for &b in &bodies[n + 1..] {
+                let wanted = only.is_none_or(|pair| pair == [a, b] || pair == [b, a]);
+                if wanted && self.branches[a] != self.branches[b] {
+                    found.extend(self.pair([a, b]));
+                }
+            }
+        }
+        found
+    }
+
+    fn keeps_direction(&self, link: usize) -> bool {
+        let first = self.samples[0][link].rotation;
+        self.samples.iter().all(|poses| poses[link].rotation.angle_between(first) <= MAX_TURN)
+    }
+
+    /// Whether two bodies move towards each other along one line, with pads that face each other.
+    fn pair(&self, bodies: [usize; 2]) -> Option<FingerPair> {
+        let mut fingers = bodies;
+        let (start, end) = (&self.samples[0], self.samples.last()?);
+        let first_between = between(start, fingers);
+        let stroke = between(end, fingers) - first_between;
+        if stroke.length() < MIN_STROKE {
+            return None;
+        }
+        let mut closing = stroke.normalize();
+        if closing.to_array()[closing.abs().max_position()] < 0.0 {
+            closing = -closing;
+        }
+        let drifts = self.samples.iter().any(|poses| {
+            across(between(poses, fingers) - first_between, closing).length() > MAX_DRIFT
+        });
+        if drifts {
+            return None;
+        }
+        let ways = fingers
+            .map(|finger| (end[finger].translation - start[finger].translation).dot(closing));
+        if ways[0] * ways[1] >= 0.0 {
+            return None;
+        }
+        let mut surfaces = fingers.map(|finger| self.surface(finger));
+        if mean_along(&surfaces[0], closing) > mean_along(&surfaces[1], closing) {
+            surfaces.swap(0, 1);
+            fingers.swap(0, 1);
+        }
+        let left = pads::innermost(&surfaces[0], closing)?;
+        let right = pads::innermost(&surfaces[1], -closing)?;
+        let width = -right.height - left.height;
+        let (low, high) = bounds(&[left.points.as_slice(), right.points.as_slice()].concat())?;
+        let approach = approach(closing, across((low + high) / 2.0, closing))?;
+        let x_axis = closing.cross(approach);
+        let x = shared(&left.points, &right.points, x_axis)?;
+        let z = shared(&left.points, &right.points, approach)?;
+        let y = (left.height - right.height) / 2.0;
+        let middle = x_axis * x.middle + closing * y + approach * z.middle;
+        Some(FingerPair {
+            drive: self.drive.clone(),
+            palm: self.palm,
+            branches: self.branches.clone(),
+            fingers,
+            closing,
+            approach,
+            pads: PadGap { width, middle },
+            pad: [x.length, z.length],
+        })
+    }
+
+    /// The triangles of a body at share 0, in the palm's frame.
+    fn surface(&self, body: usize) -> Vec<[DVec3; 3]> {
+        (0..self.robot.links.len())
+            .filter(|&link| self.robot.body_of(link) == body)
+            .flat_map(|link| {
+                let pose = self.samples[0][link];
+                self.shapes[link].triangles.iter().map(move |t| t.map(|p| pose.transform_point(p)))
+            })
+            .collect()
+    }
+}
+
+/// From the first finger to the second.
+fn between(poses: &[Pose], fingers: [usize; 2]) -> DVec3 {
+    poses[fingers[1]].translation - poses[fingers[0]].translation
+}
+
+/// The component of `v` across a unit axis.
+fn across(v: DVec3, axis: DVec3) -> DVec3 {
+    v - axis * v.dot(axis)
+}
+
+/// Mean position of a surface's corners along an axis.
+fn mean_along(surface: &[[DVec3; 3]], axis: DVec3) -> f64 {
+    surface.iter().flatten().map(|p| p.dot(axis)).sum::<f64>() / (3 * surface.len()).max(1) as f64
+}
+
+/// From the palm to the pads, across the closing axis: along an axis of the palm's frame where one
+/// is near, since grippers are drawn along their axes.
+fn approach(closing: DVec3, to_pads: DVec3) -> Option<DVec3> {
+    let wish = to_pads.try_normalize()?;
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    let near = axes
+        .into_iter()
+        .flat_map(|axis| [axis, -axis])
+        .find(|axis| axis.dot(wish) > 0.7 && axis.dot(closing).abs() < 0.02);
+    across(near.unwrap_or(wish), closing).try_normalize()
+}
+
+/// An interval on an axis.
+struct Interval {
+    length: f64,
+    middle: f64,
+}
+
+/// The interval along an axis that two pads share; `None` where it is too short for a pad.
+fn shared(left: &[DVec3], right: &[DVec3], axis: DVec3) -> Option<Interval> {
+    let [a, b] = [left, right].map(|points| {
+        points
+            .iter()
+            .map(|p| p.dot(axis))
+            .fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)])
+    });
+    let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
+    (high - low >= MIN_PAD).then_some(Interval { length: high - low, middle: (high + low) / 2.0 })
+}
