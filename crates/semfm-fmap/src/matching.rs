@@ -73,7 +73,7 @@ impl Matching {
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
-        semfm_geom::algebra::keep_sequential();
+        semfm_geom::keep_faer_sequential();
         settings.check()?;
         let available = source.shape().basis().k().min(target.shape().basis().k());
         let settings = settings.clipped(available);
@@ -156,7 +156,7 @@ impl Matching {
         Ok(Transfer {
             region,
             confidence,
-            verdict: Verdict::of(confidence),
+            verdict: verdict(confidence),
             hypotheses: self.hypotheses(&voted, second.as_deref())?,
             point_map: self.matched.point_map.onto_originals(source, target),
             other_rule: other.map(|votes| onto_original(target, &votes)).transpose()?,
