@@ -2,7 +2,7 @@
 
 use semfm_geom::{Shape, Task};
 
-use crate::confidence::{Answer, Evidence, probability_by_agreement};
+use crate::confidence::{Answer, Evidence, probability_by_agreement, verdict};
 use crate::hypotheses::{Hypothesis, hypotheses, is_connected};
 use crate::method::Method;
 use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
@@ -13,7 +13,7 @@ use crate::report::{
 use crate::settings::TransferSettings;
 use crate::stages::Stages;
 use crate::transfer::Transfer;
-use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result, Verdict};
+use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result};
 
 /// Transfers `region`, which lies on the source's original vertices, to the target: a [`Matching`]
 /// for one region, whose report lists the anchors whatever the method.
