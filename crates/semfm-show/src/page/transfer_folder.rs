@@ -198,7 +198,7 @@ fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
             Ok(Some(cloud)) => cloud,
             Ok(None) => return Ok(None),
             // A scene of millions of vertices is beyond the reader: that costs this layer, not the page.
-            Err(Error::Semfm(semfm::Error::Views(semfm::views::Error::Container {
+            Err(crate::Error::Semfm(semfm::Error::Views(semfm::views::Error::Container {
                 fault: Fault::OverLimit,
                 ..
             }))) => return Ok(None),
