@@ -1099,7 +1099,7 @@ class Mesh:
         ...
     @staticmethod
     def read(path: _Path) -> Mesh:
-        """Reads an OBJ, PLY, STL, OFF, glTF or GLB file; polygons are cut to triangles.
+        """Reads a mesh file in any format of ``mesh_formats()``; polygons are cut to triangles.
 
         Parameters
         ----------
@@ -1143,7 +1143,7 @@ class Mesh:
         """(n, 3) float64 array: positions, a read-only view."""
         ...
     def write(self, path: _Path, *, colors: Optional[ArrayLike] = None, scalars: Optional[Mapping[str, Any]] = None) -> None:
-        """Writes an OBJ, OFF, PLY, STL or GLB file, whole or not at all.
+        """Writes a mesh file, whole or not at all, in a format that ``mesh_formats()`` says is written.
 
         OBJ, OFF and PLY keep coordinates exactly. GLB and STL have 32 bits a number.
 
@@ -2158,6 +2158,27 @@ def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = '
     """
     ...
 
+def mesh_formats(*, written: bool = False) -> list[str]:
+    """The formats of mesh files, by name.
+
+    Parameters
+    ----------
+    written : bool, default False
+        Only those that meshes are written to.
+
+    Returns
+    -------
+    list of str
+        Such as ``"ply"``, which are the extensions, too.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> "gltf" in semfm.mesh_formats(), "gltf" in semfm.mesh_formats(written=True)
+    (True, False)
+    """
+    ...
+
 def point_cloud_laplacian(points: ArrayLike, *, n_neighbors: int = 30, mollify_factor: float = 1e-05) -> Laplacian:
     """The Laplacian of points sampled from a surface, without triangles (Sharp & Crane 2020).
 
@@ -2223,7 +2244,7 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     Parameters
     ----------
     path : path
-        OBJ, PLY, STL, OFF, glTF or GLB.
+        The file, in any format of ``mesh_formats()``.
     texture : path, optional
         An image for a mesh with texture coordinates (OBJ, PLY).
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Task, Verdict};
 
 use crate::Result;
 use crate::alignment::Alignment;
@@ -14,7 +14,6 @@ use crate::refine::RefinedPose;
 use crate::settings::AlignSettings;
 use crate::sim3::Sim3;
 use crate::uncertainty::Uncertainty;
-use crate::verdict::Verdict;
 
 /// Width of the last steps' kernel at first, as a share of the observed diameter.
 const FIRST_WIDTH: f64 = 0.03;

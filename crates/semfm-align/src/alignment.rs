@@ -1,7 +1,8 @@
 //! The outcome of an alignment.
 
+use semfm_geom::Verdict;
+
 use crate::sim3::Sim3;
-use crate::verdict::Verdict;
 
 /// The pose of an object in a camera's frame, and how far to trust it.
 #[derive(Clone, Debug, PartialEq)]

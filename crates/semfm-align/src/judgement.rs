@@ -1,7 +1,8 @@
 //! The verdict on a pose, and the reasons for it.
 
+use semfm_geom::Verdict;
+
 use crate::alignment::Alignment;
-use crate::verdict::Verdict;
 
 /// A share that a pose should have: accepted from the first number on, refused below the second.
 struct Threshold {

@@ -38,7 +38,6 @@ mod settings;
 mod silhouette;
 mod sim3;
 mod uncertainty;
-mod verdict;
 mod visibility;
 mod weak_directions;
 
@@ -48,9 +47,9 @@ pub use depth_image::{DepthImage, DepthPoints};
 pub use error::{Error, Result};
 pub use model::AlignModel;
 pub use observation::Observation;
+pub use semfm_geom::Verdict;
 pub use settings::AlignSettings;
 pub use sim3::Sim3;
-pub use verdict::Verdict;
 
 #[cfg(test)]
 mod tests {

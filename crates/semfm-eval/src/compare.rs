@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{write_atomically, write_json_pretty};
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
@@ -114,10 +114,7 @@ impl Comparison {
     /// [`crate::Error::Facade`] where they cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let [json, text] = FILES.map(|name| folder.join(name));
-        write_atomically(&json, |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            out.write_all(b"\n")
-        })?;
+        write_json_pretty(&json, self)?;
         write_atomically(&text, |out| out.write_all(self.render().as_bytes()))?;
         Ok(vec![json, text])
     }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use semfm::geom::io::FormatError;
+
 /// Result of an evaluation call.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -25,17 +27,8 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file is not what its format demands.
-    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Field, line or element.
-        place: String,
-        /// What the format demands there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    #[error(transparent)]
+    Format(#[from] FormatError),
     /// An argument outside what it may be.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
@@ -78,8 +71,7 @@ impl Error {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Self {
-        let (place, expected, found) = (place.into(), expected.into(), found.into());
-        Self::Format { path: path.to_owned(), place, expected, found }
+        FormatError::new(path, place.into(), expected, found).into()
     }
 
     /// Wraps what the system said about `path`.
@@ -105,7 +97,7 @@ impl Error {
             Self::Facade(cause) => cause.code(),
             Self::Synth(_) => "synth",
             Self::Io { .. } => "io",
-            Self::Format { .. } => "format",
+            Self::Format(_) => "format",
             Self::Invalid { .. } => "invalid",
             Self::OtherRun { .. } => "other-run",
         }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::write_json_pretty;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -100,10 +100,7 @@ impl Results {
     /// [`Error::Io`].
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(FILE);
-        write_atomically(&path, |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            out.write_all(b"\n")
-        })?;
+        write_json_pretty(&path, self)?;
         Ok(path)
     }
 

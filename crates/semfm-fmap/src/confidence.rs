@@ -13,6 +13,7 @@
 //! (AUC .42–.57); they are reported, and nothing is decided by them.
 
 use faer::{Mat, RowRef};
+use semfm_geom::Verdict;
 use serde::{Deserialize, Serialize};
 
 use crate::Region;
@@ -30,28 +31,14 @@ const AMBIGUOUS: std::ops::Range<f64> = 0.3..0.65;
 /// More ambiguity than this says nothing more.
 const MOST_AMBIGUITY: f64 = 2.0;
 
-/// What to do with the answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Use it.
-    Accept,
-    /// Let somebody look at it.
-    Check,
-    /// There is no answer worth using.
-    Refuse,
-}
-
-impl Verdict {
-    /// The verdict on a probability in [0, 1].
-    pub fn of(confidence: f64) -> Self {
-        if confidence >= ACCEPT {
-            Self::Accept
-        } else if confidence >= CHECK {
-            Self::Check
-        } else {
-            Self::Refuse
-        }
+/// The verdict on a transfer whose confidence is this probability in [0, 1].
+pub fn verdict(confidence: f64) -> Verdict {
+    if confidence >= ACCEPT {
+        Verdict::Accept
+    } else if confidence >= CHECK {
+        Verdict::Check
+    } else {
+        Verdict::Refuse
     }
 }
 
@@ -175,7 +162,7 @@ mod tests {
     fn verdicts_follow_the_bands() {
         use Verdict::{Accept, Check, Refuse};
         assert_eq!(
-            [0.0, 0.49, 0.5, 0.79, 0.8, 1.0].map(Verdict::of),
+            [0.0, 0.49, 0.5, 0.79, 0.8, 1.0].map(verdict),
             [Refuse, Refuse, Check, Check, Accept, Accept]
         );
     }
@@ -183,7 +170,7 @@ mod tests {
     #[test]
     fn better_evidence_is_more_probable_and_none_is_refused() {
         let sure = Evidence { ambiguity: 0.05, margin: 0.4, round_trip: 0.9 };
-        assert_eq!(Verdict::of(sure.probability()), Verdict::Accept);
+        assert_eq!(verdict(sure.probability()), Verdict::Accept);
         for worse in [
             Evidence { ambiguity: 1.0, ..sure },
             Evidence { margin: 0.0, ..sure },
@@ -192,7 +179,7 @@ mod tests {
             assert!(worse.probability() < sure.probability());
         }
         let lost = Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0 };
-        assert_eq!(Verdict::of(lost.probability()), Verdict::Refuse);
+        assert_eq!(verdict(lost.probability()), Verdict::Refuse);
         assert!(probability_by_agreement(0.9) > 0.9 && probability_by_agreement(0.2) < 0.5);
     }
 

@@ -38,7 +38,7 @@ impl CentredFeatures {
     /// # Errors
     /// [`Error::LinearAlgebra`] where an eigendecomposition fails.
     pub fn new(cloud: &SemanticCloud) -> Result<Self> {
-        semfm_geom::algebra::keep_sequential();
+        semfm_geom::keep_faer_sequential();
         let (d, m) = (cloud.dim(), cloud.n_points());
         let mut columns = MatRef::from_column_major_slice(cloud.features(), d, m).to_owned();
         let mut mean = vec![0.0f64; d];

@@ -80,7 +80,7 @@ mod union_find;
 pub mod zoomout;
 
 pub use anchors::{Anchor, Anchors, ClusteredCloud};
-pub use confidence::{Evidence, Verdict};
+pub use confidence::Evidence;
 pub use error::{Error, Result};
 pub use functional_map::FunctionalMap;
 pub use hypotheses::Hypothesis;
@@ -93,6 +93,7 @@ pub use point_map::PointMap;
 pub use prepared_object::PreparedObject;
 pub use region::Region;
 pub use report::{AnchorReport, MapQuality, OtherRule, TransferReport, TransportReport};
+pub use semfm_geom::Verdict;
 pub use settings::{Rule, TransferSettings};
 pub use stages::Stages;
 pub use transfer::Transfer;

@@ -2,7 +2,7 @@
 
 use semfm_geom::{Shape, Task};
 
-use crate::confidence::{Answer, Evidence, probability_by_agreement};
+use crate::confidence::{Answer, Evidence, probability_by_agreement, verdict};
 use crate::hypotheses::{Hypothesis, hypotheses, is_connected};
 use crate::method::Method;
 use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
@@ -13,7 +13,7 @@ use crate::report::{
 use crate::settings::TransferSettings;
 use crate::stages::Stages;
 use crate::transfer::Transfer;
-use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result, Verdict};
+use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result};
 
 /// Transfers `region`, which lies on the source's original vertices, to the target: a [`Matching`]
 /// for one region, whose report lists the anchors whatever the method.
@@ -73,7 +73,7 @@ impl Matching {
         settings: &TransferSettings,
         task: &Task,
     ) -> Result<Self> {
-        semfm_geom::algebra::keep_sequential();
+        semfm_geom::keep_faer_sequential();
         settings.check()?;
         let available = source.shape().basis().k().min(target.shape().basis().k());
         let settings = settings.clipped(available);
@@ -156,7 +156,7 @@ impl Matching {
         Ok(Transfer {
             region,
             confidence,
-            verdict: Verdict::of(confidence),
+            verdict: verdict(confidence),
             hypotheses: self.hypotheses(&voted, second.as_deref())?,
             point_map: self.matched.point_map.onto_originals(source, target),
             other_rule: other.map(|votes| onto_original(target, &votes)).transpose()?,

@@ -16,7 +16,7 @@
 //! few inside (a cup's handle is 6 % of its surface: IoU .96 became .88 at λ = 100).
 
 use faer::Mat;
-use semfm_geom::cholesky::SparseCholesky;
+use semfm_geom::SparseCholesky;
 use serde::{Deserialize, Serialize};
 
 use crate::neighbour_graph::NeighbourGraph;

@@ -15,7 +15,7 @@ use faer::matrix_free::eigen::{
 };
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Col, Mat, MatMut, MatRef, Par};
-use semfm_geom::cholesky::SparseCholesky;
+use semfm_geom::SparseCholesky;
 use semfm_geom::eigensolver::{EigenSettings, eigenbasis};
 use semfm_geom::laplacian::cotan_laplacian;
 use semfm_geom::math::DVec3;

@@ -12,7 +12,7 @@
 //! | 6 × 8 | n original vertices, n working vertices, m triangles, k, e entries of the stiffness, length of the report |
 //! | 24 n_w + 12 m | working mesh |
 //! | 4 n + 4 n_w | `of_original`, `to_original` |
-//! | 36 n | carriers: weights of all, then corners of all |
+//! | 36 n | `point_of_original`: weights of all, then corners of all |
 //! | 16 e | stiffness: values of all, then row and column of all |
 //! | 8 k + 8 n_w k + 8 n_w + 8 k | eigenvalues, eigenfunctions by column, mass, residuals |
 //! | report | JSON |
@@ -27,10 +27,9 @@ use faer::Mat;
 use faer::sparse::{SparseColMat, Triplet};
 
 use crate::math::DVec3;
-use crate::working::{Carrier, WorkingMesh};
-use crate::{
-    Eigenbasis, Error, Laplacian, Mesh, MeshHash, Result, Shape, ShapeReport, ShapeSettings, Task,
-};
+use crate::shape::ShapeParts;
+use crate::working_mesh::{BarycentricPoint, WorkingMesh};
+use crate::{Eigenbasis, Error, Laplacian, Mesh, MeshHash, Result, Shape, ShapeSettings, Task};
 
 /// Names format and version. A change of the layout *or of any step that leads to a shape* must
 /// change it: entries of other versions are never read.
@@ -71,7 +70,7 @@ pub struct CachedShape {
 }
 
 impl ShapeCache {
-    /// Room for about 300 shapes of 10 000 vertices and 60 eigenpairs.
+    /// Enough for about 300 shapes of 10 000 vertices and 60 eigenpairs.
     pub const DEFAULT_MAX_BYTES: u64 = 2 << 30;
 
     /// No cache: every shape is made.
@@ -87,15 +86,11 @@ impl ShapeCache {
     /// The user's cache: `$SEMFM_CACHE/shapes`, else `$XDG_CACHE_HOME/semfm/shapes`, else
     /// `~/.cache/semfm/shapes`; off where none of these is set.
     pub fn of_user() -> Self {
-        let folder = |name: &str| {
-            let set = std::env::var_os(name).filter(|value| !value.is_empty());
-            set.map(PathBuf::from)
-        };
         // The XDG specification has relative paths ignored.
-        let xdg = || folder("XDG_CACHE_HOME").filter(|path| path.is_absolute());
-        let base = folder("SEMFM_CACHE")
-            .or_else(|| xdg().map(|path| path.join("semfm")))
-            .or_else(|| folder("HOME").map(|path| path.join(".cache/semfm")));
+        let xdg = folder_of_variable("XDG_CACHE_HOME").filter(|path| path.is_absolute());
+        let base = folder_of_variable("SEMFM_CACHE")
+            .or_else(|| xdg.map(|path| path.join("semfm")))
+            .or_else(|| folder_of_variable("HOME").map(|path| path.join(".cache/semfm")));
         base.map_or_else(Self::off, |base| Self::at(base.join("shapes")))
     }
 
@@ -130,7 +125,7 @@ impl ShapeCache {
     /// Removes the entries used least recently, and what crashed writers left, but not `newest`.
     fn shrink(&self, folder: &Path, newest: &Path) -> Result<()> {
         let mut entries: Vec<(SystemTime, u64, PathBuf)> = fs::read_dir(folder)
-            .map_err(|source| Error::Io { path: folder.into(), source })?
+            .map_err(Error::io(folder))?
             .flatten()
             .filter(|entry| entry.path().extension().is_some_and(|suffix| suffix == SUFFIX))
             .filter_map(|entry| {
@@ -164,42 +159,45 @@ impl Shape {
     /// The shape that [`to_bytes`](Self::to_bytes) wrote, of the same mesh; `None` for any other
     /// bytes.
     pub fn from_bytes(original: Mesh, bytes: &[u8]) -> Option<Self> {
-        let (working, laplacian, basis, report) = decode(bytes, &original.hash().0, &original)?;
-        Some(Self::from_parts(original, working, laplacian, basis, report))
+        let parts = decode(bytes, &original.hash().0, &original)?;
+        Some(Self::from_parts(original, parts))
     }
 }
 
-/// BLAKE3 of the format, the mesh's hash and the settings in words.
+/// The folder that an environment variable names; `None` where it is not set or empty.
+fn folder_of_variable(name: &str) -> Option<PathBuf> {
+    std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from)
+}
+
+/// BLAKE3 of the format, the mesh's hash and the settings as JSON.
 fn key(mesh: MeshHash, settings: &ShapeSettings) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&MAGIC);
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
     hasher.update(&mesh.0);
-    hasher.update(format!("{settings:?}").as_bytes());
+    hasher.update(&serde_json::to_vec(settings).expect("settings are numbers and names"));
     *hasher.finalize().as_bytes()
 }
 
 fn write(folder: &Path, path: &Path, bytes: &[u8]) -> Result<()> {
-    let io = |source| Error::Io { path: path.into(), source };
-    fs::create_dir_all(folder).map_err(io)?;
+    let io = Error::io(path);
+    fs::create_dir_all(folder).map_err(&io)?;
     // No fsync: after a power cut the checksum tells, and the entry is made again.
     let mut file =
-        tempfile::Builder::new().suffix(".partial.shape").tempfile_in(folder).map_err(io)?;
-    file.write_all(bytes).map_err(io)?;
+        tempfile::Builder::new().suffix(".partial.shape").tempfile_in(folder).map_err(&io)?;
+    file.write_all(bytes).map_err(&io)?;
     file.persist(path).map_err(|failed| io(failed.error))?;
     Ok(())
 }
 
 /// The shape in the file; gives the mesh back where there is none.
 fn read(path: &Path, key: &[u8; 32], mesh: Mesh) -> std::result::Result<Shape, Box<Mesh>> {
-    let Some((working, laplacian, basis, report)) =
-        fs::read(path).ok().and_then(|bytes| decode(&bytes, key, &mesh))
-    else {
+    let Some(parts) = fs::read(path).ok().and_then(|bytes| decode(&bytes, key, &mesh)) else {
         return Err(Box::new(mesh));
     };
     // Marks the entry as used; a folder that may only be read is still a good cache.
     let _ = File::options().append(true).open(path).and_then(|f| f.set_modified(SystemTime::now()));
-    Ok(Shape::from_parts(mesh, working, laplacian, basis, report))
+    Ok(Shape::from_parts(mesh, parts))
 }
 
 fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
@@ -219,30 +217,29 @@ fn encode(shape: &Shape, key: &[u8; 32]) -> Result<Vec<u8>> {
     bytes.extend(MAGIC);
     bytes.extend(key);
     bytes.extend(counts.iter().flat_map(|&count| (count as u64).to_le_bytes()));
-    let mut put = |values: &mut dyn Iterator<Item = f64>, ids: &mut dyn Iterator<Item = u32>| {
-        values.for_each(|x| bytes.extend(x.to_le_bytes()));
-        ids.for_each(|id| bytes.extend(id.to_le_bytes()));
-    };
     let mesh = &working.mesh;
-    let ids = [&working.of_original, &working.to_original].into_iter().flatten().copied();
-    put(
-        &mut mesh.vertices().iter().flat_map(|p| p.to_array()),
-        &mut mesh.faces().iter().flatten().copied().chain(ids),
-    );
-    put(
-        &mut working.carriers.iter().flat_map(|carrier| carrier.weights),
-        &mut working.carriers.iter().flat_map(|carrier| carrier.corners),
-    );
-    put(
-        &mut stiffness.triplet_iter().map(|entry| *entry.val),
-        &mut stiffness.triplet_iter().flat_map(|entry| [entry.row as u32, entry.col as u32]),
-    );
-    let functions = (0..basis.k()).flat_map(|j| basis.functions.col(j).iter().copied());
-    let rest = basis.mass.iter().chain(&basis.residuals).copied();
-    put(&mut basis.values.iter().copied().chain(functions).chain(rest), &mut std::iter::empty());
+    put_floats(&mut bytes, mesh.vertices().iter().flat_map(|p| p.to_array()));
+    put_ids(&mut bytes, mesh.faces().iter().flatten().copied());
+    put_ids(&mut bytes, working.of_original.iter().chain(&working.to_original).copied());
+    put_floats(&mut bytes, working.point_of_original.iter().flat_map(|point| point.weights));
+    put_ids(&mut bytes, working.point_of_original.iter().flat_map(|point| point.corners));
+    put_floats(&mut bytes, stiffness.triplet_iter().map(|entry| *entry.val));
+    let places = stiffness.triplet_iter().flat_map(|entry| [entry.row, entry.col]);
+    put_ids(&mut bytes, places.map(|id| id as u32));
+    put_floats(&mut bytes, basis.values.iter().copied());
+    put_floats(&mut bytes, (0..basis.k()).flat_map(|j| basis.functions.col(j).iter().copied()));
+    put_floats(&mut bytes, basis.mass.iter().chain(&basis.residuals).copied());
     bytes.extend(report);
     bytes.extend(blake3::hash(&bytes).as_bytes());
     Ok(bytes)
+}
+
+fn put_floats(bytes: &mut Vec<u8>, values: impl Iterator<Item = f64>) {
+    values.for_each(|x| bytes.extend(x.to_le_bytes()));
+}
+
+fn put_ids(bytes: &mut Vec<u8>, ids: impl Iterator<Item = u32>) {
+    ids.for_each(|id| bytes.extend(id.to_le_bytes()));
 }
 
 /// Length of an entry with these counts; `None` where no file is that long.
@@ -260,11 +257,7 @@ fn total_bytes([n, n_working, m, k, n_entries, report]: [usize; 6]) -> Option<us
 }
 
 /// `None` for anything but the entry with this key.
-fn decode(
-    bytes: &[u8],
-    key: &[u8; 32],
-    original: &Mesh,
-) -> Option<(WorkingMesh, Laplacian, Eigenbasis, ShapeReport)> {
+fn decode(bytes: &[u8], key: &[u8; 32], original: &Mesh) -> Option<ShapeParts> {
     let (body, trailer) = bytes.split_last_chunk::<TRAILER>()?;
     let mut reader = Reader(body);
     if reader.take(8)? != MAGIC || reader.take(32)? != key {
@@ -284,9 +277,9 @@ fn decode(
     let faces = reader.ids(3 * m)?.as_chunks::<3>().0.to_vec();
     let (of_original, to_original) = (reader.ids(n)?, reader.ids(n_working)?);
     let (weights, corners) = (reader.floats(3 * n)?, reader.ids(3 * n)?);
-    let carriers: Vec<Carrier> = (weights.as_chunks::<3>().0.iter())
+    let point_of_original: Vec<BarycentricPoint> = (weights.as_chunks::<3>().0.iter())
         .zip(corners.as_chunks::<3>().0)
-        .map(|(&weights, &corners)| Carrier { corners, weights })
+        .map(|(&weights, &corners)| BarycentricPoint { corners, weights })
         .collect();
     let entries = reader.floats(n_entries)?;
     let places = reader.ids(2 * n_entries)?;
@@ -296,12 +289,11 @@ fn decode(
     let (mass, residuals) = (reader.floats(n_working)?, reader.floats(k)?);
     let report = serde_json::from_slice(reader.take(n_report)?).ok()?;
 
-    let in_range = |ids: &[u32], n: usize| ids.iter().all(|&id| (id as usize) < n);
     let sound = n == original.n_vertices()
         && in_range(&of_original, n_working)
         && in_range(&to_original, n)
         && in_range(&places, n_working)
-        && carriers.iter().all(|carrier| in_range(&carrier.corners, n_working));
+        && point_of_original.iter().all(|point| in_range(&point.corners, n_working));
     let mesh = Mesh::new(points, faces).ok().filter(|_| sound)?;
     let (pairs, _) = places.as_chunks::<2>();
     let entries: Vec<Triplet<usize, usize, f64>> = (pairs.iter().zip(entries))
@@ -310,7 +302,12 @@ fn decode(
     let stiffness = SparseColMat::try_new_from_triplets(n_working, n_working, &entries).ok()?;
     let laplacian = Laplacian { stiffness, mass: mass.clone() };
     let basis = Eigenbasis { values, functions, mass, residuals };
-    Some((WorkingMesh { mesh, of_original, to_original, carriers }, laplacian, basis, report))
+    let working = WorkingMesh { mesh, of_original, to_original, point_of_original };
+    Some(ShapeParts { working, laplacian, basis, report })
+}
+
+fn in_range(ids: &[u32], n: usize) -> bool {
+    ids.iter().all(|&id| (id as usize) < n)
 }
 
 /// Takes numbers off the front of a slice; `None` where it is too short.

@@ -5,10 +5,11 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::disjoint_sets::DisjointSets;
 use crate::{Error, Mesh, Result};
 
 /// How a mesh is cleaned.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CleanSettings {
     /// A component is dust when its share of the surface area is below this; 0 keeps them all.
     ///
@@ -179,37 +180,31 @@ fn without_dust(
     if !(total > 0.0 && total.is_finite()) {
         return Err(Error::NoArea { n_faces: mesh.n_faces() });
     }
-    let components = || (0..area.len()).filter(|&root| n_faces[root] > 0);
     // A component without any area is dust even where all are kept: it has no Laplacian.
-    let is_dust = |root: usize| area[root] <= 0.0 || area[root] < dust_share * total;
-    let dust: f64 = components().filter(|&root| is_dust(root)).map(|root| area[root]).sum();
-    let keep_small = dust > MOST_DUST * total;
-    let goes = |root: usize| if keep_small { area[root] <= 0.0 } else { is_dust(root) };
+    let mut is_dust: Vec<bool> =
+        area.iter().map(|&area| area <= 0.0 || area < dust_share * total).collect();
+    let components: Vec<usize> = (0..area.len()).filter(|&root| n_faces[root] > 0).collect();
+    let dust: f64 = components.iter().filter(|&&root| is_dust[root]).map(|&root| area[root]).sum();
+    if dust > MOST_DUST * total {
+        is_dust = area.iter().map(|&area| area <= 0.0).collect();
+    }
 
-    let (gone, kept): (Vec<usize>, Vec<usize>) = components().partition(|&root| goes(root));
+    let (gone, kept): (Vec<usize>, Vec<usize>) =
+        components.into_iter().partition(|&root| is_dust[root]);
     report.dust_components = gone.len();
     report.dust_faces = gone.iter().map(|&root| n_faces[root]).sum();
     report.n_components = kept.len();
-    Ok(faces.into_iter().filter(|ids| !goes(root[ids[0] as usize] as usize)).collect())
+    Ok(faces.into_iter().filter(|ids| !is_dust[root[ids[0] as usize] as usize]).collect())
 }
 
-/// For each vertex the lowest vertex of its connected component (union–find, halving paths).
+/// For each vertex the lowest vertex of its connected component.
 pub(crate) fn roots(n_vertices: usize, faces: &[[u32; 3]]) -> Vec<u32> {
-    fn find(parent: &mut [u32], mut id: u32) -> u32 {
-        while parent[id as usize] != id {
-            parent[id as usize] = parent[parent[id as usize] as usize];
-            id = parent[id as usize];
-        }
-        id
-    }
-    let mut parent: Vec<u32> = (0..n_vertices as u32).collect();
+    let mut sets = DisjointSets::new(n_vertices);
     for &[a, b, c] in faces {
-        for (from, to) in [(a, b), (b, c)] {
-            let (from, to) = (find(&mut parent, from), find(&mut parent, to));
-            parent[from.max(to) as usize] = from.min(to);
-        }
+        sets.join(a, b);
+        sets.join(b, c);
     }
-    (0..n_vertices as u32).map(|id| find(&mut parent, id)).collect()
+    (0..n_vertices as u32).map(|id| sets.root(id)).collect()
 }
 
 #[cfg(test)]

@@ -172,8 +172,8 @@ impl State {
             let ids = self.faces[face];
             for k in 0..3 {
                 let (a, b, c) = (ids[k], ids[(k + 1) % 3], ids[(k + 2) % 3]);
-                let both = |&f: &&u32| self.faces[*f as usize].contains(&b);
-                if self.faces_of[a as usize].iter().filter(both).count() != 1 {
+                let around = &self.faces_of[a as usize];
+                if around.iter().filter(|&&f| self.faces[f as usize].contains(&b)).count() != 1 {
                     continue;
                 }
                 let [pa, pb, pc] = [a, b, c].map(|id| self.points[id as usize]);
@@ -233,16 +233,18 @@ impl State {
             [(_, both_on_border)] => !both_on_border,
             // Nor the edge between the two opposite corners: that is a tetrahedron.
             [(x, _), (y, _)] => {
-                let closes = |id: u32| {
-                    self.faces_of[id as usize].iter().any(|&face| {
-                        let ids = self.faces[face as usize];
-                        ids.contains(&x) && ids.contains(&y)
-                    })
-                };
-                !(closes(from) && closes(to))
+                !(self.have_a_triangle(from, x, y) && self.have_a_triangle(to, x, y))
             }
             _ => false,
         }
+    }
+
+    /// Whether a triangle joins `id`, `x` and `y`.
+    fn have_a_triangle(&self, id: u32, x: u32, y: u32) -> bool {
+        self.faces_of[id as usize].iter().any(|&face| {
+            let ids = self.faces[face as usize];
+            ids.contains(&x) && ids.contains(&y)
+        })
     }
 
     /// No triangle turns over or becomes a sliver when `from` moves onto `to`.

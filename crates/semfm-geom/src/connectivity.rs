@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::Mesh;
+use crate::disjoint_sets::DisjointSets;
 use crate::math::DVec3;
 
 /// What is regular and what is not about the connectivity of a mesh.
@@ -248,11 +249,8 @@ fn names_twice(&[a, b, c]: &[u32; 3]) -> bool {
 }
 
 fn duplicate_faces(mesh: &Mesh) -> usize {
-    let sorted = |mut ids: [u32; 3]| {
-        ids.sort_unstable();
-        ids
-    };
-    let mut faces: Vec<_> = mesh.faces().iter().map(|&ids| sorted(ids)).collect();
+    let mut faces = mesh.faces().to_vec();
+    faces.iter_mut().for_each(|ids| ids.sort_unstable());
     faces.sort_unstable();
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
@@ -265,36 +263,13 @@ fn duplicate_positions(mesh: &Mesh) -> usize {
     places.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
 
-/// Union–find with path halving (R. E. Tarjan, 1975); the lowest member is the root.
-struct DisjointSets(Vec<u32>);
-
-impl DisjointSets {
-    fn new(n: usize) -> Self {
-        Self((0..n as u32).collect())
-    }
-
-    fn root(&mut self, mut id: u32) -> u32 {
-        while self.0[id as usize] != id {
-            let grandparent = self.0[self.0[id as usize] as usize];
-            self.0[id as usize] = grandparent;
-            id = grandparent;
-        }
-        id
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn mesh(n_vertices: usize, faces: &[[u32; 3]]) -> Mesh {
-        let place = |i: usize| DVec3::new(i as f64, (i * i) as f64, (i % 3) as f64);
-        Mesh::new((0..n_vertices).map(place).collect(), faces.to_vec()).unwrap()
+        let places = (0..n_vertices).map(|i| DVec3::new(i as f64, (i * i) as f64, (i % 3) as f64));
+        Mesh::new(places.collect(), faces.to_vec()).unwrap()
     }
 
     const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];

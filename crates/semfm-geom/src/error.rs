@@ -1,8 +1,10 @@
-//! What can go wrong on the ground floor.
+//! What can go wrong with meshes, matrices and their files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Result of a ground-floor call.
+use crate::io::FormatError;
+
+/// Result of a call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Every way in which a mesh, a matrix or a file can fail to be what it should.
@@ -111,17 +113,8 @@ pub enum Error {
 
     // ---- files
     /// A file is not what its format demands.
-    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Line, byte offset, element or accessor.
-        place: String,
-        /// What the format demands there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    #[error(transparent)]
+    Format(#[from] FormatError),
     /// A file that follows its format holds something that is not a mesh.
     #[error("{}: {cause}", path.display())]
     InFile {
@@ -147,6 +140,17 @@ pub enum Error {
 }
 
 impl Error {
+    /// [`Error::Length`] unless both counts are the same.
+    pub(crate) fn check_length(what: &'static str, expected: usize, found: usize) -> Result<()> {
+        if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }
+    }
+
+    /// [`Error::Io`] about `path`, for `map_err`.
+    pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path: path.clone(), source }
+    }
+
     /// A stable name for the kind of failure, for scripts: kebab-case, one per variant.
     pub fn code(&self) -> &'static str {
         match self {
@@ -160,7 +164,7 @@ impl Error {
             Self::NotConverged { .. } => "not-converged",
             Self::NotPositiveDefinite { .. } => "not-positive-definite",
             Self::LinearAlgebra(_) => "linear-algebra",
-            Self::Format { .. } => "format",
+            Self::Format(_) => "format",
             Self::InFile { cause, .. } => cause.code(),
             Self::Io { .. } => "io",
             Self::Cancelled => "cancelled",
@@ -174,7 +178,7 @@ impl Error {
             Self::NotFinite { vertex, .. } => Some(format!("vertex {vertex}")),
             Self::VertexOutOfRange { face, .. } => Some(format!("triangle {face}")),
             Self::NotPositiveDefinite { row, .. } => Some(format!("row {row}")),
-            Self::Format { place, .. } => Some(place.clone()),
+            Self::Format(error) => Some(error.place.clone()),
             Self::InFile { cause, .. } => cause.place(),
             _ => None,
         }

@@ -5,7 +5,10 @@ use faer::sparse::SparseColMat;
 use faer::{Mat, MatRef};
 
 use crate::cholesky::SparseCholesky;
-use crate::laplacian::{FlatTriangle, LaplacianKind, TuftedSettings, components, flat_laplacian};
+use crate::connectivity::Components;
+use crate::laplacian::{
+    LaplacianKind, PlanarTriangle, TuftedSettings, components, laplacian_and_triangles,
+};
 use crate::{Error, Mesh, Result};
 
 /// How geodesic distances are computed.
@@ -47,7 +50,7 @@ pub struct HeatGeodesics {
     heat: SparseCholesky,
     /// S, grounded at one vertex of each component.
     poisson: SparseCholesky,
-    triangles: Vec<FlatTriangle>,
+    triangles: Vec<PlanarTriangle>,
     /// Connected piece of each vertex (n).
     components: Vec<u32>,
 }
@@ -66,8 +69,9 @@ impl HeatGeodesics {
             return Err(Error::OutOfRange { what, expected, found: settings.time.to_string() });
         }
         let (laplacian, triangles) =
-            flat_laplacian(mesh, settings.kind, &TuftedSettings::default())?;
-        let (components, n_components) = components(laplacian.n_vertices(), &laplacian.stiffness);
+            laplacian_and_triangles(mesh, settings.kind, &TuftedSettings::default())?;
+        let Components { of_vertex: components, count: n_components } =
+            components(laplacian.n_vertices(), &laplacian.stiffness);
         let time = settings.time * mean_edge(&triangles).powi(2);
 
         let heat = combine(&laplacian.stiffness, time, |i, _| laplacian.mass[i]);
@@ -115,7 +119,7 @@ impl HeatGeodesics {
     /// than asking one by one.
     ///
     /// # Errors
-    /// As [`distances`](Self::distances).
+    /// [`Error::OutOfRange`] for an id beyond the vertices.
     pub fn distances_from_each(&self, sources: &[u32]) -> Result<Mat<f64>> {
         let mut all = Mat::zeros(self.n_vertices(), sources.len());
         for (block, ids) in sources.chunks(BLOCK).enumerate() {
@@ -202,8 +206,8 @@ fn combine(
 }
 
 /// Mean edge length, each edge counted once per triangle.
-fn mean_edge(triangles: &[FlatTriangle]) -> f64 {
-    let total: f64 = triangles.iter().map(FlatTriangle::perimeter).sum();
+fn mean_edge(triangles: &[PlanarTriangle]) -> f64 {
+    let total: f64 = triangles.iter().map(PlanarTriangle::perimeter).sum();
     total / (3 * triangles.len()) as f64
 }
 

@@ -1,20 +1,19 @@
-//! Meshes, Laplacians, eigenbases and spatial search: the ground floor of SemFM.
+//! Meshes, Laplacians, eigenbases and spatial search: what the other crates of SemFM stand on.
 //!
-//! Everything above this crate (views, functional maps, grasps) speaks in the types defined here:
-//! a [`Mesh`] is checked once at its door, a [`Laplacian`] is positive semidefinite with a lumped
-//! mass, an [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points
-//! with image features. Lengths are in the units of the mesh file unless a name says otherwise.
+//! Views, functional maps and grasps speak in the types defined here: a [`Mesh`] is checked once,
+//! by its constructor, a [`Laplacian`] is positive semidefinite with a lumped mass, an
+//! [`Eigenbasis`] is orthonormal for that mass, a [`SemanticCloud`] holds surface points with image
+//! features. Lengths are in the units of the mesh file unless a name says otherwise.
 
-pub mod algebra;
-pub mod cache;
+mod cache;
 mod camera;
-pub mod cholesky;
-pub mod clean;
-pub mod cloud;
+mod cholesky;
+mod clean;
 mod collapse;
 pub mod connectivity;
 pub mod descriptors;
-pub mod eigenbasis;
+mod disjoint_sets;
+mod eigenbasis;
 pub mod eigensolver;
 mod error;
 mod extent;
@@ -22,29 +21,39 @@ pub mod geodesic;
 pub mod io;
 pub mod laplacian;
 pub mod math;
-pub mod mesh;
-pub mod nearest;
+mod mesh;
+mod mesh_identity;
+mod point_index;
 mod principal_axes;
 pub mod sampling;
-pub mod shape;
-pub mod simplify;
-pub mod surface;
-pub mod task;
-pub mod working;
+mod semantic_cloud;
+mod sequential_faer;
+mod shape;
+mod simplify;
+mod surface;
+mod task;
+mod verdict;
+mod working_mesh;
 #[cfg(any(test, feature = "zoo"))]
 pub mod zoo;
 
 pub use cache::{CachedShape, ShapeCache};
 pub use camera::{Intrinsics, Pinhole, PixelDepth};
-pub use cloud::SemanticCloud;
+pub use cholesky::SparseCholesky;
+pub use clean::{CleanReport, CleanSettings, Cleaned, clean};
 pub use eigenbasis::Eigenbasis;
 pub use error::{Error, Result};
 pub use extent::{Sphere, surface_sphere, surface_vertices};
 pub use laplacian::Laplacian;
 pub use mesh::{Mesh, MeshHash};
-pub use nearest::PointIndex;
+pub use mesh_identity::{MeshIdentity, MeshMismatch, PartialMeshIdentity};
+pub use point_index::PointIndex;
 pub use principal_axes::principal_axes;
-pub use shape::{Shape, ShapeReport, ShapeSettings};
+pub use semantic_cloud::SemanticCloud;
+pub use sequential_faer::keep_faer_sequential;
+pub use shape::{Shape, ShapeReport, ShapeSettings, ShapeTimes};
+pub use simplify::{Simplified, SimplifyReport, SimplifySettings, Topology, simplify};
 pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
-pub use task::Task;
-pub use working::WorkingMesh;
+pub use task::{Progress, Task};
+pub use verdict::Verdict;
+pub use working_mesh::{BarycentricPoint, PreparedWorkingMesh, WorkingMesh};

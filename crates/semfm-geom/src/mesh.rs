@@ -1,6 +1,11 @@
 //! The triangle mesh, and the hash that names it.
 
 use std::fmt;
+use std::str::FromStr;
+use std::sync::OnceLock;
+
+use serde::de::{Error as _, Unexpected};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::math::{DVec3, bounds};
 use crate::{Error, Result};
@@ -18,10 +23,18 @@ use crate::{Error, Result};
 /// assert_eq!(triangle.area(), 0.5);
 /// # Ok::<(), semfm_geom::Error>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Mesh {
     vertices: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
+    /// Computed when first asked for.
+    hash: OnceLock<MeshHash>,
+}
+
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        self.vertices == other.vertices && self.faces == other.faces
+    }
 }
 
 impl Mesh {
@@ -43,7 +56,7 @@ impl Mesh {
                 return Err(Error::VertexOutOfRange { face, vertex: id.into(), n_vertices });
             }
         }
-        Ok(Self { vertices, faces })
+        Ok(Self { vertices, faces, hash: OnceLock::new() })
     }
 
     /// Vertex positions (n).
@@ -118,25 +131,29 @@ impl Mesh {
         (centre, radius)
     }
 
-    /// The mesh's name: BLAKE3 over counts, positions and triangles (see [`MeshHash`]).
+    /// BLAKE3 over counts, positions and triangles (see [`MeshHash`]), computed once and kept.
     pub fn hash(&self) -> MeshHash {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(b"semfm.mesh/1\n");
-        hasher.update(&(self.n_vertices() as u64).to_le_bytes());
-        hasher.update(&(self.n_faces() as u64).to_le_bytes());
-        let mut bytes = Vec::with_capacity(24 * 4096);
-        for block in self.vertices.chunks(4096) {
-            bytes.clear();
-            bytes.extend(block.iter().flat_map(|p| p.to_array()).flat_map(f64::to_le_bytes));
-            hasher.update(&bytes);
-        }
-        for block in self.faces.chunks(4096) {
-            bytes.clear();
-            bytes.extend(block.iter().flatten().flat_map(|id| id.to_le_bytes()));
-            hasher.update(&bytes);
-        }
-        MeshHash(*hasher.finalize().as_bytes())
+        *self.hash.get_or_init(|| hash_of(&self.vertices, &self.faces))
     }
+}
+
+fn hash_of(vertices: &[DVec3], faces: &[[u32; 3]]) -> MeshHash {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(b"semfm.mesh/1\n");
+    hasher.update(&(vertices.len() as u64).to_le_bytes());
+    hasher.update(&(faces.len() as u64).to_le_bytes());
+    let mut bytes = Vec::with_capacity(24 * 4096);
+    for block in vertices.chunks(4096) {
+        bytes.clear();
+        bytes.extend(block.iter().flat_map(|p| p.to_array()).flat_map(f64::to_le_bytes));
+        hasher.update(&bytes);
+    }
+    for block in faces.chunks(4096) {
+        bytes.clear();
+        bytes.extend(block.iter().flatten().flat_map(|id| id.to_le_bytes()));
+        hasher.update(&bytes);
+    }
+    MeshHash(*hasher.finalize().as_bytes())
 }
 
 /// BLAKE3 of a mesh as read, before any cleaning: the bytes `semfm.mesh/1\n`, u64 vertex count,
@@ -147,11 +164,41 @@ impl Mesh {
 pub struct MeshHash(pub [u8; 32]);
 
 impl MeshHash {
+    /// The form of its text, for messages.
+    pub const FORM: &str = "`blake3:` and 64 hexadecimal digits";
+
     /// Reads the form that [`Display`](fmt::Display) writes; `None` where the text is not one.
     pub fn parse(text: &str) -> Option<Self> {
         blake3::Hash::from_hex(text.strip_prefix("blake3:")?)
             .ok()
             .map(|hash| Self(*hash.as_bytes()))
+    }
+}
+
+impl FromStr for MeshHash {
+    type Err = Error;
+
+    /// # Errors
+    /// [`Error::OutOfRange`] for text of another form.
+    fn from_str(text: &str) -> Result<Self> {
+        Self::parse(text).ok_or_else(|| {
+            let found = format!("`{text}`");
+            Error::OutOfRange { what: "mesh hash", expected: Self::FORM.into(), found }
+        })
+    }
+}
+
+impl Serialize for MeshHash {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeshHash {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Self::parse(&text)
+            .ok_or_else(|| D::Error::invalid_value(Unexpected::Str(&text), &Self::FORM))
     }
 }
 

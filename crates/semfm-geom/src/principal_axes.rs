@@ -46,13 +46,10 @@ pub fn principal_axes(mesh: &Mesh) -> Result<DMat3> {
             .sum();
         third / variances[axis].max(f64::MIN_POSITIVE).powf(1.5)
     });
-    let signed = |axis: usize| axes[axis] * sign(skewness[axis], axes[axis]);
-    let z = signed(2);
+    let [x, y, z] = [0, 1, 2].map(|axis| axes[axis] * sign(skewness[axis], axes[axis]));
     Ok(if skewness[0].abs() > skewness[1].abs() {
-        let x = signed(0);
         DMat3::from_cols(x, z.cross(x), z).transpose()
     } else {
-        let y = signed(1);
         DMat3::from_cols(y.cross(z), y, z).transpose()
     })
 }
@@ -118,8 +115,8 @@ fn eigen_ascending(matrix: DMat3) -> ([f64; 3], [DVec3; 3]) {
     }
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
-    let axis = |i: usize| DVec3::new(v[0][i], v[1][i], v[2][i]).normalize_or(DVec3::AXES[i]);
-    (order.map(|i| a[i][i]), order.map(axis))
+    let axes = order.map(|i| DVec3::new(v[0][i], v[1][i], v[2][i]).normalize_or(DVec3::AXES[i]));
+    (order.map(|i| a[i][i]), axes)
 }
 
 #[cfg(test)]

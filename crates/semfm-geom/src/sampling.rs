@@ -56,7 +56,7 @@ fn sample_one(mesh: &Mesh, cumulative: &[f64], rng: &mut impl Rng) -> SurfaceSam
 /// `n` farthest-point samples out of `6 n` area-uniform ones: near-even cover of the surface.
 ///
 /// # Errors
-/// As [`sample_uniform`].
+/// [`Error::NoArea`] where every triangle is degenerate.
 pub fn sample_even(mesh: &Mesh, n: usize, seed: u64) -> Result<Vec<SurfaceSample>> {
     let dense = sample_uniform(mesh, 6 * n, seed)?;
     let points: Vec<DVec3> = dense.iter().map(|sample| sample.point).collect();

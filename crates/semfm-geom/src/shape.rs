@@ -10,11 +10,11 @@ use crate::clean::{CleanReport, CleanSettings};
 use crate::eigensolver::{EigenSettings, eigenbasis};
 use crate::laplacian::{BridgeSettings, Laplacian, LaplacianKind, bridge, laplacian};
 use crate::simplify::{SimplifyReport, SimplifySettings};
-use crate::working::WorkingMesh;
+use crate::working_mesh::{PreparedWorkingMesh, WorkingMesh};
 use crate::{Eigenbasis, Error, Mesh, Result, Task};
 
 /// How a [`Shape`] is prepared.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShapeSettings {
     /// Eigenpairs k.
     pub k: usize,
@@ -82,7 +82,8 @@ pub struct ShapeTimes {
     pub eigenbasis: f64,
 }
 
-/// Mesh + working mesh + eigenbasis: built once, shared by reference.
+/// A mesh prepared for functional maps: working mesh, Laplacian and eigenbasis, made once and
+/// asked often.
 ///
 /// The basis is that of the working mesh scaled to area 1, so eigenvalues and diffusion times are
 /// relative; positions keep the units of the original.
@@ -105,13 +106,22 @@ pub struct Shape {
     report: ShapeReport,
 }
 
+/// What is computed from the original mesh.
+pub(crate) struct ShapeParts {
+    pub working: WorkingMesh,
+    pub laplacian: Laplacian,
+    pub basis: Eigenbasis,
+    pub report: ShapeReport,
+}
+
 impl Shape {
     /// Prepares a mesh: clean, simplify, Laplacian at area 1, bridges, eigenbasis.
     ///
     /// # Errors
     /// [`Error::NoArea`]; [`Error::TooManyEigenpairs`] for a k of 0, or one above the number of
-    /// working vertices where it may not be clipped; whatever the eigensolver reports;
-    /// [`Error::Cancelled`].
+    /// working vertices where it may not be clipped; [`Error::OutOfRange`] for settings outside
+    /// their ranges; [`Error::NotConverged`], [`Error::NotPositiveDefinite`] and
+    /// [`Error::LinearAlgebra`] of the eigensolver; [`Error::Cancelled`].
     pub fn new(original: Mesh, settings: &ShapeSettings, task: &Task) -> Result<Self> {
         let mut clock = Stopwatch::start();
         let simplification = SimplifySettings {
@@ -119,7 +129,7 @@ impl Shape {
             ..SimplifySettings::default()
         };
         task.step("working mesh", 0, 3)?;
-        let (working, cleaning, simplification) =
+        let PreparedWorkingMesh { working, cleaning, simplification } =
             WorkingMesh::new(&original, &settings.cleaning, &simplification, task)?;
         let (k, clipped) = number_of_pairs(settings, working.mesh.n_vertices())?;
         let mut stages_ms = ShapeTimes { working_mesh: clock.lap(), ..ShapeTimes::default() };
@@ -149,13 +159,8 @@ impl Shape {
 
     /// Puts a shape together from its parts, as the cache does. All of them must be of
     /// `original`.
-    pub(crate) fn from_parts(
-        original: Mesh,
-        working: WorkingMesh,
-        laplacian: Laplacian,
-        basis: Eigenbasis,
-        report: ShapeReport,
-    ) -> Self {
+    pub(crate) fn from_parts(original: Mesh, parts: ShapeParts) -> Self {
+        let ShapeParts { working, laplacian, basis, report } = parts;
         Self { original, working, laplacian, basis, report }
     }
 
@@ -179,7 +184,7 @@ impl Shape {
         &self.laplacian
     }
 
-    /// One implicit step of heat diffusion, (M + t L) u = M f, on the working vertices at area 1.
+    /// One implicit step of heat diffusion, (M + t L) u = M f with L the stiffness, on the working vertices at area 1.
     ///
     /// Unlike [`Eigenbasis::diffuse`] it is not cut off at the k-th frequency: a region smaller
     /// than the wavelengths of the basis (the handle of a kettle) keeps its outline.
@@ -239,8 +244,11 @@ fn number_of_pairs(settings: &ShapeSettings, n_vertices: usize) -> Result<(usize
     if asked == 0 || (asked > n_vertices && !settings.clip_k) {
         return Err(Error::TooManyEigenpairs { asked, n_vertices });
     }
-    let clipped = || format!("{asked} eigenpairs clipped to {n_vertices}: one per working vertex");
-    Ok((asked.min(n_vertices), (asked > n_vertices).then(clipped)))
+    if asked <= n_vertices {
+        return Ok((asked, None));
+    }
+    let clipped = format!("{asked} eigenpairs clipped to {n_vertices}: one per working vertex");
+    Ok((n_vertices, Some(clipped)))
 }
 
 fn at_area_1(mesh: &Mesh) -> Result<Mesh> {

@@ -148,12 +148,11 @@ fn closest_points(
     points: impl IndexedParallelIterator<Item = DVec3>,
 ) -> Result<Vec<SurfacePoint>> {
     // Only coordinates whose squares overflow have no closest point.
-    let too_far = || Error::OutOfRange {
+    points.map(|p| surface.closest(p)).collect::<Option<_>>().ok_or_else(|| Error::OutOfRange {
         what: "coordinates",
         expected: "a mesh whose squared diagonal is finite".into(),
         found: "one beyond 1e150".into(),
-    };
-    points.map(|p| surface.closest(p)).collect::<Option<_>>().ok_or_else(too_far)
+    })
 }
 
 /// One run of the collapse: the simpler mesh and, for each of its vertices, the vertex before.
@@ -220,9 +219,9 @@ mod tests {
         /// Whatever triangles a soup is made of, locked or not, its topology stays.
         #[test]
         fn no_soup_is_torn(corners in prop::collection::vec(prop::array::uniform3(0u32..12), 1..40)) {
-            let angle = |i: u32| f64::from(i) * 2.4;
             let points = (0..12).map(|i| {
-                DVec3::new(angle(i).cos(), angle(i).sin(), f64::from(i) / 6.0 - 1.0)
+                let angle = f64::from(i) * 2.4;
+                DVec3::new(angle.cos(), angle.sin(), f64::from(i) / 6.0 - 1.0)
             });
             let soup = Mesh::new(points.collect(), corners).unwrap();
             let Ok(cleaned) = crate::clean::clean(&soup, &Default::default()) else { return Ok(()) };

@@ -1,5 +1,5 @@
-//! The surface as something to ask: the point on it nearest to a query, the first triangle a ray
-//! meets, whether two points see each other.
+//! Spatial search on a surface: the point nearest to a query, the first triangle a ray meets,
+//! whether two points see each other.
 
 use std::fmt;
 

@@ -82,11 +82,13 @@ pub fn icosphere(level: usize) -> Mesh {
 
 /// A wavy square sheet with boundary: `nx` × `ny` vertices over [0, 1]².
 pub fn open_grid(nx: usize, ny: usize) -> Mesh {
-    let point = |i: usize, j: usize| {
-        let (x, y) = (i as f64 / (nx - 1) as f64, j as f64 / (ny - 1) as f64);
-        DVec3::new(x, y, 0.1 * (3.0 * x).sin() * (2.0 * y).cos())
-    };
-    let vertices = (0..ny).flat_map(|j| (0..nx).map(move |i| point(i, j))).collect();
+    let vertices = (0..nx * ny)
+        .map(|id| {
+            let (i, j) = (id % nx, id / nx);
+            let (x, y) = (i as f64 / (nx - 1) as f64, j as f64 / (ny - 1) as f64);
+            DVec3::new(x, y, 0.1 * (3.0 * x).sin() * (2.0 * y).cos())
+        })
+        .collect();
     mesh(vertices, sheet(nx, ny, 0))
 }
 
@@ -99,8 +101,8 @@ pub fn torus(nu: usize, nv: usize) -> Mesh {
             let (u, v) = (TAU * i as f64 / nu as f64, TAU * j as f64 / nv as f64);
             let ring = 1.0 + 0.4 * v.cos();
             vertices.push(DVec3::new(ring * u.cos(), ring * u.sin(), 0.4 * v.sin()));
-            let id = |i: usize, j: usize| (i % nu * nv + j % nv) as u32;
-            let (a, b, c, d) = (id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1));
+            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+                .map(|(i, j)| (i % nu * nv + j % nv) as u32);
             faces.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -180,8 +182,8 @@ pub fn slivers(n: usize) -> Mesh {
     let mut faces = Vec::new();
     for row in 0..heights.len() - 1 {
         for i in 0..n {
-            let id = |row: usize, i: usize| (row * n + i % n) as u32;
-            let (a, b, c, d) = (id(row, i), id(row, i + 1), id(row + 1, i + 1), id(row + 1, i));
+            let [a, b, c, d] = [(row, i), (row, i + 1), (row + 1, i + 1), (row + 1, i)]
+                .map(|(row, i)| (row * n + i % n) as u32);
             faces.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -247,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_animals_have_the_counts_their_formulas_say() {
+    fn the_meshes_have_the_counts_their_formulas_say() {
         assert_eq!(icosphere(2).n_vertices(), 162);
         assert_eq!(torus(24, 12).n_vertices(), 288);
         assert!((icosphere(4).area() / (4.0 * PI) - 1.0).abs() < 5e-3);

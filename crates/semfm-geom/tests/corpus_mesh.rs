@@ -14,8 +14,8 @@ use semfm_geom::connectivity::MeshReport;
 use semfm_geom::io::{MeshFile, read_mesh, read_points};
 
 fn corpus() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join("corpus");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join("corpus");
     if folder.join("MANIFEST.tsv").is_file() {
         return Some(folder);
     }

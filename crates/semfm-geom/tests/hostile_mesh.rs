@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use semfm_geom::io::{Paint, read_mesh, read_points, write_painted_mesh};
+use semfm_geom::io::{VertexAttributes, read_mesh, read_points, write_mesh_with_attributes};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Error, Mesh};
 
@@ -68,9 +68,11 @@ fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
     let mesh = Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).unwrap();
     for name in ["b.ply", "b.glb"] {
         let path = folder.path().join(name);
-        let paint =
-            Paint { colors: Some(&[[9, 99, 199, 255]; 4]), scalars: &[("weight", &[0.5; 4])] };
-        write_painted_mesh(&path, &mesh, &paint).unwrap();
+        let attributes = VertexAttributes {
+            colors: Some(&[[9, 99, 199, 255]; 4]),
+            scalars: &[("weight", &[0.5; 4])],
+        };
+        write_mesh_with_attributes(&path, &mesh, &attributes).unwrap();
         files.push((name, fs::read(&path).unwrap()));
     }
     let path = folder.path().join("b.stl");

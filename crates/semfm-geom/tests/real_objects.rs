@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use semfm_geom::clean::CleanSettings;
 use semfm_geom::io::read_mesh;
-use semfm_geom::simplify::{SimplifyReport, SimplifySettings};
-use semfm_geom::{Mesh, Task, WorkingMesh};
+use semfm_geom::{
+    CleanSettings, Mesh, PreparedWorkingMesh, SimplifyReport, SimplifySettings, Task, WorkingMesh,
+};
 
 /// Objects that troubled other simplifiers: a shoe with 35 handles, one of 149 components, a game
 /// pad with non-manifold edges, thin blades, scissors of slivers, a cup, controllers of many parts.
@@ -27,8 +27,8 @@ const OBJECTS: [&str; 12] = [
 ];
 
 fn shared() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let root = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join("data");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let root = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join("data");
     let found = root.join("objects").is_dir();
     if !found {
         eprintln!("SKIPPED: no shared objects under {}", root.display());
@@ -39,7 +39,7 @@ fn shared() -> Option<PathBuf> {
 fn working(name: &str, mesh: &Mesh, target_vertices: usize) -> (WorkingMesh, SimplifyReport) {
     let settings = SimplifySettings { target_vertices, ..SimplifySettings::default() };
     let start = Instant::now();
-    let (working, cleaning, simplification) =
+    let PreparedWorkingMesh { working, cleaning, simplification } =
         WorkingMesh::new(mesh, &CleanSettings::default(), &settings, &Task::default()).unwrap();
     let report = simplification.expect("these objects are larger than the target");
     eprintln!(

@@ -77,10 +77,7 @@ impl Alignment {
     /// str: ``"accept"``, ``"check"`` or ``"refuse"``.
     #[getter]
     fn verdict(&self) -> String {
-        serde_json::to_value(self.found.verdict)
-            .ok()
-            .and_then(|value| value.as_str().map(str::to_owned))
-            .unwrap_or_default()
+        self.found.verdict.to_string()
     }
 
     /// list of str: what speaks against accepting the pose.

@@ -79,7 +79,7 @@ mod _semfm {
     #[pymodule_export]
     use crate::matching::Matching;
     #[pymodule_export]
-    use crate::mesh::{Mesh, MeshFile, read_mesh};
+    use crate::mesh::{Mesh, MeshFile, mesh_formats, read_mesh};
     #[pymodule_export]
     use crate::one_call::transfer;
     #[pymodule_export]

@@ -55,7 +55,7 @@ impl Mesh {
         Ok(Self { held: Held::new(mesh) })
     }
 
-    /// Reads an OBJ, PLY, STL, OFF, glTF or GLB file; polygons are cut to triangles.
+    /// Reads a mesh file in any format of ``mesh_formats()``; polygons are cut to triangles.
     ///
     /// Parameters
     /// ----------
@@ -106,7 +106,7 @@ impl Mesh {
         Self::new(&mesh.getattr("vertices")?, &mesh.getattr("triangles")?)
     }
 
-    /// Writes an OBJ, OFF, PLY, STL or GLB file, whole or not at all.
+    /// Writes a mesh file, whole or not at all, in a format that ``mesh_formats()`` says is written.
     ///
     /// OBJ, OFF and PLY keep coordinates exactly. GLB and STL have 32 bits a number.
     ///
@@ -139,8 +139,8 @@ impl Mesh {
         run(py, None, move |_| {
             let scalars: Vec<(&str, &[f64])> =
                 named.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
-            let paint = io::Paint { colors: colors.as_deref(), scalars: &scalars };
-            Ok(io::write_painted_mesh(&path, &mesh, &paint)?)
+            let attributes = io::VertexAttributes { colors: colors.as_deref(), scalars: &scalars };
+            Ok(io::write_mesh_with_attributes(&path, &mesh, &attributes)?)
         })
     }
 
@@ -304,8 +304,8 @@ impl MeshFile {
 
     /// str: the format, such as ``"ply"``.
     #[getter]
-    fn format(&self) -> String {
-        format!("{:?}", self.held.format).to_lowercase()
+    fn format(&self) -> &'static str {
+        self.held.format.name()
     }
 
     /// list of str: what could not be read of the colours, and why.
@@ -325,7 +325,7 @@ impl MeshFile {
 /// Parameters
 /// ----------
 /// path : path
-///     OBJ, PLY, STL, OFF, glTF or GLB.
+///     The file, in any format of ``mesh_formats()``.
 /// texture : path, optional
 ///     An image for a mesh with texture coordinates (OBJ, PLY).
 ///
@@ -343,4 +343,28 @@ pub fn read_mesh(py: Python<'_>, path: PathBuf, texture: Option<PathBuf>) -> PyR
         Ok(file)
     })?;
     Ok(MeshFile { held: Held::new(file) })
+}
+
+/// The formats of mesh files, by name.
+///
+/// Parameters
+/// ----------
+/// written : bool, default False
+///     Only those that meshes are written to.
+///
+/// Returns
+/// -------
+/// list of str
+///     Such as ``"ply"``, which are the extensions, too.
+///
+/// Examples
+/// --------
+/// >>> import semfm
+/// >>> "gltf" in semfm.mesh_formats(), "gltf" in semfm.mesh_formats(written=True)
+/// (True, False)
+#[pyfunction]
+#[pyo3(signature = (*, written=false))]
+pub fn mesh_formats(written: bool) -> Vec<&'static str> {
+    let formats = io::MeshFormat::ALL.iter().filter(|format| format.is_writable() || !written);
+    formats.map(|format| format.name()).collect()
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use semfm::geom::clean::CleanSettings;
+use semfm::geom::CleanSettings;
 use semfm::geom::laplacian::BridgeSettings;
 use semfm::geom::{self, ShapeCache, ShapeSettings};
 

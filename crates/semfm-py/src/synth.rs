@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use semfm::views::mcap::{EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
+use semfm::geom::MeshIdentity;
+use semfm::views::mcap::{EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata};
 use semfm_synth::{
     Category, Level, ObjectSettings, SynthObject, embed, make_object, render_views, write_object,
 };

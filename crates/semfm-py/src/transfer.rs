@@ -50,7 +50,7 @@ impl Transfer {
     /// str: ``"accept"``, ``"check"`` or ``"refuse"``.
     #[getter]
     fn verdict(&self) -> String {
-        json!(self.held.verdict).as_str().unwrap_or_default().to_owned()
+        self.held.verdict.to_string()
     }
 
     /// list of Hypothesis: where the region may belong, by falling probability.

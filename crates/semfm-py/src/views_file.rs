@@ -64,10 +64,10 @@ impl ViewsFile {
             return Ok(mesh.clone());
         }
         let Some(path) = self.path.clone() else { return Ok(None) };
-        let identity = self.metadata.mesh;
+        let metadata = self.metadata.clone();
         let found = run(py, None, move |_| {
             let Some((mesh, _)) = find_mesh(&path)? else { return Ok(None) };
-            identity.check(&mesh, &path)?;
+            metadata.check_mesh(&mesh, &path)?;
             Ok(Some(Held::new(mesh)))
         })?;
         Ok(self.mesh.get_or_init(|| found).clone())

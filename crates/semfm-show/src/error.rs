@@ -1,6 +1,6 @@
 //! What can go wrong while results are drawn.
 
-use std::path::PathBuf;
+use semfm::geom::io::FormatError;
 
 /// Result of drawing or writing.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -23,17 +23,8 @@ pub enum Error {
         found: String,
     },
     /// A file that cannot be shown, or not with the others.
-    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Field, line or element.
-        place: String,
-        /// What is demanded there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    #[error(transparent)]
+    Format(#[from] FormatError),
 }
 
 impl Error {
@@ -50,7 +41,7 @@ impl Error {
         match self {
             Self::Semfm(cause) => cause.code(),
             Self::Invalid { .. } => "invalid",
-            Self::Format { .. } => "format",
+            Self::Format(_) => "format",
         }
     }
 }
@@ -79,9 +70,7 @@ impl From<Error> for semfm::Error {
         match error {
             Error::Semfm(cause) => cause,
             Error::Invalid { what, expected, found } => Self::Invalid { what, expected, found },
-            Error::Format { path, place, expected, found } => {
-                Self::Format { path, place, expected, found }
-            }
+            Error::Format(error) => Self::Format(error),
         }
     }
 }

@@ -35,9 +35,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         for instance in 0..KINDS {
             let settings = ObjectSettings { seed, ..ObjectSettings::default() };
             let object = make_object(category, instance, &settings)?;
-            let held = object.region.iter().map(|&held| if held { ORANGE } else { GREY }).collect();
+            let region =
+                object.region.iter().map(|&grip| if grip { ORANGE } else { GREY }).collect();
             let parts = object.parts.iter().map(|&part| PALETTE[usize::from(part)]).collect();
-            for (k, colours) in [held, parts].into_iter().enumerate() {
+            for (k, colours) in [region, parts].into_iter().enumerate() {
                 let column = (2 * instance + k) as u32;
                 let picture = picture(&object, colours)?;
                 image::imageops::replace(

@@ -3,7 +3,7 @@
 //! Every part has a prototype (a direction shared by its category, one shared by what the part is
 //! for, one of its own); a patch sees the mean of what it covers, background included. On top come
 //! what makes real features hard: an offset for each object and each of its parts, a smooth field
-//! over the surface, a bleed between neighbouring patches and into the whole view, the patch's
+//! over the surface, a mix of neighbouring patches and of the whole view, the patch's
 //! place in the image, and noise. The three levels set how much of each.
 
 use std::fmt;
@@ -161,8 +161,8 @@ fn group(part: &str) -> &'static str {
 /// # Errors
 /// [`Error::Views`] where a view names a triangle that the object does not have.
 pub fn embed(object: &SynthObject, views: &[View], level: Level) -> Result<Vec<EmbeddedView>> {
-    let world = Appearance::new(object, level.strengths());
-    views.par_iter().enumerate().map(|(i, view)| world.embed(object, view, i)).collect()
+    let appearance = Appearance::new(object, level.strengths());
+    views.par_iter().enumerate().map(|(i, view)| appearance.embed(object, view, i)).collect()
 }
 
 /// Everything about how one object looks to the simulated encoder.
@@ -221,13 +221,14 @@ impl Appearance {
     fn embed(&self, object: &SynthObject, view: &View, number: usize) -> Result<EmbeddedView> {
         let (rows, cols) =
             ((view.camera.height() / PATCH) as usize, (view.camera.width() / PATCH) as usize);
-        let seen = (0..rows * cols)
-            .map(|patch| self.look(object, view, patch / cols, patch % cols))
-            .collect::<Result<Vec<Glance>>>()?;
-        let base: Vec<Vec<f32>> = seen.iter().map(|glance| self.base(glance)).collect();
-        let mut tokens = self.bleed(&base, &seen, rows, cols);
-        self.disturb(&mut tokens, rows, cols, number);
-        let coverage = seen.iter().map(|glance| (glance.covered * 255.0).round() as u8).collect();
+        let contents = (0..rows * cols)
+            .map(|patch| self.content_of(object, view, patch / cols, patch % cols))
+            .collect::<Result<Vec<PatchContent>>>()?;
+        let base: Vec<Vec<f32>> = contents.iter().map(|content| self.base(content)).collect();
+        let mut tokens = self.mix_neighbours(&base, &contents, rows, cols);
+        self.add_noise(&mut tokens, rows, cols, number);
+        let coverage =
+            contents.iter().map(|content| (content.covered * 255.0).round() as u8).collect();
         let (width, height) = (cols as u32 * PATCH, rows as u32 * PATCH);
         let grid = PatchGrid { rows, cols, rect: [0.0, 0.0, width as f32, height as f32] };
         let data = tokens.into_iter().flatten().collect();
@@ -236,9 +237,18 @@ impl Appearance {
     }
 
     /// What one patch covers.
-    fn look(&self, object: &SynthObject, view: &View, row: usize, col: usize) -> Result<Glance> {
-        let mut glance =
-            Glance { shares: vec![0.0; self.prototypes.len()], covered: 0.0, place: DVec3::ZERO };
+    fn content_of(
+        &self,
+        object: &SynthObject,
+        view: &View,
+        row: usize,
+        col: usize,
+    ) -> Result<PatchContent> {
+        let mut content = PatchContent {
+            shares: vec![0.0; self.prototypes.len()],
+            covered: 0.0,
+            place: DVec3::ZERO,
+        };
         let mut hits = 0.0;
         let patch = PATCH as usize;
         for y in row * patch..(row + 1) * patch {
@@ -255,32 +265,32 @@ impl Appearance {
                         found: triangle.to_string(),
                     }));
                 };
-                glance.shares[object.parts[corners[0] as usize] as usize] += 1.0;
+                content.shares[object.parts[corners[0] as usize] as usize] += 1.0;
                 let ray = view.camera.ray(x as f64 + 0.5, y as f64 + 0.5);
-                glance.place += view.camera.eye() + f64::from(view.depth[pixel]) * ray;
+                content.place += view.camera.eye() + f64::from(view.depth[pixel]) * ray;
                 hits += 1.0;
             }
         }
         let n_pixels = (patch * patch) as f32;
-        glance.shares.iter_mut().for_each(|share| *share /= n_pixels);
-        glance.covered = hits as f32 / n_pixels;
+        content.shares.iter_mut().for_each(|share| *share /= n_pixels);
+        content.covered = hits as f32 / n_pixels;
         if hits > 0.0 {
-            glance.place /= hits;
+            content.place /= hits;
         }
-        Ok(glance)
+        Ok(content)
     }
 
     /// Mean of the prototypes that a patch sees, with the smooth field at its place.
-    fn base(&self, glance: &Glance) -> Vec<f32> {
-        let behind = (1.0 - glance.covered) * self.strengths.background;
-        let total = glance.covered + behind + 1e-9;
+    fn base(&self, content: &PatchContent) -> Vec<f32> {
+        let behind = (1.0 - content.covered) * self.strengths.background;
+        let total = content.covered + behind + 1e-9;
         let mut token = scaled(&self.background, behind / total);
-        for (prototype, share) in self.prototypes.iter().zip(&glance.shares) {
+        for (prototype, share) in self.prototypes.iter().zip(&content.shares) {
             add(&mut token, prototype, share / total);
         }
-        if glance.covered > 0.0 {
+        if content.covered > 0.0 {
             for (wave, frequency, phase) in &self.waves {
-                let height = (glance.place.dot(*frequency) + phase).sin() / 3f64.sqrt();
+                let height = (content.place.dot(*frequency) + phase).sin() / 3f64.sqrt();
                 add(&mut token, wave, self.strengths.smooth * height as f32);
             }
         }
@@ -288,7 +298,13 @@ impl Appearance {
     }
 
     /// Mixes each token with its four neighbours, then with the mean of the object's tokens.
-    fn bleed(&self, base: &[Vec<f32>], seen: &[Glance], rows: usize, cols: usize) -> Vec<Vec<f32>> {
+    fn mix_neighbours(
+        &self,
+        base: &[Vec<f32>],
+        contents: &[PatchContent],
+        rows: usize,
+        cols: usize,
+    ) -> Vec<Vec<f32>> {
         let Strengths { blur, context, .. } = *self.strengths;
         let mut tokens: Vec<Vec<f32>> = (0..rows * cols)
             .map(|patch| {
@@ -305,8 +321,9 @@ impl Appearance {
             })
             .collect();
         let mut mean = vec![0.0; DIM];
-        let on_object = seen.iter().filter(|glance| glance.covered > 0.0).count().max(1) as f32;
-        for (token, _) in tokens.iter().zip(seen).filter(|(_, glance)| glance.covered > 0.0) {
+        let on_object =
+            contents.iter().filter(|content| content.covered > 0.0).count().max(1) as f32;
+        for (token, _) in tokens.iter().zip(contents).filter(|(_, content)| content.covered > 0.0) {
             add(&mut mean, token, 1.0 / on_object);
         }
         for token in &mut tokens {
@@ -317,11 +334,11 @@ impl Appearance {
     }
 
     /// Adds the patch's place in the image, the view's offset and white noise.
-    fn disturb(&self, tokens: &mut [Vec<f32>], rows: usize, cols: usize, number: usize) {
+    fn add_noise(&self, tokens: &mut [Vec<f32>], rows: usize, cols: usize, number: usize) {
         let mut draw = stream(&["noise", &self.key, &number.to_string()]);
         let unit = 1.0 / (DIM as f64).sqrt();
-        let mut noise = |strength: f32| (f64::from(strength) * unit * draw.normal()) as f32;
-        let offset: Vec<f32> = (0..DIM).map(|_| noise(self.strengths.view)).collect();
+        let [view, noise] = [self.strengths.view, self.strengths.noise].map(f64::from);
+        let offset: Vec<f32> = (0..DIM).map(|_| (view * unit * draw.normal()) as f32).collect();
         for (patch, token) in tokens.iter_mut().enumerate() {
             let x = (patch % cols) as f32 / cols as f32 - 0.5;
             let y = (patch / cols) as f32 / rows as f32 - 0.5;
@@ -330,13 +347,13 @@ impl Appearance {
                 add(token, direction, 2.0 * self.strengths.position * amount);
             }
             add(token, &offset, 1.0);
-            token.iter_mut().for_each(|value| *value += noise(self.strengths.noise));
+            token.iter_mut().for_each(|value| *value += (noise * unit * draw.normal()) as f32);
         }
     }
 }
 
 /// What a patch covers: the share of each part, of the object, and where it is.
-struct Glance {
+struct PatchContent {
     shares: Vec<f32>,
     covered: f32,
     place: DVec3,
@@ -384,7 +401,7 @@ mod tests {
                 let cols = patches.grid().cols;
                 for (patch, token) in patches.data().chunks_exact(DIM).enumerate() {
                     let (row, col) = (patch / cols, patch % cols);
-                    let shares = clean.look(&object, view, row, col).unwrap().shares;
+                    let shares = clean.content_of(&object, view, row, col).unwrap().shares;
                     let Some(own) = shares.iter().position(|&share| share == 1.0) else { continue };
                     met[own] = true;
                     for (part, prototype) in clean.prototypes.iter().enumerate() {
@@ -416,18 +433,17 @@ mod tests {
 
     #[test]
     fn a_view_of_another_mesh_is_refused() {
-        let make = |n_vertices| {
+        let [small, large] = [500, 3000].map(|n_vertices| {
             let settings = ObjectSettings { n_vertices, ..ObjectSettings::default() };
             make_object(Category::Containers, 0, &settings).unwrap()
-        };
-        let (small, large) = (make(500), make(3000));
+        });
         let views = render_views(&large, &Task::default()).unwrap();
         let error = embed(&small, &views, Level::Easy).unwrap_err().to_string();
         assert!(error.contains(&format!("{} triangles", small.mesh.n_faces())), "{error}");
     }
 
     #[test]
-    fn level_names_are_read_back_and_strangers_refused() {
+    fn level_names_are_read_back_and_other_words_refused() {
         for level in Level::ALL {
             assert_eq!(level.name().parse::<Level>().unwrap(), level);
         }

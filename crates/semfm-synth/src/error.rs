@@ -7,10 +7,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The ground floor refused.
+    /// A mesh or its file could not be made.
     #[error(transparent)]
     Geom(#[from] semfm_geom::Error),
-    /// The views or their files refused.
+    /// The views or their files could not be made.
     #[error(transparent)]
     Views(#[from] semfm_views::Error),
     /// A name that is not on the list.

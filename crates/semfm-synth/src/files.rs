@@ -1,11 +1,11 @@
-//! Objects as files: the road that a real object takes, with simulated embeddings at its end.
+//! Objects as files, as a real object has them, with simulated embeddings.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use semfm_geom::Task;
-use semfm_geom::io::{write_atomically, write_mesh};
-use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, MeshIdentity, ViewsMetadata};
+use semfm_geom::io::{write_json, write_mesh};
+use semfm_geom::{MeshIdentity, Task};
+use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata};
 use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
 
 use crate::{Level, Result, SynthObject, embed};
@@ -24,7 +24,8 @@ pub struct ObjectFiles {
 /// The pictures that the simulated encoder is shown: the default rig and light, in grey.
 ///
 /// # Errors
-/// As [`rig()`] and [`render()`], which a procedural object never causes; cancellation.
+/// [`Error::Views`](crate::Error::Views) for a mesh that cannot be rendered, which a procedural
+/// object never causes, and for a cancelled task.
 pub fn render_views(object: &SynthObject, task: &Task) -> Result<Vec<View>> {
     let cameras = rig(&object.mesh, &RigSettings::default())?;
     let settings = RenderSettings::default();
@@ -38,7 +39,7 @@ pub fn render_views(object: &SynthObject, task: &Task) -> Result<Vec<View>> {
 ///
 /// # Errors
 /// [`Error::Geom`](crate::Error::Geom) and [`Error::Views`](crate::Error::Views) where a file
-/// cannot be written, and cancellation.
+/// cannot be written; [`Error::Views`](crate::Error::Views) for a cancelled task.
 pub fn write_object(
     folder: &Path,
     object: &SynthObject,
@@ -46,9 +47,9 @@ pub fn write_object(
     task: &Task,
 ) -> Result<ObjectFiles> {
     let name = object.name();
-    let path = |extension: &str| folder.join(format!("{name}.{extension}"));
-    let files =
-        ObjectFiles { mesh: path("obj"), truth: path("json"), embeddings: path("emb.mcap") };
+    let [mesh, truth, embeddings] =
+        ["obj", "json", "emb.mcap"].map(|extension| folder.join(format!("{name}.{extension}")));
+    let files = ObjectFiles { mesh, truth, embeddings };
     let views = render_views(object, task)?;
     let embeddings = EmbeddingsFile {
         path: PathBuf::new(),
@@ -56,22 +57,19 @@ pub fn write_object(
         views: embed(object, &views, level)?,
     };
     write_mesh(&files.mesh, &object.mesh)?;
-    write_atomically(&files.truth, |out| writeln!(out, "{}", truth(object)))?;
+    write_json(&files.truth, &truth_of(object))?;
     embeddings.write(&files.embeddings, Dtype::F16)?;
     Ok(files)
 }
 
 /// The truth about an object as evaluation reads it.
-fn truth(object: &SynthObject) -> serde_json::Value {
-    let ids_where = |holds: &dyn Fn(usize) -> bool| -> Vec<usize> {
-        (0..object.mesh.n_vertices()).filter(|&id| holds(id)).collect()
-    };
-    let parts: BTreeMap<&str, Vec<usize>> = object
-        .part_names
-        .iter()
-        .enumerate()
-        .map(|(part, &name)| (name, ids_where(&|id| usize::from(object.parts[id]) == part)))
-        .collect();
+fn truth_of(object: &SynthObject) -> serde_json::Value {
+    let mut parts: BTreeMap<&str, Vec<usize>> =
+        object.part_names.iter().map(|&name| (name, Vec::new())).collect();
+    for (id, &part) in object.parts.iter().enumerate() {
+        parts.entry(object.part_names[usize::from(part)]).or_default().push(id);
+    }
+    let grip: Vec<usize> = (0..object.region.len()).filter(|&id| object.region[id]).collect();
     serde_json::json!({
         "object": object.name(),
         "category": object.category.name(),
@@ -79,7 +77,7 @@ fn truth(object: &SynthObject) -> serde_json::Value {
         "n_vertices": object.mesh.n_vertices(),
         "n_faces": object.mesh.n_faces(),
         "source": "procedural",
-        "region": { "name": "grip", "vertices": ids_where(&|id| object.region[id]) },
+        "region": { "name": "grip", "vertices": grip },
         "parts": parts,
     })
 }

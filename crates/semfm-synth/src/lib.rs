@@ -1,16 +1,16 @@
 //! Procedural objects of the paper's six categories and a simulated patch encoder.
 //!
 //! SemFM is measured on real meshes with a real encoder; this crate is what ships with it, so that
-//! a demonstration, the tests and the synthetic evaluation need no download: [`object`] builds a
-//! closed mesh with part labels and its true grip region from signed distances, [`encoder`] stands
-//! in for a vision transformer and gives ordinary patch embeddings, [`files`] writes both as an
+//! a demonstration, the tests and the synthetic evaluation need no download: `object` builds a
+//! closed mesh with part labels and its true grip region from signed distances, `encoder` stands
+//! in for a vision transformer and gives ordinary patch embeddings, `files` writes both as an
 //! evaluation reads them. Nothing here knows how the
 //! matching works, and whatever it writes says that it is simulated.
 
-pub mod encoder;
+mod encoder;
 mod error;
-pub mod files;
-pub mod object;
+mod files;
+mod object;
 mod sdf;
 mod seed;
 mod shapes;

@@ -11,12 +11,10 @@ use isosurface::source::ScalarSource;
 use rayon::prelude::*;
 use semfm_geom::connectivity::components;
 use semfm_geom::math::{DMat3, DVec3, bounds};
-use semfm_geom::simplify::{SimplifySettings, simplify};
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, SimplifySettings, Task, simplify};
 
-use crate::sdf::smooth_min;
 use crate::seed::{Draw, stream};
-use crate::shapes::{Part, blueprint};
+use crate::shapes::{Blueprint, Part, blueprint};
 use crate::{Category, Result};
 
 /// What to make.
@@ -78,7 +76,7 @@ impl SynthObject {
 /// ```
 ///
 /// # Errors
-/// Only where the ground floor refuses the mesh, which a blueprint never causes.
+/// [`Error::Geom`](crate::Error::Geom) where the mesh has no surface, which a blueprint never causes.
 pub fn make_object(
     category: Category,
     instance: usize,
@@ -87,12 +85,8 @@ pub fn make_object(
     let key = [category.name(), &instance.to_string(), &settings.seed.to_string()];
     let mut draw = stream(&key);
     let plan = blueprint(category, instance, &mut draw);
-    let field = |p: DVec3| {
-        let distances = plan.parts.iter().map(|part| part.field.at(p).distance);
-        distances.reduce(|a, b| smooth_min(a, b, plan.blend)).unwrap_or(f64::INFINITY)
-    };
-    let grid = Grid::around(&field, settings.n_vertices)?;
-    let mut distances = grid.sample(&field);
+    let grid = Grid::around(&plan, settings.n_vertices)?;
+    let mut distances = grid.sample(&plan);
     grid.float(&mut distances, settings.floaters, &mut draw);
     let dense = grid.mesh(&distances)?;
     let whole = if settings.floaters == 0 { largest_component(&dense)? } else { dense };
@@ -105,9 +99,10 @@ pub fn make_object(
     let mut part_names: Vec<&'static str> = plan.parts.iter().map(|part| part.name).collect();
     part_names.sort_unstable();
     part_names.dedup();
-    let name_of =
-        |label: usize| part_names.binary_search(&plan.parts[label].name).unwrap_or(0) as u8;
-    let parts = labels.iter().map(|&label| name_of(label)).collect();
+    let parts = labels
+        .iter()
+        .map(|&label| part_names.binary_search(&plan.parts[label].name).unwrap_or(0) as u8)
+        .collect();
     let region = mesh
         .vertices()
         .iter()
@@ -143,8 +138,9 @@ struct Grid {
 }
 
 /// No blueprint reaches beyond these corners.
-const WORLD: (DVec3, DVec3) = (DVec3::new(-1.6, -1.2, -1.2), DVec3::new(1.9, 1.2, 2.0));
-/// Spacing of the first look at where the object is.
+const LOWEST: DVec3 = DVec3::new(-1.6, -1.2, -1.2);
+const HIGHEST: DVec3 = DVec3::new(1.9, 1.2, 2.0);
+/// Spacing of the lattice that finds where the object is.
 const COARSE: f64 = 0.05;
 /// Finer than aimed at by this factor, then thinned out to the count asked for. 1.6 makes triangles
 /// a little better shaped on average (.82 for .80) but spends them where the surface bends: edges on
@@ -156,18 +152,19 @@ const CLEARANCE: f64 = 0.2;
 /// Thinning may move the surface by this share of the object's diagonal; no blueprint comes near.
 const FARTHEST_FROM_LATTICE: f64 = 0.05;
 /// Finest and coarsest lattice: thin blades need .03, memory forbids less than .008.
-const SPACING: (f64, f64) = (0.008, 0.03);
+const FINEST: f64 = 0.008;
+const COARSEST: f64 = 0.03;
 
 impl Grid {
-    /// Fine enough that the zero level of `field` has some more than `n_vertices`.
-    fn around(field: &(impl Fn(DVec3) -> f64 + Sync), n_vertices: usize) -> Result<Self> {
-        let (low, high) = surroundings(field);
+    /// Fine enough that the surface of `plan` has some more than `n_vertices`.
+    fn around(plan: &Blueprint, n_vertices: usize) -> Result<Self> {
+        let [low, high] = surroundings(plan);
         // The number of vertices goes with the inverse square of the spacing.
-        let coarse = Self::new(low, high, SPACING.1);
-        let n_coarse = coarse.mesh(&coarse.sample(field))?.n_vertices() as f64;
+        let coarse = Self::new(low, high, COARSEST);
+        let n_coarse = coarse.mesh(&coarse.sample(plan))?.n_vertices() as f64;
         let wanted = n_vertices as f64 * OVERSAMPLING;
-        let spacing = SPACING.1 * (n_coarse / wanted).sqrt();
-        Ok(Self::new(low, high, spacing.clamp(SPACING.0, SPACING.1)))
+        let spacing = COARSEST * (n_coarse / wanted).sqrt();
+        Ok(Self::new(low, high, spacing.clamp(FINEST, COARSEST)))
     }
 
     fn new(low: DVec3, high: DVec3, spacing: f64) -> Self {
@@ -181,9 +178,9 @@ impl Grid {
             + self.spacing * DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64)
     }
 
-    fn sample(&self, field: &(impl Fn(DVec3) -> f64 + Sync)) -> Vec<f32> {
+    fn sample(&self, plan: &Blueprint) -> Vec<f32> {
         let [nx, ny, nz] = self.used;
-        (0..nx * ny * nz).into_par_iter().map(|i| field(self.point(i)) as f32).collect()
+        (0..nx * ny * nz).into_par_iter().map(|i| plan.distance(self.point(i)) as f32).collect()
     }
 
     /// Adds `count` blobs a little way off the surface.
@@ -235,14 +232,15 @@ impl Grid {
     }
 }
 
-/// A box around the object with room for floaters.
-fn surroundings(field: &(impl Fn(DVec3) -> f64 + Sync)) -> (DVec3, DVec3) {
-    let look = Grid::new(WORLD.0, WORLD.1, COARSE);
-    let distances = look.sample(field);
+/// The corners of a box around the object that is large enough for floaters.
+fn surroundings(plan: &Blueprint) -> [DVec3; 2] {
+    let coarse = Grid::new(LOWEST, HIGHEST, COARSE);
+    let distances = coarse.sample(plan);
     let near = (0..distances.len()).filter(|&i| distances[i] < 1.2 * COARSE as f32);
-    let near: Vec<DVec3> = near.map(|i| look.point(i)).collect();
-    let (low, high) = bounds(&near).expect("a blueprint has at least one part inside the world");
-    (low - 0.16, high + 0.16)
+    let near: Vec<DVec3> = near.map(|i| coarse.point(i)).collect();
+    let (low, high) =
+        bounds(&near).expect("a blueprint has at least one part between LOWEST and HIGHEST");
+    [low - 0.16, high + 0.16]
 }
 
 /// The component with most vertices: thin parts of a coarse lattice may leave crumbs.
@@ -262,13 +260,19 @@ fn thin_out(mesh: Mesh, n_vertices: usize) -> Result<Mesh> {
     Ok(thinned.map_or(mesh, |thinned| thinned.mesh))
 }
 
-/// Tears `count` round holes of 4 to 9 % of the world into the surface.
+/// Tears `count` round holes into the surface, of radii from .04 to .09.
 fn tear(mesh: &Mesh, count: usize, draw: &mut Draw) -> Result<Mesh> {
-    let centre = |face: usize| mesh.corners(face).iter().sum::<DVec3>() / 3.0;
     let holes: Vec<(DVec3, f64)> = (0..count)
-        .map(|_| (centre(draw.below(mesh.n_faces())), draw.between(0.04, 0.09)))
+        .map(|_| (centre(mesh, draw.below(mesh.n_faces())), draw.between(0.04, 0.09)))
         .collect();
-    keep(mesh, |face| holes.iter().all(|&(hole, radius)| centre(face).distance(hole) >= radius))
+    keep(mesh, |face| {
+        let centre = centre(mesh, face);
+        holes.iter().all(|&(hole, radius)| centre.distance(hole) >= radius)
+    })
+}
+
+fn centre(mesh: &Mesh, face: usize) -> DVec3 {
+    mesh.corners(face).iter().sum::<DVec3>() / 3.0
 }
 
 /// The triangles that `wanted` names, with the vertices that they use, in the same order.

@@ -1,4 +1,4 @@
-//! The road through files, and how the levels differ.
+//! Objects as files, and how the levels differ.
 
 use semfm_geom::{Task, io::read_mesh};
 use semfm_synth::{
@@ -12,6 +12,13 @@ fn object(category: Category, instance: usize, n_vertices: usize) -> SynthObject
     make_object(category, instance, &settings).unwrap()
 }
 
+/// The vertices of a list of ids as one flag for each of `n`.
+fn mask_of(ids: &serde_json::Value, n: usize) -> Vec<bool> {
+    let mut mask = vec![false; n];
+    ids.as_array().unwrap().iter().for_each(|id| mask[id.as_u64().unwrap() as usize] = true);
+    mask
+}
+
 #[test]
 fn files_say_what_the_object_is() {
     let folder = tempfile::tempdir().unwrap();
@@ -23,15 +30,11 @@ fn files_say_what_the_object_is() {
 
     let truth = std::fs::read_to_string(&files.truth).unwrap();
     let truth: serde_json::Value = serde_json::from_str(&truth).unwrap();
-    let marked = |ids: &serde_json::Value| {
-        let mut mask = vec![false; mesh.n_vertices()];
-        ids.as_array().unwrap().iter().for_each(|id| mask[id.as_u64().unwrap() as usize] = true);
-        mask
-    };
-    assert_eq!(marked(&truth["region"]["vertices"]), kettle.region);
+    let n = mesh.n_vertices();
+    assert_eq!(mask_of(&truth["region"]["vertices"], n), kettle.region);
     for (part, name) in kettle.part_names.iter().enumerate() {
         let own: Vec<bool> = kettle.parts.iter().map(|&p| usize::from(p) == part).collect();
-        assert_eq!(marked(&truth["parts"][name]), own, "{name}");
+        assert_eq!(mask_of(&truth["parts"][name], n), own, "{name}");
     }
 
     let embeddings = EmbeddingsFile::read(&files.embeddings).unwrap();
@@ -61,12 +64,12 @@ fn the_same_bytes_at_every_thread_count() {
 }
 
 /// Mean of unit tokens per part over an object, and the tokens of patches on one part alone.
-struct Seen {
+struct PartTokens {
     means: Vec<(&'static str, Vec<f32>)>,
     tokens: Vec<(&'static str, Vec<f32>)>,
 }
 
-impl Seen {
+impl PartTokens {
     fn new(object: &SynthObject, views: &[View], level: Level) -> Self {
         let embedded = embed(object, views, level).unwrap();
         let mut tokens = Vec::new();
@@ -109,30 +112,32 @@ fn only_part(object: &SynthObject, view: &View, patch: usize, cols: usize) -> Op
 
 /// How much nearer the patches of another object are to the mean of their own part than to that of
 /// any other part: 1 where they coincide with it, 0 where they lie in between, less where they are
-/// nearer to a stranger. Squared distances, mean over all patches on one part.
+/// nearer to another part. Squared distances, mean over all patches on one part.
 fn clearness(level: Level) -> f64 {
     let (mut sum, mut n_patches) = (0.0, 0);
     for category in [Category::Tools, Category::Containers, Category::Scissors] {
         let [one, other] = [0, 5].map(|instance| {
             let object = object(category, instance, 1500);
             let views = render_views(&object, &Task::default()).unwrap();
-            Seen::new(&object, &views, level)
+            PartTokens::new(&object, &views, level)
         });
         for (part, token) in &other.tokens {
-            let distance = |mean: &[f32]| -> f32 {
-                mean.iter().zip(token).map(|(a, b)| (a - b) * (a - b)).sum()
-            };
-            let nearest = |own: bool| {
+            // Squared distances to the mean of the own part and to the nearest of the others.
+            let [own, rest] = [true, false].map(|own| {
                 let parts = one.means.iter().filter(|(name, _)| (name == part) == own);
-                parts.map(|(_, mean)| distance(mean)).min_by(f32::total_cmp)
-            };
-            if let (Some(own), Some(stranger)) = (nearest(true), nearest(false)) {
-                sum += f64::from((stranger - own) / (stranger + own));
+                parts.map(|(_, mean)| distance_squared(mean, token)).min_by(f32::total_cmp)
+            });
+            if let (Some(own), Some(rest)) = (own, rest) {
+                sum += f64::from((rest - own) / (rest + own));
                 n_patches += 1;
             }
         }
     }
     sum / f64::from(n_patches)
+}
+
+fn distance_squared(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
 #[test]

@@ -59,8 +59,8 @@ fn every_kind_is_closed_manifold_even_and_labelled() {
                 let n = object.parts.iter().filter(|&&p| usize::from(p) == part).count();
                 assert!(n > 0, "{name}: nothing of {part_name} is to be seen");
             }
-            let held = object.region.iter().filter(|&&held| held).count() as f64;
-            let share = held / mesh.n_vertices() as f64;
+            let n_grip = object.region.iter().filter(|&&grip| grip).count() as f64;
+            let share = n_grip / mesh.n_vertices() as f64;
             assert!((0.02..0.75).contains(&share), "{name}: {share} of it is grip");
             kinds.push(object.kind);
         }
@@ -83,13 +83,14 @@ fn the_vertex_count_is_the_one_asked_for() {
 
 #[test]
 fn seeds_and_instances_make_different_objects_and_the_same_ones_again() {
-    let hash = |instance, seed| {
-        let settings = ObjectSettings { n_vertices: 800, seed, ..ObjectSettings::default() };
-        object(Category::Tools, instance, settings).mesh.hash()
-    };
-    assert_eq!(hash(0, 0), hash(0, 0));
-    assert_ne!(hash(0, 0), hash(0, 1));
-    assert_ne!(hash(0, 0), hash(KINDS, 0), "the next hammer has other proportions");
+    let [first, again, other_seed, next_hammer] =
+        [(0, 0), (0, 0), (0, 1), (KINDS, 0)].map(|(instance, seed)| {
+            let settings = ObjectSettings { n_vertices: 800, seed, ..ObjectSettings::default() };
+            object(Category::Tools, instance, settings).mesh.hash()
+        });
+    assert_eq!(first, again);
+    assert_ne!(first, other_seed);
+    assert_ne!(first, next_hammer, "the next hammer has other proportions");
 }
 
 #[test]
@@ -109,7 +110,7 @@ fn holes_open_the_surface_and_floaters_hover_beside_it() {
 }
 
 #[test]
-fn category_names_are_read_back_and_strangers_refused() {
+fn category_names_are_read_back_and_other_words_refused() {
     for category in Category::ALL {
         assert_eq!(category.name().parse::<Category>().unwrap(), category);
     }

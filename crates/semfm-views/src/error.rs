@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use semfm_geom::io::FormatError;
+
 /// Result of a call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -47,17 +49,8 @@ pub enum Error {
         found: String,
     },
     /// A file is not what its format demands.
-    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Topic, message, record or byte offset.
-        place: String,
-        /// What the format demands there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    #[error(transparent)]
+    Format(#[from] FormatError),
     /// An MCAP file is damaged or breaks the rules of its container.
     #[error("{}: {place}: expected {expected}, found {found}", path.display())]
     Container {
@@ -110,7 +103,7 @@ impl Error {
             Self::NoGpu { .. } => "no-gpu",
             Self::Gpu { .. } => "gpu",
             Self::BeyondGpu { .. } => "beyond-gpu",
-            Self::Format { .. } => "format",
+            Self::Format(_) => "format",
             Self::Container { fault, .. } => fault.code(),
             Self::OtherMesh { .. } => "other-mesh",
             Self::Io { .. } => "io",
@@ -121,7 +114,8 @@ impl Error {
     pub fn place(&self) -> Option<String> {
         match self {
             Self::Invalid { what, .. } => Some(what.clone()),
-            Self::Format { place, .. } | Self::Container { place, .. } => Some(place.clone()),
+            Self::Format(error) => Some(error.place.clone()),
+            Self::Container { place, .. } => Some(place.clone()),
             Self::Geom(cause) => cause.place(),
             _ => None,
         }

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use semfm_align::{AlignSettings, Alignment, Sim3, Verdict};
-use semfm_geom::Mesh;
+use semfm_geom::io::{FormatError, read_json, write_json};
+use semfm_geom::{Mesh, MeshIdentity, PartialMeshIdentity};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::region_file::{MeshName, write_json};
 use crate::{Error, Result};
 
 /// The format that is written.
@@ -37,7 +37,7 @@ pub fn aligned_json(found: &Alignment, mesh: &Mesh, settings: &AlignSettings) ->
     let stages = found.stages_ms.iter().map(|&(name, ms)| (name.to_owned(), json!(ms)));
     json!({
         "format": FORMAT,
-        "mesh": MeshName::of(mesh),
+        "mesh": MeshIdentity::of(mesh),
         "camera_from_object": found.camera_from_object.to_rows(),
         "scale": found.camera_from_object.scale,
         "scale_std": found.scale_std,
@@ -66,7 +66,7 @@ pub fn aligned_json(found: &Alignment, mesh: &Mesh, settings: &AlignSettings) ->
 /// # Errors
 /// [`semfm_geom::Error::Io`].
 pub fn write_aligned(path: &Path, value: &Value) -> Result<()> {
-    write_json(path, value)
+    Ok(write_json(path, value)?)
 }
 
 /// Reads `aligned.json`. Where it names its mesh and `mesh` is given, they must be the same.
@@ -74,8 +74,10 @@ pub fn write_aligned(path: &Path, value: &Value) -> Result<()> {
 /// # Errors
 /// [`Error::Format`] with the field at fault.
 pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<Aligned> {
-    let value = read_json(path)?;
-    let fault = |place: &str, expected: String, found: String| fault(path, place, expected, found);
+    let value: Value = read_json(path)?;
+    let fault = |place: &str, expected: String, found: String| {
+        Error::from(FormatError::new(path, place, expected, found))
+    };
     let file = AlignedFile::deserialize(&value).map_err(|error| {
         let expected = "an object with `camera_from_object`, a 4 × 4 matrix".into();
         fault("aligned", expected, error.to_string())
@@ -84,7 +86,7 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<Aligned> {
         return Err(fault("format", FORMAT.into(), format.into()));
     }
     if let (Some(named), Some(mesh)) = (&file.mesh, mesh) {
-        named.check(mesh).map_err(|(place, expected, found)| fault(place, expected, found))?;
+        named.check(mesh).map_err(|other| fault(other.field, other.expected, other.found))?;
     }
     let camera_from_object = similarity(path, "camera_from_object", file.camera_from_object)?;
     let scale = camera_from_object.scale;
@@ -106,41 +108,29 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<Aligned> {
 /// # Errors
 /// [`Error::Format`] with the place at fault.
 pub fn read_pose(path: &Path) -> Result<Sim3> {
-    let value = read_json(path)?;
+    let value: Value = read_json(path)?;
     let (place, rows) = match value.get("camera_from_object") {
         Some(rows) => ("camera_from_object", rows),
         None => ("matrix", &value),
     };
     let rows = <[[f64; 4]; 4]>::deserialize(rows)
-        .map_err(|error| fault(path, place, "a 4 × 4 matrix".into(), error.to_string()))?;
+        .map_err(|error| FormatError::new(path, place, "a 4 × 4 matrix", error.to_string()))?;
     similarity(path, place, rows)
 }
 
 fn similarity(path: &Path, place: &str, rows: [[f64; 4]; 4]) -> Result<Sim3> {
     Sim3::from_rows(rows).map_err(|error| match error {
         semfm_align::Error::OutOfRange { expected, found, .. } => {
-            fault(path, place, expected, found)
+            FormatError::new(path, place, expected, found).into()
         }
         other => other.into(),
     })
 }
 
-pub(crate) fn read_json(path: &Path) -> Result<Value> {
-    let bytes = std::fs::read(path)
-        .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
-    serde_json::from_slice(&bytes).map_err(|error| {
-        fault(path, &format!("line {}", error.line()), "JSON".into(), error.to_string())
-    })
-}
-
-pub(crate) fn fault(path: &Path, place: &str, expected: String, found: String) -> Error {
-    Error::Format { path: path.to_owned(), place: place.into(), expected, found }
-}
-
 #[derive(Deserialize)]
 struct AlignedFile {
     format: Option<String>,
-    mesh: Option<MeshName>,
+    mesh: Option<PartialMeshIdentity>,
     camera_from_object: [[f64; 4]; 4],
     scale: Option<f64>,
     scale_std: Option<f64>,

@@ -1,6 +1,6 @@
 //! What can go wrong on the way from two meshes to a region.
 
-use std::path::PathBuf;
+use semfm_geom::io::FormatError;
 
 /// Result of a facade call.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -38,17 +38,8 @@ pub enum Error {
         found: String,
     },
     /// A file is not what its format demands.
-    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Field, line or element.
-        place: String,
-        /// What the format demands there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    #[error(transparent)]
+    Format(#[from] FormatError),
 }
 
 impl Error {
@@ -70,7 +61,7 @@ impl Error {
             Self::Grasp(cause) => cause.code(),
             Self::Align(cause) => cause.code(),
             Self::Fmap(_) | Self::Invalid { .. } => "invalid",
-            Self::Format { .. } => "format",
+            Self::Format(_) => "format",
         }
     }
 
@@ -85,7 +76,7 @@ impl Error {
             Self::Align(cause) => cause.place(),
             Self::Fmap(_) => None,
             Self::Invalid { what, .. } => Some(what.clone()),
-            Self::Format { place, .. } => Some(place.clone()),
+            Self::Format(error) => Some(error.place.clone()),
         }
     }
 }

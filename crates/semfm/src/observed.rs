@@ -4,13 +4,13 @@ use std::path::Path;
 
 use image::DynamicImage;
 use semfm_align::DepthImage;
+use semfm_geom::io::{FormatError, read_json};
 use semfm_geom::math::DAffine3;
 use semfm_geom::{Intrinsics, Pinhole};
 use serde::Deserialize;
 use serde_json::Value;
 
 use crate::Result;
-use crate::aligned::{fault, read_json};
 
 /// Reads a depth image: a 16-bit grey PNG, `per_metre` units to the metre (1000 where it counts
 /// millimetres), 0 where nothing came back.
@@ -25,8 +25,14 @@ pub fn read_depth(path: &Path, per_metre: f64) -> Result<DepthImage> {
     }
     let picture = picture(path)?;
     let DynamicImage::ImageLuma16(picture) = picture else {
-        let expected = "16-bit grey pixels".into();
-        return Err(fault(path, "pixel format", expected, format!("{:?}", picture.color())));
+        let expected = "16-bit grey pixels";
+        return Err(FormatError::new(
+            path,
+            "pixel format",
+            expected,
+            format!("{:?}", picture.color()),
+        )
+        .into());
     };
     let (width, height) = picture.dimensions();
     let depth = picture.pixels().map(|p| (f64::from(p.0[0]) / per_metre) as f32).collect();
@@ -42,12 +48,12 @@ pub fn read_mask(path: &Path, image: &DepthImage) -> Result<Vec<bool>> {
     let (width, height) = picture.dimensions();
     if (width as usize, height as usize) != (image.width(), image.height()) {
         let expected = format!("{} × {}, as the depth image", image.width(), image.height());
-        return Err(fault(path, "size", expected, format!("{width} × {height}")));
+        return Err(FormatError::new(path, "size", expected, format!("{width} × {height}")).into());
     }
     let mask: Vec<bool> = picture.pixels().map(|pixel| pixel.0[0] >= 128).collect();
     if !mask.contains(&true) {
-        let expected = "at least one bright pixel".into();
-        return Err(fault(path, "pixels", expected, "a dark picture".into()));
+        let expected = "at least one bright pixel";
+        return Err(FormatError::new(path, "pixels", expected, "a dark picture").into());
     }
     Ok(mask)
 }
@@ -60,11 +66,11 @@ pub fn read_mask(path: &Path, image: &DepthImage) -> Result<Vec<bool>> {
 /// # Errors
 /// [`crate::Error::Format`] with the field at fault.
 pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
-    let value = read_json(path)?;
+    let value: Value = read_json(path)?;
     for (field, has) in [("width", image.width()), ("height", image.height())] {
         if let Some(told) = value.get(field).filter(|told| told.as_f64() != Some(has as f64)) {
             let expected = format!("{has}, as the depth image");
-            return Err(fault(path, field, expected, told.to_string()));
+            return Err(FormatError::new(path, field, expected, told.to_string()).into());
         }
     }
     let [fx, fy, cx, cy] = match value.get("K").or_else(|| value.get("k")) {
@@ -74,7 +80,7 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
             let number = |field: &str| {
                 value.get(field).and_then(Value::as_f64).ok_or_else(|| {
                     let found = value.get(field).map_or("nothing".into(), Value::to_string);
-                    fault(path, field, "a number of pixels (or a matrix `K`)".into(), found)
+                    FormatError::new(path, field, "a number of pixels (or a matrix `K`)", found)
                 })
             };
             let [fx, fy, cx, cy] = ["fx", "fy", "cx", "cy"].map(number);
@@ -86,7 +92,8 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
     Pinhole::with_pixel_centres_at_integers(intrinsics, DAffine3::IDENTITY).map_err(|error| {
         match error {
             semfm_geom::Error::OutOfRange { what, expected, found } => {
-                fault(path, what.trim_start_matches("camera: "), expected, found)
+                let place = what.trim_start_matches("camera: ");
+                FormatError::new(path, place, expected, found).into()
             }
             other => other.into(),
         }
@@ -98,13 +105,14 @@ fn from_matrix(path: &Path, value: &Value) -> Result<[f64; 4]> {
     let flat = <[f64; 9]>::deserialize(value).ok();
     let square = || <[[f64; 3]; 3]>::deserialize(value).ok().map(|rows| rows.concat());
     let Some(k) = flat.map(Vec::from).or_else(square) else {
-        let expected = "a 3 × 3 matrix or nine numbers".into();
-        return Err(fault(path, "K", expected, value.to_string().chars().take(60).collect()));
+        let expected = "a 3 × 3 matrix or nine numbers";
+        let found: String = value.to_string().chars().take(60).collect();
+        return Err(FormatError::new(path, "K", expected, found).into());
     };
     let rest = [k[1], k[3], k[6], k[7], k[8] - 1.0];
     if rest.iter().any(|&x| x != 0.0) {
-        let expected = "fx 0 cx, 0 fy cy, 0 0 1".into();
-        return Err(fault(path, "K", expected, format!("{k:?}")));
+        let expected = "fx 0 cx, 0 fy cy, 0 0 1";
+        return Err(FormatError::new(path, "K", expected, format!("{k:?}")).into());
     }
     Ok([k[0], k[4], k[2], k[5]])
 }
@@ -112,16 +120,17 @@ fn from_matrix(path: &Path, value: &Value) -> Result<[f64; 4]> {
 fn picture(path: &Path) -> Result<DynamicImage> {
     let io = |source| semfm_geom::Error::Io { path: path.to_owned(), source };
     let reader = image::ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
-    reader
+    let picture = reader
         .decode()
-        .map_err(|error| fault(path, "picture", "a PNG or JPEG".into(), error.to_string()))
+        .map_err(|error| FormatError::new(path, "picture", "a PNG or JPEG", error.to_string()))?;
+    Ok(picture)
 }
 
 /// An error about the contents, with the file's name.
 fn within(path: &Path, error: semfm_align::Error) -> crate::Error {
     match error {
         semfm_align::Error::OutOfRange { what, expected, found } => {
-            fault(path, what, expected, found)
+            FormatError::new(path, what, expected, found).into()
         }
         other => other.into(),
     }

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use semfm_fmap::Anchor;
-use semfm_geom::io::{Paint, write_painted_mesh};
-use semfm_geom::{Mesh, Task};
+use semfm_geom::io::{VertexAttributes, write_json, write_mesh_with_attributes};
+use semfm_geom::{Mesh, MeshIdentity, Task};
 use serde_json::{Map, Value, json};
 
-use crate::region_file::{region_json, write_json};
+use crate::region_file::region_json;
 use crate::weight_colors::{color_bytes, weight_colors};
 use crate::{PreparedObject, Region, Result, Transfer};
 
@@ -113,8 +113,11 @@ fn write_weighted(paths: &[PathBuf], mesh: &Mesh, weights: &[f64]) -> Result<()>
     let opaque = |[r, g, b]: [u8; 3]| [r, g, b, u8::MAX];
     let colors: Vec<[u8; 4]> =
         weight_colors(weights).into_iter().map(|color| opaque(color_bytes(color))).collect();
-    let paint = Paint { colors: Some(&colors), scalars: &[("weight", weights)] };
-    Ok(paths.iter().try_for_each(|path| write_painted_mesh(path, mesh, &paint))?)
+    let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
+    for path in paths {
+        write_mesh_with_attributes(path, mesh, &attributes)?;
+    }
+    Ok(())
 }
 
 /// The region as in a region file, with method, confidence, verdict and the other places it may be.
@@ -188,11 +191,7 @@ pub fn stages_ms(
 fn object_json(object: &PreparedObject) -> Value {
     let mesh = object.shape.original();
     let mut value = json!({
-        "mesh": {
-            "n_vertices": mesh.n_vertices(),
-            "n_triangles": mesh.n_faces(),
-            "hash": mesh.hash().to_string(),
-        },
+        "mesh": MeshIdentity::of(mesh),
         "shape": object.shape.report(),
         "from_cache": object.from_cache,
         "cloud": { "n_points": object.cloud.n_points(), "dim": object.cloud.dim() },

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use semfm_geom::{Mesh, MeshHash};
-use serde::{Deserialize, Serialize};
+use semfm_geom::io::{FormatError, read_json, write_json};
+use semfm_geom::{Mesh, MeshIdentity, PartialMeshIdentity};
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::{Error, Region, Result};
@@ -20,17 +21,10 @@ pub const FORMAT: &str = "semfm.region/1";
 /// [`Error::Format`] with the field at fault; an empty region is one, for nothing can be done
 /// with it.
 pub fn read_region(path: &Path, mesh: &Mesh) -> Result<Region> {
-    let fault = |place: &str, expected: String, found: String| Error::Format {
-        path: path.to_owned(),
-        place: place.into(),
-        expected,
-        found,
+    let fault = |place: &str, expected: String, found: String| {
+        Error::from(FormatError::new(path, place, expected, found))
     };
-    let bytes = std::fs::read(path)
-        .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
-    let value: Value = serde_json::from_slice(&bytes).map_err(|error| {
-        fault(&format!("line {}", error.line()), "JSON".into(), error.to_string())
-    })?;
+    let value: Value = read_json(path)?;
     let value = value.get("region").unwrap_or(&value);
     let file = RegionFile::deserialize(value).map_err(|error| {
         fault("region", "an object with `vertices`, a list of vertex ids".into(), error.to_string())
@@ -39,7 +33,7 @@ pub fn read_region(path: &Path, mesh: &Mesh) -> Result<Region> {
         return Err(fault("format", FORMAT.into(), format.into()));
     }
     if let Some(named) = &file.mesh {
-        named.check(mesh).map_err(|(place, expected, found)| fault(place, expected, found))?;
+        named.check(mesh).map_err(|other| fault(other.field, other.expected, other.found))?;
     }
     let n = mesh.n_vertices();
     if file.vertices.is_empty() {
@@ -78,7 +72,7 @@ pub fn read_region(path: &Path, mesh: &Mesh) -> Result<Region> {
 pub fn region_json(region: &Region, mesh: &Mesh) -> Value {
     let vertices = region.vertices();
     let weights: Vec<f64> = vertices.iter().map(|&v| region.weights()[v as usize]).collect();
-    json!({ "format": FORMAT, "mesh": MeshName::of(mesh), "vertices": vertices, "weights": weights })
+    json!({ "format": FORMAT, "mesh": MeshIdentity::of(mesh), "vertices": vertices, "weights": weights })
 }
 
 /// Writes a region file whole or not at all.
@@ -86,70 +80,15 @@ pub fn region_json(region: &Region, mesh: &Mesh) -> Value {
 /// # Errors
 /// [`semfm_geom::Error::Io`].
 pub fn write_region(path: &Path, region: &Region, mesh: &Mesh) -> Result<()> {
-    write_json(path, &region_json(region, mesh))
-}
-
-pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    semfm_geom::io::write_atomically(path, |out| {
-        serde_json::to_writer(&mut *out, value)?;
-        out.write_all(b"\n")
-    })?;
-    Ok(())
+    Ok(write_json(path, &region_json(region, mesh))?)
 }
 
 #[derive(Deserialize)]
 struct RegionFile {
     format: Option<String>,
-    mesh: Option<MeshName>,
+    mesh: Option<PartialMeshIdentity>,
     vertices: Vec<u64>,
     weights: Option<Vec<f64>>,
-}
-
-/// Which mesh a region belongs to; whatever is given must agree.
-#[derive(Deserialize, Serialize)]
-pub(crate) struct MeshName {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    n_vertices: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    n_triangles: Option<usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    hash: Option<String>,
-}
-
-impl MeshName {
-    pub(crate) fn of(mesh: &Mesh) -> Self {
-        let hash = Some(mesh.hash().to_string());
-        Self { n_vertices: Some(mesh.n_vertices()), n_triangles: Some(mesh.n_faces()), hash }
-    }
-
-    /// Place, expected and found of the first disagreement.
-    pub(crate) fn check(
-        &self,
-        mesh: &Mesh,
-    ) -> std::result::Result<(), (&'static str, String, String)> {
-        let counts = [
-            ("mesh.n_vertices", self.n_vertices, mesh.n_vertices(), "vertices"),
-            ("mesh.n_triangles", self.n_triangles, mesh.n_faces(), "triangles"),
-        ];
-        for (place, named, has, what) in counts {
-            if let Some(named) = named.filter(|&named| named != has) {
-                return Err((place, format!("{has} {what}, as the mesh has"), named.to_string()));
-            }
-        }
-        if let Some(text) = &self.hash {
-            let named = MeshHash::parse(text).ok_or_else(|| {
-                ("mesh.hash", "blake3: and 64 hexadecimal digits".into(), text.clone())
-            })?;
-            if named != mesh.hash() {
-                return Err((
-                    "mesh.hash",
-                    format!("{}, the mesh given", mesh.hash()),
-                    text.clone(),
-                ));
-            }
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]

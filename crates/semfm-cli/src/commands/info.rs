@@ -21,8 +21,10 @@ use crate::talk;
 #[command(after_help = "Example:\n  semfm-cli info mug.obj mug.emb.mcap --json\n\n\
     With --json, one object a line: `kind` and counts, or `error` with code, message and place.")]
 pub struct Info {
-    /// Mesh files (OBJ, PLY, STL, OFF, glTF, GLB), MCAP files and robots (URDF)
-    #[arg(required = true)]
+    #[arg(
+        required = true,
+        help = format!("Mesh files ({}), MCAP files and robots (URDF)", MeshFormat::readable_names())
+    )]
     files: Vec<PathBuf>,
     /// Folder of a package that a URDF names as package://NAME/…; may be given again
     #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
@@ -80,7 +82,7 @@ fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Valu
     value["hash"] = json!(file.mesh.hash().to_string());
     value["area"] = json!(file.mesh.area());
     value["bounds"] = json!([low.to_array(), high.to_array()]);
-    value["format"] = json!(format!("{:?}", file.format).to_lowercase());
+    value["format"] = json!(file.format.name());
     value["has_colors"] = json!(!file.appearance.is_plain());
     value["notes"] = json!(file.appearance.notes);
     Ok(value)

@@ -98,7 +98,7 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
         .with_context(|| format!("--view: expected a number after #, found `{number}`"))?;
     let path = Path::new(path);
     let (metadata, view) = read_view(path, number)?;
-    metadata.mesh.check(mesh, path)?;
+    metadata.check_mesh(mesh, path)?;
     let picture = image::open(mask).with_context(|| mask.display().to_string())?.into_luma8();
     let (width, height) = (view.camera.width(), view.camera.height());
     if picture.dimensions() != (width, height) {

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use semfm::geom::io::MeshFile;
-use semfm::views::mcap::{MeshIdentity, ViewsMetadata, write_views};
+use semfm::geom::MeshIdentity;
+use semfm::geom::io::{MeshFile, MeshFormat};
+use semfm::views::mcap::{ViewsMetadata, write_views};
 use semfm::views::{
     RenderSettings, Renderer, RendererChoice, RigSettings, SurfaceColor, View, rig,
 };
@@ -20,7 +21,7 @@ use crate::{load, talk};
 #[command(after_help = "Example:\n  semfm-cli views mug.obj -o mug.views.mcap\n  \
     semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224")]
 pub struct Views {
-    /// The mesh: OBJ, PLY, STL, OFF, glTF or GLB
+    #[arg(help = format!("The mesh: {}", MeshFormat::readable_names()))]
     mesh: PathBuf,
     /// Where to write (`NAME.views.mcap`)
     #[arg(short, long, value_name = "FILE")]

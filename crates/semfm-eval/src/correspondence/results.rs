@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::write_json_pretty;
 use serde::{Deserialize, Serialize};
 
 use super::map_method::MapMethod;
@@ -90,10 +90,7 @@ impl MapResults {
     /// [`crate::Error::Facade`] where it cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(results::FILE);
-        write_atomically(&path, |out| {
-            serde_json::to_writer_pretty(&mut *out, self)?;
-            out.write_all(b"\n")
-        })?;
+        write_json_pretty(&path, self)?;
         Ok(path)
     }
 

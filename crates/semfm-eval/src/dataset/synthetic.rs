@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use semfm::Region;
-use semfm::geom::io::{Appearance, MeshFile, MeshFormat};
+use semfm::geom::io::{Appearance, MeshFile};
 use semfm_synth::{Category, Level, ObjectSettings, make_object};
 use serde_json::json;
 
@@ -83,7 +83,7 @@ pub(super) fn load(category: Category, instance: usize, seed: u64) -> Result<Lab
             mesh: object.mesh.clone(),
             n_faces: object.mesh.n_faces(),
             appearance: Appearance::default(),
-            format: MeshFormat::Obj, // what it would be written as
+            format: "obj".parse()?, // what it would be written as
         },
         truth: Region::from_mask(&object.region),
         parts,

@@ -165,7 +165,7 @@ fn card(
         words += &format!(" · confidence <b>{}</b>", number(Some(confidence), 2));
     }
     if let Some(verdict) = row.verdict {
-        words += &format!(" · {}", in_words(verdict));
+        words += &format!(" · {}", verdict);
     }
     format!(
         "<article class=\"card\" data-method=\"{method}\" data-rank=\"{rank}\" data-group=\"{group}\" \
@@ -175,7 +175,7 @@ fn card(
         method = escape(&row.method),
         rank = context.methods.iter().position(|m| *m == row.method).unwrap_or(0),
         group = escape(&row.group),
-        verdict = row.verdict.map_or("", in_words),
+        verdict = row.verdict.map_or("", Verdict::name),
         iou = attribute(row.iou),
         confidence = attribute(row.confidence),
         source = escape(&row.source),
@@ -188,21 +188,13 @@ fn attribute(value: Option<f64>) -> String {
     value.map_or(String::new(), |v| v.to_string())
 }
 
-fn in_words(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Accept => "accept",
-        Verdict::Check => "check",
-        Verdict::Refuse => "refuse",
-    }
-}
-
 /// Filters and orders; hidden until the script that serves them runs.
 fn controls(context: &Context<'_>, rows: &[&Row]) -> String {
     let with_card =
         context.methods.iter().filter(|method| rows.iter().any(|row| row.method == ***method));
     let methods: String = with_card.map(|m| option(m, m, *m == context.lead)).collect();
     let groups: String = context.groups.iter().map(|g| option(g, g, false)).collect();
-    let verdicts: String = ["accept", "check", "refuse"].map(|v| option(v, v, false)).concat();
+    let verdicts: String = Verdict::ALL.map(|v| option(v.name(), v.name(), false)).concat();
     let orders = [
         ("worst", "worst IoU first"),
         ("best", "best IoU first"),

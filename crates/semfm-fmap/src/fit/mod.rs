@@ -97,7 +97,7 @@ pub fn fit(
     settings: &FitSettings,
     task: &Task,
 ) -> Result<Fit> {
-    semfm_geom::algebra::keep_sequential();
+    semfm_geom::keep_faer_sequential();
     check(&source, &target, settings)?;
     let (a, b) = (source.descriptors, target.descriptors);
     let bare = settings.weights() == [0.0; 3];

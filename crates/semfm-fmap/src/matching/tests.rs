@@ -6,6 +6,7 @@ use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings};
 
 use super::*;
+use crate::Verdict;
 use crate::metrics;
 use crate::propagation::PropagationSettings;
 use crate::settings::Rule;

@@ -25,7 +25,7 @@ use crate::{Error, Result};
 ///
 /// ```
 /// use faer::sparse::{SparseColMat, Triplet};
-/// use semfm_geom::cholesky::SparseCholesky;
+/// use semfm_geom::SparseCholesky;
 /// let path = [(0, 0, 2.0), (1, 1, 2.0), (0, 1, -1.0), (1, 0, -1.0)];
 /// let a = SparseColMat::<usize, f64>::try_new_from_triplets(
 ///     2, 2, &path.map(|(i, j, v)| Triplet::new(i, j, v)))?;
@@ -44,6 +44,9 @@ pub struct SparseCholesky {
 /// Below zero, because faer's own `FORCE_SUPERNODAL` (zero) still stores a diagonal matrix by columns.
 const ALWAYS_SUPERNODAL: SupernodalThreshold = SupernodalThreshold(-1.0);
 
+/// faer's own failures: no memory, or a factor of another layout than was asked for.
+const FAILED: Error = Error::LinearAlgebra("the sparse Cholesky factorisation");
+
 /// Right-hand sides solved together: their numbers for one unknown fill a cache line.
 const LANES: usize = 8;
 
@@ -59,7 +62,6 @@ impl SparseCholesky {
             let (expected, found) = (matrix.nrows(), matrix.ncols());
             return Err(Error::Length { what: "columns of a square matrix", expected, found });
         }
-        let failed = || Error::LinearAlgebra("the sparse Cholesky factorisation");
         let symbolic = factorize_symbolic_cholesky(
             matrix.symbolic(),
             Side::Lower,
@@ -69,9 +71,9 @@ impl SparseCholesky {
                 ..Default::default()
             },
         )
-        .map_err(|_| failed())?;
+        .map_err(|_| FAILED)?;
         let SymbolicCholeskyRaw::Supernodal(nodes) = symbolic.raw() else {
-            return Err(failed());
+            return Err(FAILED);
         };
         let mut values = vec![0.0; symbolic.len_val()];
         let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());

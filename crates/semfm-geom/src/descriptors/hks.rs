@@ -5,7 +5,7 @@ use std::f64::consts::LN_10;
 
 use faer::Mat;
 
-use super::{evenly, spectrum, weighted_squares};
+use super::{Spectrum, evenly, spectrum, weighted_squares};
 use crate::{Eigenbasis, Error, Result};
 
 /// How the heat kernel signature is sampled.
@@ -37,10 +37,10 @@ pub fn hks(basis: &Eigenbasis, settings: &HksSettings) -> Result<Mat<f64>> {
             found: "0".into(),
         });
     }
-    let (smallest, largest) = spectrum(basis)?;
-    let log_time = |lambda: f64| (4.0 * LN_10 / lambda).ln();
-    let times: Vec<f64> =
-        evenly(log_time(largest), log_time(smallest), settings.n_times).map(f64::exp).collect();
+    let Spectrum { smallest, largest } = spectrum(basis)?;
+    // t from 4 ln 10 / λ_max to 4 ln 10 / λ_min, evenly in ln t.
+    let [first, last] = [largest, smallest].map(|lambda| (4.0 * LN_10 / lambda).ln());
+    let times: Vec<f64> = evenly(first, last, settings.n_times).map(f64::exp).collect();
     let weights = Mat::from_fn(basis.k(), times.len(), |k, t| (-times[t] * basis.values[k]).exp());
     Ok(weighted_squares(basis, weights))
 }

@@ -15,12 +15,18 @@ use crate::{Eigenbasis, Error, Result};
 /// one for each connected piece, up to the solver's residual (1e-8).
 const ZERO: f64 = 1e-7;
 
-/// Smallest and largest eigenvalue that is not zero, or why there is none.
-fn spectrum(basis: &Eigenbasis) -> Result<(f64, f64)> {
+/// Smallest and largest eigenvalue that is not zero.
+struct Spectrum {
+    smallest: f64,
+    largest: f64,
+}
+
+/// The range of the eigenvalues, or why there is none.
+fn spectrum(basis: &Eigenbasis) -> Result<Spectrum> {
     let largest = basis.values.iter().copied().fold(0.0, f64::max);
     let zero = ZERO * largest.max(1.0 / basis.mass.iter().sum::<f64>());
     let smallest = basis.values.iter().copied().find(|&value| value > zero);
-    smallest.map(|smallest| (smallest, largest)).ok_or_else(|| Error::OutOfRange {
+    smallest.map(|smallest| Spectrum { smallest, largest }).ok_or_else(|| Error::OutOfRange {
         what: "eigenbasis of a descriptor",
         expected: "an eigenvalue above zero".into(),
         found: format!("{} pairs, the largest with {largest}", basis.k()),
@@ -60,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn every_animal_has_finite_descriptors() {
+    fn every_mesh_of_the_zoo_has_finite_descriptors() {
         for (name, mesh) in zoo::all() {
             let basis = basis(&mesh, 20.min(mesh.n_vertices()));
             let [wks, hks] =

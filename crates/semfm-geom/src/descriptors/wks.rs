@@ -4,7 +4,7 @@
 
 use faer::Mat;
 
-use super::{evenly, spectrum, weighted_squares};
+use super::{Spectrum, evenly, spectrum, weighted_squares};
 use crate::{Eigenbasis, Error, Result};
 
 /// How the wave kernel signature is sampled.
@@ -42,7 +42,8 @@ pub fn wks(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
 /// symmetries of the shapes.
 ///
 /// # Errors
-/// As [`wks`]; [`Error::OutOfRange`] for a landmark beyond the vertices.
+/// [`Error::OutOfRange`] for no energies, a basis without an eigenvalue above zero, or a landmark
+/// beyond the vertices.
 pub fn landmark_wks(
     basis: &Eigenbasis,
     landmarks: &[u32],
@@ -73,20 +74,23 @@ fn bands(basis: &Eigenbasis, settings: &WksSettings) -> Result<Mat<f64>> {
             found: "0".into(),
         });
     }
-    let (smallest, largest) = spectrum(basis)?;
+    let Spectrum { smallest, largest } = spectrum(basis)?;
     let (low, high) = (smallest.ln(), largest.ln());
     let sigma = if high > low { BAND * (high - low) / n as f64 } else { 1.0 };
     let energies: Vec<f64> = evenly(low + 2.0 * sigma, high - 2.0 * sigma, n).collect();
-    // The exponents of one energy are taken from their largest, so that far bands do not vanish.
-    let exponent = |k: usize, e: usize| {
-        let distance = (energies[e] - basis.values[k].ln()) / sigma;
-        -0.5 * distance * distance
-    };
     let positive: Vec<usize> = (0..basis.k()).filter(|&k| basis.values[k] >= smallest).collect();
     let mut weights = Mat::zeros(basis.k(), n);
-    for e in 0..n {
-        let top = positive.iter().map(|&k| exponent(k, e)).fold(f64::NEG_INFINITY, f64::max);
-        positive.iter().for_each(|&k| weights[(k, e)] = (exponent(k, e) - top).exp());
+    let mut exponents = vec![0.0; positive.len()];
+    for (e, energy) in energies.iter().enumerate() {
+        // −(e − ln λ)² / 2σ², taken from their largest, so that far bands do not vanish.
+        for (exponent, &k) in exponents.iter_mut().zip(&positive) {
+            let distance = (energy - basis.values[k].ln()) / sigma;
+            *exponent = -0.5 * distance * distance;
+        }
+        let top = exponents.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (&exponent, &k) in exponents.iter().zip(&positive) {
+            weights[(k, e)] = (exponent - top).exp();
+        }
     }
     Ok(weights)
 }

@@ -12,7 +12,7 @@ const CLUSTER_WIDTH: f64 = 1e-6;
 
 /// A gap in the spectrum, and how many eigenvalues must lie below it if none was missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fence {
+pub(super) struct SpectralGap {
     /// Largest value below the gap.
     pub below: f64,
     /// Smallest value above it.
@@ -21,20 +21,20 @@ pub(super) struct Fence {
     pub expected: usize,
 }
 
-/// The highest place among `values` (ascending) at which counting makes sense: the last gap wider
-/// than a cluster. `None` where all values are one cluster.
+/// The last gap among `values` (ascending) that is wider than a cluster: the highest place at which
+/// counting makes sense. `None` where all values are one cluster.
 ///
-/// Above the fence remain at most the members of the cluster that ends the list; within a cluster
+/// Above the gap remain at most the members of the cluster that ends the list; within a cluster
 /// any choice of members is as good as any other.
-pub(super) fn fence(values: &[f64], scale: f64) -> Option<Fence> {
+pub(super) fn last_gap(values: &[f64], scale: f64) -> Option<SpectralGap> {
     (1..values.len()).rev().find_map(|j| {
         let (below, above) = (values[j - 1], values[j]);
         let wide = above - below > CLUSTER_WIDTH * above.max(scale);
-        wide.then_some(Fence { below, above, expected: j })
+        wide.then_some(SpectralGap { below, above, expected: j })
     })
 }
 
-/// How many eigenvalues below the fence were not found.
+/// How many eigenvalues below the gap were not found.
 ///
 /// The count is taken in the middle of the gap, and elsewhere in it where the middle gives none or
 /// one that contradicts the pairs at hand: without pivoting, a factorisation of an indefinite
@@ -43,16 +43,16 @@ pub(super) fn fence(values: &[f64], scale: f64) -> Option<Fence> {
 /// # Errors
 /// [`Error::LinearAlgebra`] where no place in the gap gives a possible count.
 pub(super) fn missed_below(
-    fence: Fence,
+    gap: SpectralGap,
     laplacian: &Laplacian,
     symbolic: &SymbolicCholesky<usize>,
 ) -> Result<usize> {
     for share in [0.5, 0.3, 0.7] {
-        let tau = fence.below + share * (fence.above - fence.below);
+        let tau = gap.below + share * (gap.above - gap.below);
         if let Some(below) = count_below(laplacian, symbolic, tau)?
-            && below >= fence.expected
+            && below >= gap.expected
         {
-            return Ok(below - fence.expected);
+            return Ok(below - gap.expected);
         }
     }
     Err(Error::LinearAlgebra("the eigensolver's count of eigenvalues"))
@@ -119,25 +119,33 @@ pub(super) fn residuals(
     values: &[f64],
     functions: MatRef<'_, f64>,
 ) -> Vec<Residual> {
-    let stiffness = laplacian.stiffness.as_ref();
-    let pair = |(j, &lambda): (usize, &f64)| {
-        let phi = functions.col(j).try_as_col_major().map(|column| column.as_slice());
-        // Each vertex contributes a squared residual and a squared bound; L is symmetric, so its
-        // columns serve as rows.
-        let (mut squared, mut squared_bound) = (0.0, 0.0);
-        for (i, m) in laplacian.mass.iter().enumerate() {
-            let at = |row: usize| phi.map_or_else(|| functions[(row, j)], |values| values[row]);
-            let (mut sum, mut size) = (-lambda * m * at(i), lambda * m * at(i).abs());
-            let entries = stiffness.row_idx_of_col_raw(i).iter().zip(stiffness.val_of_col(i));
-            for (&row, weight) in entries {
-                let term = weight * at(row);
-                sum += term;
-                size += term.abs();
+    let pairs = values.iter().enumerate();
+    pairs
+        .map(|(j, &lambda)| match functions.col(j).try_as_col_major() {
+            Some(column) => residual(laplacian, lambda, column.as_slice()),
+            None => {
+                residual(laplacian, lambda, &functions.col(j).iter().copied().collect::<Vec<_>>())
             }
-            squared += sum * sum / m;
-            squared_bound += size * size / m;
+        })
+        .collect()
+}
+
+/// The residual of the pair (λ, φ), from r = L φ − λ M φ and its bound, vertex by vertex:
+/// ‖r‖²_{M⁻¹} = Σᵢ rᵢ² / mᵢ.
+fn residual(laplacian: &Laplacian, lambda: f64, phi: &[f64]) -> Residual {
+    let stiffness = laplacian.stiffness.as_ref();
+    let (mut squared, mut squared_bound) = (0.0, 0.0);
+    for (i, m) in laplacian.mass.iter().enumerate() {
+        let (mut sum, mut size) = (-lambda * m * phi[i], lambda * m * phi[i].abs());
+        // L is symmetric, so its columns serve as rows.
+        let entries = stiffness.row_idx_of_col_raw(i).iter().zip(stiffness.val_of_col(i));
+        for (&row, weight) in entries {
+            let term = weight * phi[row];
+            sum += term;
+            size += term.abs();
         }
-        Residual { norm: squared.sqrt(), rounding: 4.0 * f64::EPSILON * squared_bound.sqrt() }
-    };
-    values.iter().enumerate().map(pair).collect()
+        squared += sum * sum / m;
+        squared_bound += size * size / m;
+    }
+    Residual { norm: squared.sqrt(), rounding: 4.0 * f64::EPSILON * squared_bound.sqrt() }
 }

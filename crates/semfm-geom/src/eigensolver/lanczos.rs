@@ -13,7 +13,7 @@ use crate::{Error, Result, Task};
 /// Restarts after which the search is given up; a mesh's spectrum takes 0 to 4.
 const MOST_RESTARTS: usize = 60;
 
-/// What to look for, and with how much room.
+/// What to look for, and in how many dimensions.
 pub(super) struct Plan {
     /// Pairs wanted.
     pub wanted: usize,
@@ -111,7 +111,7 @@ impl Schedule {
 /// of the identity.
 struct Krylov<'a> {
     operator: &'a ShiftInvert,
-    /// [deflated | V | Q | room] (n × (d + max_dimension)).
+    /// [deflated | V | Q | free] (n × (d + max_dimension)).
     basis: RowPanels,
     n_deflated: usize,
     /// Columns of V.
@@ -203,7 +203,7 @@ impl<'a> Krylov<'a> {
     /// Replaces V by its best Ritz vectors; Q stays the block to be expanded next.
     fn restart(&mut self, projection: &Projection, plan: &Plan) {
         let (d, m, b) = (self.n_deflated, self.expanded, self.block.ncols());
-        // Room for at least two blocks must remain; half of the unwanted vectors is a middle
+        // Space for at least two blocks must remain; half of the unwanted vectors is a middle
         // between forgetting what was learnt and having to orthogonalise against it.
         let keep = (plan.wanted + (m - plan.wanted.min(m)) / 2).min(m - 2 * b);
         let combination = projection.vectors.as_ref().subcols(0, keep);

@@ -13,8 +13,9 @@ mod row_panels;
 mod shift_invert;
 
 use faer::{Mat, MatRef};
+use serde::Serialize;
 
-use self::check::{fence, missed_below};
+use self::check::{last_gap, missed_below};
 use self::lanczos::{Plan, Ritz};
 use self::shift_invert::ShiftInvert;
 use crate::{Eigenbasis, Error, Laplacian, Result, Task};
@@ -46,7 +47,7 @@ const MOST_SEARCHES: usize = 50;
 const ORTHONORMALITY_TOLERANCE: f64 = 1e-10;
 
 /// How the eigenbasis is computed.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EigenSettings {
     /// Largest relative residual accepted.
     pub tolerance: f64,
@@ -95,7 +96,7 @@ pub fn eigenbasis(
     settings: &EigenSettings,
     task: &Task,
 ) -> Result<Eigenbasis> {
-    crate::algebra::keep_sequential();
+    crate::keep_faer_sequential();
     let n_vertices = laplacian.n_vertices();
     if k == 0 {
         let (expected, found) = ("1 or more".to_owned(), "0".to_owned());
@@ -146,9 +147,9 @@ fn iterate(
             lanczos::largest_pairs(&operator, vectors.as_ref(), &plan, task)?;
         values.extend(mus.iter().map(|&mu| operator.eigenvalue(mu).max(0.0)));
         (values, vectors) = merge(values, vectors.as_ref(), found.as_ref(), k);
-        let missed = match fence(&values, scale) {
+        let missed = match last_gap(&values, scale) {
             None => 0,
-            Some(fence) => missed_below(fence, laplacian, operator.factor.symbolic())?,
+            Some(gap) => missed_below(gap, laplacian, operator.factor.symbolic())?,
         };
         if missed == 0 {
             return Ok((values, vectors));
@@ -158,7 +159,7 @@ fn iterate(
     Err(Error::LinearAlgebra("the eigensolver: eigenpairs are missing"))
 }
 
-/// Room and blocks for a search of `wanted` pairs beside `n_deflated` known ones.
+/// Dimensions and blocks for a search of `wanted` pairs beside `n_deflated` known ones.
 fn plan(
     n: usize,
     n_deflated: usize,
@@ -166,8 +167,8 @@ fn plan(
     settings: &EigenSettings,
     search: usize,
 ) -> Plan {
-    let room = KRYLOV_PER_WANTED * wanted + 8 * BLOCK;
-    let max_dimension = room.min(n - n_deflated) / BLOCK * BLOCK;
+    let enough = KRYLOV_PER_WANTED * wanted + 8 * BLOCK;
+    let max_dimension = enough.min(n - n_deflated) / BLOCK * BLOCK;
     Plan {
         wanted,
         block: BLOCK,

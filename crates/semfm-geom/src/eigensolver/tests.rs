@@ -16,8 +16,8 @@ fn torus(around: usize, along: usize, bumps: f64, offset: DVec3) -> (Vec<DVec3>,
             let tube = 0.35 * (1.0 + bumps * ((3.0 * a).sin() + 0.5 * (5.0 * b + 2.0 * a).cos()));
             let ring = 1.0 + tube * b.cos();
             vertices.push(offset + DVec3::new(ring * a.cos(), ring * a.sin(), tube * b.sin()));
-            let at = |i: usize, j: usize| ((i % around) * along + j % along) as u32;
-            let [p, q, s, t] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let [p, q, s, t] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+                .map(|(i, j)| ((i % around) * along + j % along) as u32);
             faces.extend([[p, q, s], [p, s, t]]);
         }
     }
@@ -42,7 +42,7 @@ fn dense_values(laplacian: &Laplacian, k: usize) -> Vec<f64> {
 fn assert_same_values(found: &[f64], expected: &[f64], scale: f64) {
     assert_eq!(found.len(), expected.len());
     for (j, (a, b)) in found.iter().zip(expected).enumerate() {
-        // Eigenvalue errors are squares of residuals: 1e-10 leaves room for rounding alone.
+        // Eigenvalue errors are squares of residuals: 1e-10 allows for rounding alone.
         assert!((a - b).abs() <= 1e-10 * b.max(scale), "λ_{j}: {a} against {b}");
     }
 }
@@ -57,15 +57,14 @@ fn lanczos_agrees_with_the_dense_solution() {
 }
 
 #[test]
-fn a_restarted_search_finds_the_same_as_one_with_room() {
+fn a_restarted_search_finds_the_same_as_one_in_many_dimensions() {
     let laplacian = torus_laplacian(60, 25, 0.2);
     let operator = ShiftInvert::new(&laplacian).unwrap();
     let none = Mat::zeros(1500, 0);
-    let with_room = |max_dimension| {
+    let [tight, ample] = [56, 300].map(|max_dimension| {
         let plan = Plan { wanted: 40, block: 4, max_dimension, tolerance: 1e-9, seed: 5 };
         lanczos::largest_pairs(&operator, none.as_ref(), &plan, &Task::default()).unwrap()
-    };
-    let (tight, ample) = (with_room(56), with_room(300));
+    });
     for (a, b) in tight.mus.iter().zip(&ample.mus) {
         assert!((a - b).abs() < 1e-12 * b, "{a} against {b}");
     }
@@ -164,8 +163,8 @@ fn a_count_notices_a_pair_that_was_left_out() {
     let operator = ShiftInvert::new(&laplacian).unwrap();
     let mut values = dense_values(&laplacian, 21);
     let missed = |values: &[f64]| {
-        let fence = fence(values, values[1]).unwrap();
-        missed_below(fence, &laplacian, operator.factor.symbolic()).unwrap()
+        let gap = last_gap(values, values[1]).unwrap();
+        missed_below(gap, &laplacian, operator.factor.symbolic()).unwrap()
     };
     assert_eq!(missed(&values), 0);
     values.remove(10);
@@ -179,7 +178,7 @@ fn a_count_below_what_was_found_is_an_error() {
     let laplacian = torus_laplacian(40, 20, 0.2);
     let operator = ShiftInvert::new(&laplacian).unwrap();
     let values = dense_values(&laplacian, 9);
-    let too_many = check::Fence { below: values[7], above: values[8], expected: 9 };
+    let too_many = check::SpectralGap { below: values[7], above: values[8], expected: 9 };
     assert!(matches!(
         missed_below(too_many, &laplacian, operator.factor.symbolic()),
         Err(Error::LinearAlgebra(_))

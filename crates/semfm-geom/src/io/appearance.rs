@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use super::format_error::FormatError;
 use super::image::{ImageBudget, Texture, Wrap};
 use super::input::read_file;
-use crate::{Error, Result};
+use crate::Result;
 
 /// How a mesh looks, as far as its file says.
 ///
@@ -78,23 +79,19 @@ impl Appearance {
     /// Puts the image of a file on a mesh that has texture coordinates (an OBJ or a PLY, say).
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::Format`] about the image; [`Error::Format`] where the mesh has no
+    /// [`Error::Io`](crate::Error::Io) or [`Error::Format`](crate::Error::Format) about the image;
+    /// [`Error::Format`](crate::Error::Format) where the mesh has no
     /// texture coordinates for it.
     pub fn attach_image(&mut self, path: &Path) -> Result<()> {
-        let format = |expected: &str, found: String| Error::Format {
-            path: path.to_owned(),
-            place: "texture".into(),
-            expected: expected.into(),
-            found,
-        };
         if self.corner_uvs.is_none() {
-            let found = "a mesh without texture coordinates".into();
-            return Err(format("a mesh that an image fits on", found));
+            let (expected, found) =
+                ("a mesh that an image fits on", "a mesh without texture coordinates");
+            return Err(FormatError::new(path, "texture", expected, found).into());
         }
         let bytes = read_file(path)?;
         let mut budget = ImageBudget::generous();
         let texture = Texture::decode(&bytes, [Wrap::Repeat; 2], &mut budget)
-            .map_err(|reason| format("a PNG or JPEG image", reason))?;
+            .map_err(|reason| FormatError::new(path, "texture", "a PNG or JPEG image", reason))?;
         self.materials = vec![Material { color: [1.0; 4], texture: Some(texture) }];
         self.material_of = None;
         Ok(())

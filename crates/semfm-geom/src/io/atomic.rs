@@ -28,19 +28,19 @@ pub fn write_atomically(
     replace_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         let written = write(&mut out).and_then(|()| out.flush());
-        written.map_err(|source| Error::Io { path: path.to_owned(), source })
+        written.map_err(Error::io(path))
     })
 }
 
 /// As [`write_atomically`], for writers that seek and fail in ways of their own.
 ///
 /// # Errors
-/// What `fill` reports, or [`Error::Io`] with the target's path.
+/// The errors of `fill` as they are; [`Error::Io`] with the target's path.
 pub fn replace_atomically<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&mut File) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
-    let io = |source| Error::Io { path: path.to_owned(), source };
+    let io = Error::io(path);
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -55,9 +55,9 @@ pub fn replace_atomically<E: From<Error>>(
         let ordinary = std::fs::Permissions::from_mode(0o666);
         builder.permissions(std::fs::metadata(path).map_or(ordinary, |old| old.permissions()));
     }
-    let mut temporary = builder.tempfile_in(folder).map_err(io)?;
+    let mut temporary = builder.tempfile_in(folder).map_err(&io)?;
     fill(temporary.as_file_mut())?;
-    temporary.as_file().sync_all().map_err(io)?;
+    temporary.as_file().sync_all().map_err(&io)?;
     temporary.persist(path).map_err(|error| io(error.error))?;
     Ok(())
 }

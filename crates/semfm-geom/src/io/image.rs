@@ -69,11 +69,10 @@ impl Texture {
         wrap: [Wrap; 2],
         budget: &mut ImageBudget,
     ) -> Result<Self, String> {
-        let words = |error: image::ImageError| error.to_string();
         let reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|error| error.to_string())?;
-        let mut decoder = reader.into_decoder().map_err(words)?;
+        let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
         let (width, height) = decoder.dimensions();
         let n_bytes = u64::from(width) * u64::from(height) * 4;
         if width > MAX_SIDE
@@ -87,15 +86,22 @@ impl Texture {
         }
         let mut limits = Limits::default();
         limits.max_alloc = Some(budget.bytes);
-        decoder.set_limits(limits).map_err(words)?;
-        let pixels = image::DynamicImage::from_decoder(decoder).map_err(words)?.into_rgba8();
+        decoder.set_limits(limits).map_err(|error| error.to_string())?;
+        let pixels = image::DynamicImage::from_decoder(decoder)
+            .map_err(|error| error.to_string())?
+            .into_rgba8();
         budget.bytes -= n_bytes;
         Self::new(width, height, pixels.into_raw(), wrap).ok_or_else(|| "no pixels".into())
     }
 
-    /// Width and height in pixels.
-    pub fn size(&self) -> (u32, u32) {
-        (self.width, self.height)
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
     }
 
     /// RGBA bytes (height × width × 4), rows from the top.
@@ -105,32 +111,38 @@ impl Texture {
 
     /// Bilinear colour in 0..1 at `uv`, counted from the top left corner; `None` at NaN.
     pub fn sample(&self, uv: [f32; 2]) -> Option<[f32; 4]> {
-        let axis = |coordinate: f32, wrap: Wrap, side: u32| {
-            if !coordinate.is_finite() {
-                return None;
-            }
-            let inside = wrap.apply(coordinate) * side as f32 - 0.5;
-            let low = inside.floor();
-            let neighbour = |i: i64| match wrap {
-                Wrap::Repeat => i.rem_euclid(i64::from(side)) as usize,
-                Wrap::Clamp | Wrap::Mirror => i.clamp(0, i64::from(side) - 1) as usize,
-            };
-            Some((neighbour(low as i64), neighbour(low as i64 + 1), inside - low))
-        };
-        let (x0, x1, s) = axis(uv[0], self.wrap[0], self.width)?;
-        let (y0, y1, t) = axis(uv[1], self.wrap[1], self.height)?;
-        let texel = |x: usize, y: usize, c: usize| {
-            f32::from(self.rgba8[(y * self.width as usize + x) * 4 + c]) / 255.0
-        };
+        let ([x0, x1], s) = self.wrap[0].neighbours(uv[0], self.width)?;
+        let ([y0, y1], t) = self.wrap[1].neighbours(uv[1], self.height)?;
         Some(std::array::from_fn(|c| {
-            let top = texel(x0, y0, c) * (1.0 - s) + texel(x1, y0, c) * s;
-            let bottom = texel(x0, y1, c) * (1.0 - s) + texel(x1, y1, c) * s;
+            let top = self.texel(x0, y0, c) * (1.0 - s) + self.texel(x1, y0, c) * s;
+            let bottom = self.texel(x0, y1, c) * (1.0 - s) + self.texel(x1, y1, c) * s;
             top * (1.0 - t) + bottom * t
         }))
+    }
+
+    /// Channel `c` of a pixel, in 0..1.
+    fn texel(&self, x: usize, y: usize, c: usize) -> f32 {
+        f32::from(self.rgba8[(y * self.width as usize + x) * 4 + c]) / 255.0
     }
 }
 
 impl Wrap {
+    /// The two pixels of a row (or column) of `side` whose centres are next to a coordinate, and
+    /// how far it lies from the first to the second; `None` at NaN.
+    fn neighbours(self, coordinate: f32, side: u32) -> Option<([usize; 2], f32)> {
+        if !coordinate.is_finite() {
+            return None;
+        }
+        let inside = self.apply(coordinate) * side as f32 - 0.5;
+        let low = inside.floor();
+        let side = i64::from(side);
+        let pixels = [low as i64, low as i64 + 1].map(|i| match self {
+            Self::Repeat => i.rem_euclid(side) as usize,
+            Self::Clamp | Self::Mirror => i.clamp(0, side - 1) as usize,
+        });
+        Some((pixels, inside - low))
+    }
+
     /// Brings a coordinate into 0..1.
     fn apply(self, x: f32) -> f32 {
         match self {
@@ -174,11 +186,15 @@ mod tests {
 
     #[test]
     fn wrapping_follows_its_names() {
-        let same = |a: f32, b: f32| assert!((a - b).abs() < 1e-6, "{a} {b}");
-        same(Wrap::Repeat.apply(1.25), 0.25);
-        same(Wrap::Repeat.apply(-0.25), 0.75);
-        same(Wrap::Clamp.apply(-3.0), 0.0);
-        same(Wrap::Mirror.apply(1.25), 0.75);
-        same(Wrap::Mirror.apply(-0.25), 0.25);
+        for (wrap, coordinate, expected) in [
+            (Wrap::Repeat, 1.25, 0.25),
+            (Wrap::Repeat, -0.25, 0.75),
+            (Wrap::Clamp, -3.0, 0.0),
+            (Wrap::Mirror, 1.25, 0.75),
+            (Wrap::Mirror, -0.25, 0.25),
+        ] {
+            let found: f32 = wrap.apply(coordinate);
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 
+use super::FormatError;
 use crate::{Error, Result};
 
 /// A file in memory with its path, so that every complaint can name where it stands.
@@ -23,12 +24,7 @@ impl Input<'_> {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Error {
-        Error::Format {
-            path: self.path.to_owned(),
-            place: place.to_string(),
-            expected: expected.into(),
-            found: found.into(),
-        }
+        FormatError::new(self.path, place, expected, found).into()
     }
 
     /// Adds the path to an error about the contents.
@@ -44,14 +40,10 @@ impl Input<'_> {
 
 /// Reads a regular file whole: a device or a pipe could go on for ever.
 pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let io = |source| Error::Io { path: path.to_owned(), source };
-    if !fs::metadata(path).map_err(io)?.is_file() {
-        return Err(Error::Format {
-            path: path.to_owned(),
-            place: "file system".into(),
-            expected: "a regular file".into(),
-            found: "a folder or a device".into(),
-        });
+    let io = Error::io(path);
+    if !fs::metadata(path).map_err(&io)?.is_file() {
+        let (expected, found) = ("a regular file", "a folder or a device");
+        return Err(FormatError::new(path, "file system", expected, found).into());
     }
     fs::read(path).map_err(io)
 }

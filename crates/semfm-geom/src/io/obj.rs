@@ -6,17 +6,36 @@
 //! facto extension `v x y z r g b [a]`.
 
 use std::borrow::Cow;
+use std::io::Write;
 
 use super::appearance::{Appearance, rgba_from_floats};
+use super::blocks::{push, write_blocks};
+use super::format_row::{FormatRow, FormatWriter, MeshParts};
 use super::input::{Input, quote};
 use super::polygon::{NO_UV, Polygons, Triangles};
 use super::text::{Line, Lines, integer, number};
-use super::{MeshParts, PointCloud};
-use crate::Result;
+use super::{PointCloud, VertexAttributes};
 use crate::math::DVec3;
+use crate::{Mesh, Result};
+
+/// The row of the table of formats.
+pub(super) const FORMAT: FormatRow = FormatRow {
+    name: "obj",
+    extensions: &["obj"],
+    summary: "Wavefront OBJ",
+    recognise: |_| false,
+    read,
+    read_points: Some(read_points),
+    writer: Some(FormatWriter {
+        write,
+        holds_colors: true,
+        holds_scalars: false,
+        is_single_precision: false,
+    }),
+};
 
 /// Reads the faces of an OBJ file; those with one or two corners are points and edges.
-pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
+fn read(input: Input<'_>) -> Result<MeshParts> {
     let file = ObjFile::read(input)?;
     let vertex_colors = file.vertex_colors();
     // OBJ counts v from the bottom of the image, we from the top as glTF does.
@@ -29,7 +48,7 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
 }
 
 /// Reads the vertices of an OBJ file and drops its faces.
-pub(crate) fn read_points(input: Input<'_>) -> Result<PointCloud> {
+fn read_points(input: Input<'_>) -> Result<PointCloud> {
     let file = ObjFile::read(input)?;
     let colors = file.vertex_colors();
     Ok(PointCloud { points: file.vertices, colors })
@@ -191,4 +210,24 @@ fn resolve(word: &[u8], n_so_far: usize) -> Option<u32> {
         _ => given.checked_add(n_so_far as i64)?,
     };
     u32::try_from(id).ok().filter(|&id| id != NO_UV)
+}
+
+/// Writes `v x y z [r g b]` and `f` lines, in the shortest digits that read back as the same number.
+fn write(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+) -> std::io::Result<()> {
+    write_blocks(out, mesh.vertices().iter().enumerate(), |block, (i, p)| {
+        push(block, format_args!("v {:?} {:?} {:?}", p.x, p.y, p.z));
+        if let Some(colors) = attributes.colors {
+            let [r, g, b, _] = colors[i].map(|c| f32::from(c) / 255.0);
+            push(block, format_args!(" {r} {g} {b}"));
+        }
+        block.push(b'\n');
+    })?;
+    write_blocks(out, mesh.faces(), |block, face| {
+        let [a, b, c] = face.map(|id| u64::from(id) + 1);
+        push(block, format_args!("f {a} {b} {c}\n"));
+    })
 }

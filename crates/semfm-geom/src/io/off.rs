@@ -4,16 +4,42 @@
 //! for `N`, a colour for `C`, a texture coordinate for `ST`; a face row is its corner count, the
 //! corners and an optional colour. A `#` hides the rest of its line. The edge count may be missing.
 
+use std::io::Write;
+
 use super::appearance::{Appearance, rgba_from_floats};
+use super::blocks::{push, write_blocks};
+use super::format_row::{FormatRow, FormatWriter, MeshParts};
 use super::input::{Input, quote};
 use super::polygon::{NO_UV, Polygons, Triangles};
 use super::text::{Lines, Words, number};
-use super::{MeshParts, PointCloud};
-use crate::Result;
+use super::{PointCloud, VertexAttributes};
 use crate::math::DVec3;
+use crate::{Error, Mesh, Result};
+
+/// The row of the table of formats.
+pub(super) const FORMAT: FormatRow = FormatRow {
+    name: "off",
+    extensions: &["off"],
+    summary: "Geomview's Object File Format",
+    recognise,
+    read,
+    read_points: Some(read_points),
+    writer: Some(FormatWriter {
+        write,
+        holds_colors: true,
+        holds_scalars: false,
+        is_single_precision: false,
+    }),
+};
+
+/// Whether the first word is `OFF` with any prefix.
+fn recognise(bytes: &[u8]) -> bool {
+    let mut words = bytes.trim_ascii_start().split(|b| !b.is_ascii_uppercase());
+    words.next().is_some_and(|word| word.ends_with(b"OFF"))
+}
 
 /// Reads an ascii OFF file.
-pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
+fn read(input: Input<'_>) -> Result<MeshParts> {
     let mut reader = Reader::open(input)?;
     let vertices = reader.vertices()?;
     let polygons = reader.polygons()?;
@@ -24,7 +50,7 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
 }
 
 /// Reads the vertices alone.
-pub(crate) fn read_points(input: Input<'_>) -> Result<PointCloud> {
+fn read_points(input: Input<'_>) -> Result<PointCloud> {
     let mut reader = Reader::open(input)?;
     let points = reader.vertices()?;
     Ok(PointCloud { points, colors: reader.vertex_colors() })
@@ -46,24 +72,15 @@ impl<'a> Reader<'a> {
     fn open(input: Input<'a>) -> Result<Self> {
         let mut words = Words::new(input, Lines::new(input)?, true);
         let header = words.peek_line().unwrap_or_default();
-        let header_error = || {
-            let found = if header.is_empty() { "an empty file".into() } else { quote(header) };
-            input.error("header", "OFF, with or without ST, C or N before it, in ascii", found)
-        };
         let mut rest = header;
-        let mut has = |prefix: &[u8]| match rest.strip_prefix(prefix) {
-            Some(tail) => {
-                rest = tail;
-                true
-            }
-            None => false,
-        };
-        let (has_uvs, has_colors, has_normals) = (has(b"ST"), has(b"C"), has(b"N"));
+        let [has_uvs, has_colors, has_normals, keyword] =
+            [&b"ST"[..], b"C", b"N", b"OFF"].map(|prefix| take_prefix(&mut rest, prefix));
         // The counts may be glued to the keyword, as in a well-known data set.
-        let keyword = has(b"OFF");
         let sound = rest.first().is_none_or(|b| b.is_ascii_whitespace() || b.is_ascii_digit());
         if !keyword || !sound || rest.trim_ascii_start().starts_with(b"BINARY") {
-            return Err(header_error());
+            let found = if header.is_empty() { "an empty file".into() } else { quote(header) };
+            let expected = "OFF, with or without ST, C or N before it, in ascii";
+            return Err(input.error("header", expected, found));
         }
         let n_skipped = header.len() - rest.len();
         words.skip_bytes(n_skipped);
@@ -124,16 +141,14 @@ impl<'a> Reader<'a> {
     /// Colour of three or four numbers, then the texture coordinate: what the prefix announced.
     fn extras_of_vertex(&mut self, extras: &[f32]) -> Result<()> {
         let n_uv = if self.has_uvs { 2 } else { 0 };
-        let missing = |reader: &Self, what: &str| {
-            reader.input.error(reader.words.place(), what, format!("{} numbers", extras.len()))
-        };
         if extras.len() < n_uv {
-            return Err(missing(self, "a texture coordinate at the end of the row"));
+            let expected = "a texture coordinate at the end of the row";
+            return Err(self.too_few_numbers(expected, extras.len()));
         }
         let (color, uv) = extras.split_at(extras.len() - n_uv);
         if self.has_colors {
             let &[r, g, b, ..] = color else {
-                return Err(missing(self, "a colour of 3 or 4 numbers"));
+                return Err(self.too_few_numbers("a colour of 3 or 4 numbers", extras.len()));
             };
             self.colors.push([r, g, b, color.get(3).copied().unwrap_or(f32::NAN)]);
         }
@@ -141,6 +156,10 @@ impl<'a> Reader<'a> {
             self.uvs.push([uv[0], 1.0 - uv[1]]);
         }
         Ok(())
+    }
+
+    fn too_few_numbers(&self, expected: &str, n_found: usize) -> Error {
+        self.input.error(self.words.place(), expected, format!("{n_found} numbers"))
     }
 
     fn polygons(&mut self) -> Result<Polygons> {
@@ -175,12 +194,40 @@ impl<'a> Reader<'a> {
     /// Colours as bytes: the format says 0..1, many files have 0..255, and a value above 1 tells.
     fn vertex_colors(&self) -> Option<Vec<[u8; 4]>> {
         let scale = if self.colors.iter().flatten().any(|&x| x > 1.0) { 1.0 / 255.0 } else { 1.0 };
-        let bytes = |color: &[f32; 4]| rgba_from_floats(color.map(|x| x * scale));
-        (!self.colors.is_empty()).then(|| self.colors.iter().map(bytes).collect())
+        let colors = self.colors.iter().map(|color| rgba_from_floats(color.map(|x| x * scale)));
+        (!self.colors.is_empty()).then(|| colors.collect())
     }
+}
+
+/// Whether `rest` starts with `prefix`, which is then taken off.
+fn take_prefix(rest: &mut &[u8], prefix: &[u8]) -> bool {
+    let tail = rest.strip_prefix(prefix);
+    *rest = tail.unwrap_or(*rest);
+    tail.is_some()
 }
 
 fn count(input: Input<'_>, words: &mut Words<'_>, what: &str) -> Result<usize> {
     let given = words.integer(what)?;
     usize::try_from(given).map_err(|_| input.error(words.place(), what, given.to_string()))
+}
+
+/// Writes OFF, or COFF with colours in 0..255, which is what other readers understand.
+fn write(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+) -> std::io::Result<()> {
+    let keyword = if attributes.colors.is_some() { "COFF" } else { "OFF" };
+    writeln!(out, "{keyword}\n{} {} 0", mesh.n_vertices(), mesh.n_faces())?;
+    write_blocks(out, mesh.vertices().iter().enumerate(), |block, (i, p)| {
+        push(block, format_args!("{:?} {:?} {:?}", p.x, p.y, p.z));
+        if let Some(colors) = attributes.colors {
+            let [r, g, b, a] = colors[i];
+            push(block, format_args!(" {r} {g} {b} {a}"));
+        }
+        block.push(b'\n');
+    })?;
+    write_blocks(out, mesh.faces(), |block, [a, b, c]| {
+        push(block, format_args!("3 {a} {b} {c}\n"));
+    })
 }

@@ -1,14 +1,14 @@
 //! PCD, the point-cloud files of PCL: ascii, binary and compressed.
 //!
 //! Format: R. B. Rusu et al., *The PCD (Point Cloud Data) file format*, version .7. Fields other
-//! than `x`, `y`, `z` and `rgb`/`rgba` are walked over. PCL marks a pixel without a return by NaN
+//! than `x`, `y`, `z` and `rgb`/`rgba` are skipped. PCL marks a pixel without a return by NaN
 //! coordinates; such rows are no points and are left out, while an infinite one is refused.
 
 use super::PointCloud;
 use super::input::{Input, quote};
 use super::text::{Line, Lines, number};
-use crate::Result;
 use crate::math::DVec3;
+use crate::{Error, Result};
 
 /// Whether the file is a PCD, by its extension or by its first line.
 pub(crate) fn is_pcd(input: Input<'_>) -> bool {
@@ -98,10 +98,9 @@ impl<'a> Header<'a> {
                 _ => return Err(input.error(line.place(), "a line of a PCD header", quote(key))),
             }
         };
-        let missing = |what: &str| input.error("header", format!("a line {what}"), "none");
-        let (line, names) = names.ok_or_else(|| missing("FIELDS"))?;
-        let sizes = sizes.ok_or_else(|| missing("SIZE"))?;
-        let kinds = kinds.ok_or_else(|| missing("TYPE"))?;
+        let (line, names) = names.ok_or_else(|| missing_line(input, "FIELDS"))?;
+        let sizes = sizes.ok_or_else(|| missing_line(input, "SIZE"))?;
+        let kinds = kinds.ok_or_else(|| missing_line(input, "TYPE"))?;
         let counts = counts.unwrap_or_else(|| vec![1; names.len()]);
         for (what, found) in [("SIZE", sizes.len()), ("TYPE", kinds.len()), ("COUNT", counts.len())]
         {
@@ -111,17 +110,18 @@ impl<'a> Header<'a> {
             }
         }
         let grid = width.zip(height).and_then(|(w, h)| w.checked_mul(h));
-        let n_points = n_points.or(grid).ok_or_else(|| missing("POINTS"))?;
+        let n_points = n_points.or(grid).ok_or_else(|| missing_line(input, "POINTS"))?;
         if grid.is_some_and(|grid| grid != n_points) {
             let expected = format!("{n_points}, the number of POINTS");
             return Err(input.error("header, WIDTH × HEIGHT", expected, format!("{grid:?}")));
         }
         let fields = fields(input, line, &names, &sizes, &kinds, &counts)?;
-        let place = |name: &str| fields.iter().position(|f| f.name == name && f.count == 1);
-        let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(place) else {
+        let [x, y, z, rgb, rgba] = ["x", "y", "z", "rgb", "rgba"]
+            .map(|name| fields.iter().position(|f| f.name == name && f.count == 1));
+        let (Some(x), Some(y), Some(z)) = (x, y, z) else {
             return Err(input.error(format!("line {line}"), "fields x, y and z", "other ones"));
         };
-        let rgb = place("rgb").or_else(|| place("rgba")).filter(|&f| fields[f].size == 4);
+        let rgb = rgb.or(rgba).filter(|&f| fields[f].size == 4);
         Ok(Self { xyz: [x, y, z], rgb, n_points, data, body: lines, fields })
     }
 
@@ -146,14 +146,18 @@ impl<'a> Header<'a> {
                 };
                 return Err(input.error(line.place(), expected, quote(line.text)));
             }
-            let value = |field: usize| {
-                let word = words[self.fields[field].column];
-                number(word).ok_or_else(|| input.error(line.place(), "a number", quote(word)))
+            let mut xyz = [0.0; 3];
+            for (value, field) in xyz.iter_mut().zip(self.xyz) {
+                *value = number_of(input, line, words[self.fields[field].column])?;
+            }
+            let color = match self.rgb {
+                Some(field) => {
+                    let value = number_of(input, line, words[self.fields[field].column])?;
+                    Some(self.color_from_text(field, value))
+                }
+                None => None,
             };
-            let [x, y, z] = self.xyz;
-            let point = DVec3::new(value(x)?, value(y)?, value(z)?);
-            let color = self.rgb.map(|field| Ok(self.color_from_text(field, value(field)?)));
-            rows.push(Row { point, color: color.transpose()? });
+            rows.push(Row { point: DVec3::from_array(xyz), color });
         }
         self.count(input, rows.len())?;
         Ok(rows)
@@ -172,47 +176,40 @@ impl<'a> Header<'a> {
         if held < self.n_points {
             self.count(input, held)?;
         }
-        let at = |row: usize, field: &Field| start + row * self.row_bytes() + field.offset;
-        Ok(self.rows_at(input.bytes, at))
+        let row_bytes = self.row_bytes();
+        Ok(self.rows_at(input.bytes, |row, field| start + row * row_bytes + field.offset))
     }
 
     /// Compressed files hold the fields one after the other (structure of arrays), packed by LZF.
     fn compressed_rows(&self, input: Input<'_>) -> Result<Vec<Row>> {
         let start = self.body.offset();
-        let size_at = |offset: usize| {
-            let bytes = input.bytes.get(start + offset..start + offset + 4)?;
-            Some(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize)
-        };
-        let place = || format!("byte {start}");
-        let (Some(packed), Some(unpacked)) = (size_at(0), size_at(4)) else {
-            return Err(input.error(place(), "two sizes of 4 bytes", input.left_after(start)));
+        let place = format!("byte {start}");
+        let (Some(packed), Some(unpacked)) =
+            (size_at(input.bytes, start), size_at(input.bytes, start + 4))
+        else {
+            return Err(input.error(place, "two sizes of 4 bytes", input.left_after(start)));
         };
         let wanted = self.n_points.checked_mul(self.row_bytes());
         if wanted != Some(unpacked) {
             let expected = format!("{} points of {} bytes", self.n_points, self.row_bytes());
-            return Err(input.error(place(), expected, format!("{unpacked} bytes unpacked")));
+            return Err(input.error(place, expected, format!("{unpacked} bytes unpacked")));
         }
         let Some(body) = input.bytes.get(start + 8..).and_then(|rest| rest.get(..packed)) else {
-            return Err(input.error(
-                place(),
-                format!("{packed} bytes"),
-                input.left_after(start + 8),
-            ));
+            return Err(input.error(place, format!("{packed} bytes"), input.left_after(start + 8)));
         };
         // LZF gains at most 264 bytes from three: a larger claim is refused before memory is asked.
         if unpacked > 88 * packed + 264 {
             return Err(input.error(
-                place(),
+                place,
                 "a size that LZF can reach",
                 format!("{unpacked} bytes out of {packed}"),
             ));
         }
         let bytes = unpack_lzf(body, unpacked)
-            .ok_or_else(|| input.error(place(), "LZF data", "a broken stream"))?;
-        let at = |row: usize, field: &Field| {
+            .ok_or_else(|| input.error(place, "LZF data", "a broken stream"))?;
+        Ok(self.rows_at(&bytes, |row, field| {
             self.n_points * field.offset + row * field.size * field.count
-        };
-        Ok(self.rows_at(&bytes, at))
+        }))
     }
 
     fn rows_at(&self, bytes: &[u8], at: impl Fn(usize, &Field) -> usize) -> Vec<Row> {
@@ -275,11 +272,26 @@ fn data(input: Input<'_>, line: Line<'_>, words: &[&[u8]]) -> Result<Data> {
 }
 
 fn whole_numbers(input: Input<'_>, line: Line<'_>, words: &[&[u8]]) -> Result<Vec<usize>> {
-    let parse = |word: &&[u8]| {
+    let mut numbers = Vec::with_capacity(words.len());
+    for word in words {
         let value = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-        value.ok_or_else(|| input.error(line.place(), "whole numbers", quote(word)))
-    };
-    words.iter().map(parse).collect()
+        numbers.push(value.ok_or_else(|| input.error(line.place(), "whole numbers", quote(word)))?);
+    }
+    Ok(numbers)
+}
+
+fn missing_line(input: Input<'_>, keyword: &str) -> Error {
+    input.error("header", format!("a line {keyword}"), "none")
+}
+
+fn number_of(input: Input<'_>, line: Line<'_>, word: &[u8]) -> Result<f64> {
+    number(word).ok_or_else(|| input.error(line.place(), "a number", quote(word)))
+}
+
+/// The size that stands at `offset`; `None` beyond the end.
+fn size_at(bytes: &[u8], offset: usize) -> Option<usize> {
+    let bytes = bytes.get(offset..offset + 4)?;
+    Some(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize)
 }
 
 fn fields(

@@ -4,7 +4,7 @@ use super::appearance::MISSING_UV;
 use crate::math::{DVec2, DVec3};
 
 /// Above this many corners a polygon is fanned even if it is concave: ear clipping takes quadratic
-/// time, and at 256 a hostile file of nothing but such polygons costs as much as its parsing.
+/// time, and at 256 a malicious file of nothing but such polygons costs as much as its parsing.
 const MAX_EAR_CORNERS: usize = 256;
 
 /// A corner that turns the wrong way by less than this share of the polygon's area counts as
@@ -70,7 +70,6 @@ impl Polygons {
         let uv_ids = if self.uvs_by_vertex { &self.ids } else { &self.uv_ids };
         let mut faces = Vec::with_capacity(n_triangles);
         let mut corner_uvs = Vec::with_capacity(if uv_ids.is_empty() { 0 } else { n_triangles });
-        let uv_of = |id: u32| uvs.get(id as usize).copied().unwrap_or(MISSING_UV);
         let mut cutter = EarCutter::default();
         let mut start = 0;
         for &end in &self.ends {
@@ -78,7 +77,10 @@ impl Polygons {
             let mut push = |corners: [u32; 3]| {
                 faces.push(corners.map(|i| ids[i as usize]));
                 if !uv_ids.is_empty() {
-                    corner_uvs.push(corners.map(|i| uv_of(uv_ids[start + i as usize])));
+                    corner_uvs.push(corners.map(|i| {
+                        let id = uv_ids[start + i as usize];
+                        uvs.get(id as usize).copied().unwrap_or(MISSING_UV)
+                    }));
                 }
             };
             match cutter.cut(ids, vertices) {
@@ -134,8 +136,10 @@ impl EarCutter {
     fn flatten_if_concave(&mut self) -> bool {
         let corners = &self.corners;
         let origin = corners[0];
-        let next = |i: usize| corners[(i + 1) % corners.len()] - origin;
-        let normal: DVec3 = (0..corners.len()).map(|i| (corners[i] - origin).cross(next(i))).sum();
+        // Newell: Σ pᵢ × pᵢ₊₁, which is twice the area along the normal.
+        let normal: DVec3 = (0..corners.len())
+            .map(|i| (corners[i] - origin).cross(corners[(i + 1) % corners.len()] - origin))
+            .sum();
         let double_area = normal.length();
         let Some(normal) = normal.try_normalize() else { return false };
         let (x, y) = normal.any_orthonormal_pair();

@@ -4,21 +4,40 @@
 //! appearance; nearby corners are kept apart. All solids of an ascii file are read.
 
 use std::collections::HashMap;
+use std::io::Write;
 
-use super::MeshParts;
+use super::VertexAttributes;
 use super::appearance::Appearance;
+use super::blocks::write_blocks;
+use super::format_row::{FormatRow, FormatWriter, MeshParts};
 use super::input::Input;
 use super::text::{Lines, Words};
-use crate::Result;
 use crate::math::DVec3;
+use crate::{Mesh, Result};
 
 /// Bytes before the triangles of a binary file: 80 of anything, then their number.
 const HEADER: usize = 84;
 /// Bytes of a binary triangle: normal, three corners, two bytes of anything.
 const TRIANGLE: usize = 50;
 
+/// The row of the table of formats.
+pub(super) const FORMAT: FormatRow = FormatRow {
+    name: "stl",
+    extensions: &["stl"],
+    summary: "stereolithography, ascii or binary",
+    recognise: |bytes| bytes.trim_ascii_start().starts_with(b"solid"),
+    read,
+    read_points: None,
+    writer: Some(FormatWriter {
+        write,
+        holds_colors: false,
+        holds_scalars: false,
+        is_single_precision: true,
+    }),
+};
+
 /// Reads an STL file of either kind.
-pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
+fn read(input: Input<'_>) -> Result<MeshParts> {
     let mut soup = Soup::default();
     if is_ascii(input.bytes) {
         read_ascii(input, &mut soup)?
@@ -37,8 +56,8 @@ fn is_ascii(bytes: &[u8]) -> bool {
     let start = bytes.trim_ascii_start();
     let solid = start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     let binary_length = n_binary(bytes).and_then(|n| n.checked_mul(TRIANGLE)?.checked_add(HEADER));
-    let text = |b: &u8| *b >= b' ' || b.is_ascii_whitespace();
-    solid && binary_length != Some(bytes.len()) && bytes.iter().take(LOOK_AT).all(text)
+    let is_text = bytes.iter().take(LOOK_AT).all(|b| *b >= b' ' || b.is_ascii_whitespace());
+    solid && binary_length != Some(bytes.len()) && is_text
 }
 
 /// The number of triangles in the header of a binary file.
@@ -54,20 +73,17 @@ fn read_binary(input: Input<'_>, soup: &mut Soup) -> Result<()> {
     let body = &input.bytes[HEADER..];
     let n_present = body.len() / TRIANGLE;
     if n_present < n_triangles {
-        let found = format!("room for {n_present}");
+        let found = format!("bytes for {n_present}");
         return Err(input.error("byte 80", format!("{n_triangles} triangles"), found));
     }
     soup.faces.reserve_exact(n_triangles);
     for triangle in body.chunks_exact(TRIANGLE).take(n_triangles) {
-        let value = |at: usize| {
-            f64::from(f32::from_le_bytes([
-                triangle[at],
-                triangle[at + 1],
-                triangle[at + 2],
-                triangle[at + 3],
-            ]))
-        };
-        soup.add([12, 24, 36].map(|at| DVec3::new(value(at), value(at + 4), value(at + 8))));
+        // The normal's three numbers come first.
+        let (numbers, _) = triangle[12..48].as_chunks::<4>();
+        soup.add([0, 3, 6].map(|first| {
+            let [x, y, z] = [0, 1, 2].map(|k| f64::from(f32::from_le_bytes(numbers[first + k])));
+            DVec3::new(x, y, z)
+        }));
     }
     Ok(())
 }
@@ -103,8 +119,9 @@ fn read_facet(words: &mut Words<'_>, soup: &mut Soup) -> Result<bool> {
     for corner in &mut corners {
         let word = words.next_word().unwrap_or_default();
         expect(words, word, "vertex")?;
-        let mut value = || words.number("a vertex coordinate");
-        *corner = DVec3::new(value()?, value()?, value()?);
+        for axis in 0..3 {
+            corner[axis] = words.number("a vertex coordinate")?;
+        }
     }
     for keyword in ["endloop", "endfacet"] {
         let word = words.next_word().unwrap_or_default();
@@ -141,6 +158,22 @@ impl Soup {
         });
         self.faces.push(face);
     }
+}
+
+/// Writes binary STL.
+fn write(out: &mut dyn Write, mesh: &Mesh, _: &VertexAttributes<'_>) -> std::io::Result<()> {
+    // Anything but the word `solid`, which would look like an ascii file.
+    let mut header = [b' '; 80];
+    header[..15].copy_from_slice(b"binary STL mesh");
+    out.write_all(&header)?;
+    out.write_all(&(mesh.n_faces() as u32).to_le_bytes())?;
+    write_blocks(out, 0..mesh.n_faces(), |block, face| {
+        let normal = mesh.face_normal_scaled(face).normalize_or_zero();
+        for p in std::iter::once(normal).chain(mesh.corners(face)) {
+            block.extend(p.as_vec3().to_array().iter().flat_map(|x| x.to_le_bytes()));
+        }
+        block.extend([0, 0]);
+    })
 }
 
 #[cfg(test)]

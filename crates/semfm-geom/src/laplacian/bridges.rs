@@ -5,13 +5,17 @@
 //! one of these into slowly varying functions of the whole object.
 
 use faer::sparse::SparseColMat;
+use serde::Serialize;
 
-use super::foreign::{ForeignIndex, Link};
+use super::assembly::WeightedEdge;
+use super::labelled_tree::{LabelledTree, Link};
 use super::{Laplacian, assembly};
+use crate::connectivity::Components;
+use crate::disjoint_sets::DisjointSets;
 use crate::{Error, Mesh, Result};
 
 /// How pieces are joined.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BridgeSettings {
     /// Stiffness of a bridge. 0.5 is near that of an edge between equilateral triangles (0.58).
     pub weight: f64,
@@ -70,7 +74,7 @@ pub fn bridge(
             });
         }
     }
-    let (labels, n_components) = components(n, &laplacian.stiffness);
+    let Components { of_vertex: labels, count: n_components } = components(n, &laplacian.stiffness);
     if n_components == 1 {
         return Ok(BridgedLaplacian {
             laplacian: laplacian.clone(),
@@ -83,8 +87,10 @@ pub fn bridge(
     bridges.dedup();
 
     let upper = laplacian.stiffness.triplet_iter().filter(|t| t.row < t.col);
-    let mut edges: Vec<_> = upper.map(|t| (t.row as u32, t.col as u32, -*t.val)).collect();
-    edges.extend(bridges.iter().map(|&[i, j]| (i, j, settings.weight)));
+    let mut edges: Vec<WeightedEdge> = upper
+        .map(|t| WeightedEdge { ends: [t.row as u32, t.col as u32], weight: -*t.val })
+        .collect();
+    edges.extend(bridges.iter().map(|&ends| WeightedEdge { ends, weight: settings.weight }));
     let stiffness = assembly::stiffness(n, &edges);
     let joined = Laplacian { stiffness, mass: laplacian.mass.clone() };
     Ok(BridgedLaplacian { laplacian: joined, n_components, bridges })
@@ -93,34 +99,30 @@ pub fn bridge(
 /// The bridges: first all short ones, then the shortest links until one piece is left.
 fn links(mesh: &Mesh, labels: Vec<u32>, reach: f64) -> Vec<[u32; 2]> {
     let points = mesh.vertices();
-    let mut index = ForeignIndex::new(points, &labels);
+    let mut index = LabelledTree::new(points, &labels);
     let mut groups = Groups::new(labels);
-    let limit = |distance_squared| Link { distance_squared, from: u32::MAX, to: u32::MAX };
-    let is_link = |link: &Link| link.to != u32::MAX;
-
-    let nearest = |index: &ForeignIndex, labels: &[u32], i: usize, best: Link| {
-        index.nearest(i as u32, points[i], labels[i], best)
-    };
+    let short = Link::limit(reach * reach);
     let mut chosen: Vec<Link> = (0..points.len())
-        .map(|i| nearest(&index, &groups.labels, i, limit(reach * reach)))
-        .filter(is_link)
+        .map(|i| index.nearest(i as u32, points[i], groups.labels[i], short))
+        .filter(Link::is_found)
         .collect();
     let mut bridges = chosen.clone();
     loop {
         chosen.iter().for_each(|link| groups.join(link));
         groups.refresh();
         if groups.is_one() {
-            return bridges.iter().map(|l| [l.from.min(l.to), l.from.max(l.to)]).collect();
+            return bridges.iter().map(Link::ends).collect();
         }
         // One round of Borůvka: each group's own shortest link. Asking with the group's best so
         // far as the limit lets most vertices stop at the root.
         index.relabel(&groups.labels);
-        let mut best = vec![limit(f64::INFINITY); groups.n_labels()];
+        let mut best = vec![Link::limit(f64::INFINITY); groups.n_labels];
         for i in 0..points.len() {
-            let label = groups.labels[i] as usize;
-            best[label] = nearest(&index, &groups.labels, i, best[label]);
+            let label = groups.labels[i];
+            let best = &mut best[label as usize];
+            *best = index.nearest(i as u32, points[i], label, *best);
         }
-        chosen = best.into_iter().filter(is_link).collect();
+        chosen = best.into_iter().filter(Link::is_found).collect();
         bridges.extend(&chosen);
     }
 }
@@ -129,28 +131,25 @@ fn links(mesh: &Mesh, labels: Vec<u32>, reach: f64) -> Vec<[u32; 2]> {
 struct Groups {
     /// Label of each vertex, as of the last refresh.
     labels: Vec<u32>,
-    parent: Vec<u32>,
+    /// Of the labels; the smallest stays, whatever the order of the links.
+    sets: DisjointSets,
+    n_labels: usize,
 }
 
 impl Groups {
     fn new(labels: Vec<u32>) -> Self {
-        let n_labels = labels.iter().max().map_or(0, |&label| label + 1);
-        Self { labels, parent: (0..n_labels).collect() }
-    }
-
-    fn n_labels(&self) -> usize {
-        self.parent.len()
+        let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
+        Self { labels, sets: DisjointSets::new(n_labels), n_labels }
     }
 
     fn join(&mut self, link: &Link) {
-        let [a, b] = [link.from, link.to].map(|i| find(&mut self.parent, self.labels[i as usize]));
-        // The smaller label stays, whatever the order of the links.
-        self.parent[a.max(b) as usize] = a.min(b);
+        let [a, b] = [link.from, link.to].map(|i| self.labels[i as usize]);
+        self.sets.join(a, b);
     }
 
     fn refresh(&mut self) {
         for label in &mut self.labels {
-            *label = find(&mut self.parent, *label);
+            *label = self.sets.root(*label);
         }
     }
 
@@ -159,27 +158,16 @@ impl Groups {
     }
 }
 
-/// Root of `i`, halving the path to it.
-fn find(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
-}
-
-/// Labels of the connected pieces of a stiffness matrix (n), numbered by their first vertex, and
-/// how many there are.
-pub(crate) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> (Vec<u32>, usize) {
-    let mut parent: Vec<u32> = (0..n as u32).collect();
+/// The connected pieces of a stiffness matrix (n × n), numbered by their first vertex.
+pub(crate) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> Components {
+    let mut sets = DisjointSets::new(n);
     for t in stiffness.triplet_iter().filter(|t| t.row < t.col && *t.val != 0.0) {
-        let [a, b] = [t.row, t.col].map(|i| find(&mut parent, i as u32));
-        parent[a.max(b) as usize] = a.min(b);
+        sets.join(t.row as u32, t.col as u32);
     }
     let mut labels = vec![0; n];
     let mut count = 0;
     for i in 0..n {
-        let root = find(&mut parent, i as u32) as usize;
+        let root = sets.root(i as u32) as usize;
         if root == i {
             labels[i] = count;
             count += 1;
@@ -187,7 +175,7 @@ pub(crate) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> (Vec
             labels[i] = labels[root];
         }
     }
-    (labels, count as usize)
+    Components { of_vertex: labels, count: count as usize }
 }
 
 /// Median length of the triangles' edges, counted once per triangle.
@@ -210,12 +198,12 @@ mod tests {
     use crate::zoo;
 
     #[test]
-    fn afterwards_every_animal_is_in_one_piece() {
+    fn afterwards_every_mesh_of_the_zoo_is_in_one_piece() {
         for (name, mesh) in zoo::all() {
             let before = laplacian(&mesh, LaplacianKind::Tufted).unwrap();
             let bridged = bridge(&before, &mesh, &BridgeSettings::default()).unwrap();
             let n = mesh.n_vertices();
-            assert_eq!(components(n, &bridged.laplacian.stiffness).1, 1, "{name}");
+            assert_eq!(components(n, &bridged.laplacian.stiffness).count, 1, "{name}");
             assert!(bridged.bridges.len() + 1 >= bridged.n_components, "{name}");
             assert_eq!(bridged.bridges.is_empty(), bridged.n_components == 1, "{name}");
             let sums =

@@ -1,5 +1,6 @@
 //! The cotangent Laplacian (Pinkall & Polthier 1993; Meyer et al. 2003).
 
+use super::assembly::WeightedEdge;
 use super::{Laplacian, assembly, fill_empty_masses};
 use crate::{Error, Mesh, Result};
 
@@ -24,7 +25,7 @@ pub fn cotan_laplacian(mesh: &Mesh) -> Result<Laplacian> {
             let (to_i, to_j) =
                 (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
             let weight = 0.5 * to_i.dot(to_j) / double_area;
-            edges.push((ids[(k + 1) % 3], ids[(k + 2) % 3], weight));
+            edges.push(WeightedEdge { ends: [ids[(k + 1) % 3], ids[(k + 2) % 3]], weight });
         }
     }
     let mut mass = mesh.vertex_areas();

@@ -51,6 +51,18 @@ struct Corner {
     sine: f64,
 }
 
+impl Corner {
+    /// cot θ; 0 in a triangle without area.
+    fn cotangent(self) -> f64 {
+        if self.sine > 0.0 { self.cosine / self.sine } else { 0.0 }
+    }
+}
+
+/// Where the half-edge of `slot` goes by a list of (from, to); itself where it is not in it.
+fn moved(slot: usize, turn: &[(usize, usize)]) -> usize {
+    turn.iter().find(|(from, _)| *from == slot).map_or(slot, |(_, to)| *to)
+}
+
 impl IntrinsicTriangulation {
     /// Number of triangles m.
     pub fn n_triangles(&self) -> usize {
@@ -119,11 +131,8 @@ impl IntrinsicTriangulation {
         }
         // Lay both triangles out along the edge: their apexes are the ends of the new edge.
         let length = self.length[h];
-        let square = |h: usize| self.length[h] * self.length[h];
-        let along =
-            |from_tail: f64, from_tip: f64| (square(h) + from_tail - from_tip) / (2.0 * length);
-        let above = along(square(previous(h)), square(next(h)));
-        let below = along(square(next(other)), square(previous(other)));
+        let above = self.apex_along(h, previous(h), next(h));
+        let below = self.apex_along(h, next(other), previous(other));
         let height = (near.sine + far.sine) / (2.0 * length);
         let flipped = (above - below).hypot(height);
         if !(flipped.is_finite() && flipped > 0.0) {
@@ -131,6 +140,13 @@ impl IntrinsicTriangulation {
         }
         self.flip(h, flipped);
         true
+    }
+
+    /// How far along edge `h` the apex of a triangle on it lies, seen from the tail:
+    /// (ℓ² + p² − q²) / 2ℓ, with p its side at the tail and q its side at the tip.
+    fn apex_along(&self, h: usize, side_at_tail: usize, side_at_tip: usize) -> f64 {
+        let [length, p, q] = [h, side_at_tail, side_at_tip].map(|side| self.length[side]);
+        (length * length + p * p - q * q) / (2.0 * length)
     }
 
     /// Replaces the diagonal a→b of the quadrilateral a d b c by d→c.
@@ -145,15 +161,9 @@ impl IntrinsicTriangulation {
         let (c, d) = (self.tail[ca], self.tail[db]);
         let (a, b) = (self.tail[h], self.tail[other]);
         // The sides turn by one slot: h's triangle becomes d→c, c→a, a→d, the other c→d, d→b, b→c.
-        let moved = |slot: usize| match slot {
-            s if s == ca => bc,
-            s if s == ad => ca,
-            s if s == db => ad,
-            s if s == bc => db,
-            s => s,
-        };
-        let sides =
-            [bc, ca, ad, db].map(|s| (moved(s), moved(self.twin[s] as usize), self.length[s]));
+        let turn = [(ca, bc), (ad, ca), (db, ad), (bc, db)];
+        let sides = [bc, ca, ad, db]
+            .map(|s| (moved(s, &turn), moved(self.twin[s] as usize, &turn), self.length[s]));
         for (slot, twin, side_length) in sides {
             self.twin[slot] = twin as u32;
             self.twin[twin] = slot as u32;
@@ -166,15 +176,12 @@ impl IntrinsicTriangulation {
 
     /// The cotangent weight (cot α + cot β) / 2 of every edge; a triangle without area adds none.
     pub fn weighted_edges(&self) -> Vec<WeightedEdge> {
-        let cot = |h: usize| {
-            let corner = self.corner(h);
-            if corner.sine > 0.0 { corner.cosine / corner.sine } else { 0.0 }
-        };
         (0..self.twin.len())
             .filter(|&h| h < self.twin[h] as usize)
             .map(|h| {
                 let other = self.twin[h] as usize;
-                (self.tail[h], self.tail[other], 0.5 * (cot(h) + cot(other)))
+                let weight = 0.5 * (self.corner(h).cotangent() + self.corner(other).cotangent());
+                WeightedEdge { ends: [self.tail[h], self.tail[other]], weight }
             })
             .collect()
     }
@@ -218,7 +225,7 @@ mod tests {
             assert_eq!(kite.tail[twin], kite.tail[next(h)], "glued edges have the same ends");
             assert_eq!(kite.length[twin], kite.length[h]);
         }
-        assert!(kite.weighted_edges().iter().all(|edge| edge.2 >= -DELAUNAY_TOLERANCE));
+        assert!(kite.weighted_edges().iter().all(|edge| edge.weight >= -DELAUNAY_TOLERANCE));
         assert!(kite.length.iter().all(|&length| length < 2.1), "the short diagonal has length 1");
     }
 }

@@ -1,31 +1,31 @@
 //! The Laplace–Beltrami operator of a mesh, as a stiffness matrix and a lumped mass.
 //!
-//! [`laplacian`] is the door: it builds the kind that is asked, by default the intrinsic Delaunay
-//! Laplacian of the *tufted cover* (Sharp & Crane 2020), which holds on open, non-manifold and
+//! [`laplacian`] builds the kind that is asked for, by default the intrinsic Delaunay Laplacian of the *tufted cover* (Sharp & Crane 2020), which holds on open, non-manifold and
 //! sliver-ridden meshes alike. [`point_cloud_laplacian`] does the same without triangles, and
 //! [`bridge`] joins what lies in several pieces.
 //!
-//! The rooms: [`tufted`](self) = cover (glue two copies of every triangle) → mollify → flip to
-//! Delaunay (both in `intrinsic`) → cotangents → `assembly`.
+//! The steps of [`tufted_laplacian`]: glue two copies of every triangle and mollify
+//! (`tufted_cover`) → flip to Delaunay (`intrinsic`) → cotangents → matrix (`assembly`).
 
 mod assembly;
 mod bridges;
-mod cloud;
 mod cotan;
-mod cover;
-mod flat;
-mod foreign;
 mod intrinsic;
-mod star;
+mod labelled_tree;
+mod local_delaunay;
+mod planar_triangle;
+mod point_cloud;
 mod tufted;
+mod tufted_cover;
 
 use faer::sparse::SparseColMat;
+use serde::Serialize;
 
 pub(crate) use bridges::components;
 pub use bridges::{BridgeSettings, BridgedLaplacian, bridge};
-pub use cloud::{CloudSettings, point_cloud_laplacian};
 pub use cotan::cotan_laplacian;
-pub(crate) use flat::{FlatTriangle, flat_laplacian};
+pub(crate) use planar_triangle::{PlanarTriangle, laplacian_and_triangles};
+pub use point_cloud::{CloudSettings, point_cloud_laplacian};
 pub use tufted::{TuftedSettings, tufted_laplacian};
 
 use crate::{Mesh, Result};
@@ -51,7 +51,9 @@ impl Laplacian {
 }
 
 /// Which discretisation of the Laplace–Beltrami operator.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum LaplacianKind {
     /// Intrinsic Delaunay on the tufted cover, mollified ([`tufted_laplacian`]).
     #[default]
@@ -140,7 +142,7 @@ mod tests {
             let laplacian = laplacian(&mesh, LaplacianKind::Tufted).unwrap();
             let n = laplacian.n_vertices();
             let root: Vec<f64> = laplacian.mass.iter().map(|m| m.sqrt()).collect();
-            let pieces = bridges::components(n, &laplacian.stiffness).1;
+            let pieces = bridges::components(n, &laplacian.stiffness).count;
             // Vertices without mass would hide the scale of the spectrum.
             let keep: Vec<usize> =
                 (0..n).filter(|&i| laplacian.mass[i] > 1e-6 * mesh.area() / n as f64).collect();

@@ -1,8 +1,8 @@
 //! The intrinsic Delaunay Laplacian of the tufted cover
 //! (Sharp & Crane 2020, "A Laplacian for Nonmanifold Triangle Meshes").
 
-use super::cover::tufted_cover;
 use super::intrinsic::IntrinsicTriangulation;
+use super::tufted_cover::tufted_cover;
 use super::{Laplacian, assembly, fill_empty_masses};
 use crate::math::DVec3;
 use crate::{Error, Mesh, Result};
@@ -41,12 +41,15 @@ pub(super) fn delaunay_cover(
     mesh: &Mesh,
     settings: &TuftedSettings,
 ) -> Result<IntrinsicTriangulation> {
-    let whole = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
-    if mesh.faces().iter().all(whole) {
+    if mesh.faces().iter().all(names_three_vertices) {
         return delaunay_cover_of_soup(mesh.vertices(), mesh.faces(), settings.mollify_factor);
     }
-    let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().filter(whole).collect();
+    let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().filter(names_three_vertices).collect();
     delaunay_cover_of_soup(mesh.vertices(), &faces, settings.mollify_factor)
+}
+
+fn names_three_vertices(&[a, b, c]: &[u32; 3]) -> bool {
+    a != b && b != c && c != a
 }
 
 /// As [`delaunay_cover`], for triangles that each name three different vertices.
@@ -74,7 +77,7 @@ pub(super) fn laplacian_of_cover(cover: &IntrinsicTriangulation, n: usize) -> Re
     mass.iter_mut().for_each(|m| *m /= 2.0);
     fill_empty_masses(&mut mass);
     let mut edges = cover.weighted_edges();
-    edges.iter_mut().for_each(|edge| edge.2 /= 2.0);
+    edges.iter_mut().for_each(|edge| edge.weight /= 2.0);
     Ok(Laplacian { stiffness: assembly::stiffness(n, &edges), mass })
 }
 

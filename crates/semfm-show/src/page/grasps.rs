@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use parry3d_f64::transformation::try_convex_hull;
+use semfm::geom::io::{FormatError, read_json};
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::{Mesh, Region, Task};
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::group::{Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors};
-use super::json::read_json;
 use super::mesh::file_name;
+use crate::Result;
 use crate::colors::{MARKED, PLAIN, color_bytes, grasp_color};
 use crate::pictures::{N_SHOWN, Viewpoints, WeightedMesh, viewpoints_with_grippers};
-use crate::{Error, Result};
 
 /// The format of the file.
 pub(super) const FORMAT: &str = "semfm.grasps/1";
@@ -22,7 +22,7 @@ pub(super) const FORMAT: &str = "semfm.grasps/1";
 /// the region, where it is known. Nothing where there is no grasp.
 ///
 /// # Errors
-/// [`Error::Format`] for another file or another mesh, [`Error::Semfm`] where it cannot be read or
+/// [`Error::Format`](crate::Error::Format) for another file or another mesh, [`Error::Semfm`](crate::Error::Semfm) where it cannot be read or
 /// drawn.
 pub(super) fn grasps_group(
     path: &Path,
@@ -148,7 +148,7 @@ impl GraspsFile {
             }
             None => return Ok(()),
         };
-        Err(Error::Format { path: path.to_owned(), place: place.into(), expected, found })
+        Err(FormatError::new(path, place, expected, found).into())
     }
 
     fn panel(&self, name: &str, n: usize, mesh: Mesh, viewpoints: Viewpoints) -> Panel {

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use semfm::geom::io::{MeshFile, read_mesh};
+use semfm::geom::io::{FormatError, MeshFile, read_mesh};
 use semfm::region_file::read_region;
 use semfm::{Region, Task};
 
 use super::group::{Fact, Group, Layer, Panel, VertexColors};
-use crate::{Error, Result};
+use crate::Result;
 
 /// Of vertices without a colour.
 pub(super) const GREY: [u8; 3] = [184; 3];
@@ -20,16 +20,14 @@ pub(super) fn file_name(path: &Path) -> String {
 /// The mesh in its own colours.
 ///
 /// # Errors
-/// [`Error::Semfm`] for a file that is no mesh, [`Error::Format`] for a surface that cannot be drawn.
+/// [`Error::Semfm`](crate::Error::Semfm) for a file that is no mesh,
+/// [`Error::Format`](crate::Error::Format) for a surface that cannot be drawn.
 pub(super) fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
     let file = read_mesh(path)?;
     let name = file_name(path);
     let layers = vec![Layer::own_colors(vertex_colors(&file))];
-    let panel = Panel::new(&name, file.mesh, None, task).map_err(|error| Error::Format {
-        path: path.to_owned(),
-        place: "mesh".into(),
-        expected: "a surface that can be drawn".into(),
-        found: error.to_string(),
+    let panel = Panel::new(&name, file.mesh, None, task).map_err(|error| {
+        FormatError::new(path, "mesh", "a surface that can be drawn", error.to_string())
     })?;
     Ok(Group {
         title: name,
@@ -44,7 +42,7 @@ pub(super) fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
 /// Puts a region in front of the other layers of a mesh, and looks at it from where it shows.
 ///
 /// # Errors
-/// [`Error::Semfm`] for a file that is no region of this mesh.
+/// [`Error::Semfm`](crate::Error::Semfm) for a file that is no region of this mesh.
 pub(super) fn add_region(group: &mut Group, path: &Path, task: &Task) -> Result<Region> {
     let panel = &mut group.panels[0];
     let region = read_region(path, &panel.mesh)?;

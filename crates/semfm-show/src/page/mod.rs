@@ -9,7 +9,6 @@ mod document;
 mod encoding;
 mod grasps;
 mod group;
-mod json;
 mod mesh;
 mod paths;
 mod transfer_folder;

@@ -2,20 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::MeshFormat;
+use semfm::geom::io::{FormatError, MeshFormat, read_json};
 use semfm::{Region, Task, region_file};
 use serde_json::Value;
 
 use super::grasps::{self, grasps_group};
 use super::group::Group;
-use super::json::read_json;
 use super::mesh::{add_region, mesh_group};
 use super::transfer_folder::transfer_groups;
 use crate::{Error, Result};
 
 /// What `show` takes, for its messages.
-const EXPECTED: &str = "the folder that `transfer -o` wrote, a mesh (OBJ, PLY, STL, OFF, glTF or GLB), \
-    a region or grasps (JSON) after their mesh, or a views file (MCAP)";
+fn expected() -> String {
+    format!(
+        "the folder that `transfer -o` wrote, a mesh ({}), a region or grasps (JSON) after their \
+         mesh, or a views file (MCAP)",
+        MeshFormat::readable_names()
+    )
+}
 
 /// The groups of all paths: one for each folder of a transfer (and one for its grasps), mesh and views
 /// file; a region file is shown on the mesh before it, a file of grasps beside it.
@@ -71,12 +75,7 @@ fn extension(path: &Path) -> String {
 }
 
 fn unknown(path: &Path, place: &str, found: &str) -> Error {
-    Error::Format {
-        path: path.to_owned(),
-        place: place.into(),
-        expected: EXPECTED.into(),
-        found: found.into(),
-    }
+    FormatError::new(path, place, expected(), found).into()
 }
 
 /// A JSON file that stands where it cannot be shown, with what it is if it says so.
@@ -86,10 +85,8 @@ fn json_alone(path: &Path) -> Error {
             unknown(path, "file", "a region without a mesh before it")
         }
         Ok(Some(format)) => unknown(path, "format", &format!("`{format}`")),
-        Ok(None) | Err(Error::Format { .. }) => {
-            unknown(path, "file", "JSON without a mesh before it")
-        }
-        Err(error) => error,
+        Err(error) if error.code() != "format" => error,
+        Ok(None) | Err(_) => unknown(path, "file", "JSON without a mesh before it"),
     }
 }
 

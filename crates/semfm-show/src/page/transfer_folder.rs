@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use semfm::geom::io::read_mesh;
+use semfm::geom::io::{FormatError, read_json, read_mesh};
 use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use semfm::{Mesh, Region, Task};
 use serde::Deserialize;
@@ -12,10 +12,9 @@ use super::grasps::grasps_group;
 use super::group::{
     Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors, mesh_note,
 };
-use super::json::read_json;
+use crate::Result;
 use crate::colors::anchor_color;
 use crate::pictures::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
-use crate::{Error, Result};
 
 /// Classes of a layer have numbers below 256; so many anchors or places get one of their own.
 const MOST_CLASSES: usize = 200;
@@ -23,7 +22,7 @@ const MOST_CLASSES: usize = 200;
 /// What the files of `folder` say of one transfer, and its grasps, where there are some.
 ///
 /// # Errors
-/// [`Error::Format`] for files that are not of one transfer, [`Error::Semfm`] where one cannot be read
+/// [`Error::Format`](crate::Error::Format) for files that are not of one transfer, [`Error::Semfm`](crate::Error::Semfm) where one cannot be read
 /// or drawn.
 pub(super) fn transfer_groups(folder: &Path, task: &Task) -> Result<Vec<Group>> {
     let files = TransferFolder::read(folder)?;
@@ -151,7 +150,7 @@ fn check_hash(path: &Path, mesh: &Mesh, hash: &str) -> Result<()> {
         return Ok(());
     }
     let expected = format!("the mesh {hash} of point_map.json");
-    Err(Error::Format { path: path.to_owned(), place: "mesh".into(), expected, found })
+    Err(FormatError::new(path, "mesh", expected, found).into())
 }
 
 fn panel(name: &str, mesh: Mesh, viewpoints: Viewpoints) -> Panel {
@@ -199,7 +198,7 @@ fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
             Ok(Some(cloud)) => cloud,
             Ok(None) => return Ok(None),
             // A scene of millions of vertices is beyond the reader: that costs this layer, not the page.
-            Err(Error::Semfm(semfm::Error::Views(semfm::views::Error::Container {
+            Err(crate::Error::Semfm(semfm::Error::Views(semfm::views::Error::Container {
                 fault: Fault::OverLimit,
                 ..
             }))) => return Ok(None),
@@ -250,7 +249,7 @@ impl PointMapFile {
             (None, Some(v)) => ("source_of", format!("ids below {n_source}"), v.to_string()),
             (None, None) => return Ok(()),
         };
-        Err(Error::Format { path: path.to_owned(), place: place.into(), expected, found })
+        Err(FormatError::new(path, place, expected, found).into())
     }
 }
 

@@ -5,22 +5,23 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use semfm::Task;
+use semfm::geom::io::FormatError;
 use semfm::views::View;
 use semfm::views::mcap::{ViewsFile, read_mesh};
 
 use super::group::{Fact, Group, Layer, Panel, Picture};
 use super::mesh::{GREY, file_name};
-use crate::{Error, Result};
+use crate::Result;
 
 /// More pictures make a page that nobody scrolls through.
 const N_SHOWN: usize = 64;
 
 /// # Errors
-/// [`Error::Semfm`] for a damaged file or one of another mesh.
+/// [`Error::Semfm`](crate::Error::Semfm) for a damaged file or one of another mesh.
 pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
     let file = ViewsFile::read(path)?;
     let (mesh, colors) = read_mesh(path)?;
-    file.metadata.mesh.check(&mesh, path)?;
+    file.metadata.check_mesh(&mesh, path)?;
     let colors = colors.unwrap_or_else(|| vec![GREY; mesh.n_vertices()]);
     let shown = file.views.iter().take(N_SHOWN).enumerate();
     let pictures = shown.map(|(i, view)| picture(path, i, view)).collect::<Result<_>>()?;
@@ -49,11 +50,8 @@ fn facts(file: &ViewsFile) -> Vec<Fact> {
 }
 
 fn picture(path: &Path, i: usize, view: &View) -> Result<Picture> {
-    let png = png(view).map_err(|source| Error::Format {
-        path: path.to_owned(),
-        place: format!("view {i:03}"),
-        expected: "a picture".into(),
-        found: source.to_string(),
+    let png = png(view).map_err(|source| {
+        FormatError::new(path, format!("view {i:03}"), "a picture", source.to_string())
     })?;
     let towards_eye = -view.camera.camera_from_world().matrix3.row(2);
     Ok(Picture { name: format!("{i:03}"), png, towards_eye })

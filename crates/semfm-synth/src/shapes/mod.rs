@@ -10,7 +10,7 @@ mod tools;
 use semfm_geom::math::DVec3;
 
 use crate::Category;
-use crate::sdf::{Chain, Field};
+use crate::sdf::{Chain, Field, smooth_min};
 use crate::seed::Draw;
 
 /// Which points of a part belong to the grip.
@@ -62,6 +62,14 @@ pub(crate) struct Blueprint {
     pub kind: &'static str,
     pub parts: Vec<Part>,
     pub blend: f64,
+}
+
+impl Blueprint {
+    /// Signed distance to the smooth union of all parts.
+    pub(crate) fn distance(&self, p: DVec3) -> f64 {
+        let distances = self.parts.iter().map(|part| part.field.at(p).distance);
+        distances.reduce(|a, b| smooth_min(a, b, self.blend)).unwrap_or(f64::INFINITY)
+    }
 }
 
 /// The `instance`-th object of a category (six kinds, in turn) with proportions from `draw`.

@@ -19,9 +19,13 @@ pub(super) fn generate(kind: usize, draw: &mut Draw) -> Blueprint {
     };
     let (wiggle, flatness) = (draw.between(-0.03, 0.03), draw.between(0.3, 0.42));
     let along: Vec<f64> = (0..6).map(|i| f64::from(i) / 5.0).collect();
-    let rise = |t: f64| lift * (1.0 - 1.7 * t).clamp(0.0, 1.0).powf(1.3);
-    let nodes: Vec<_> =
-        along.iter().map(|&t| v(t * length, wiggle * (PI * t).sin(), rise(t) - 0.03)).collect();
+    let nodes: Vec<_> = along
+        .iter()
+        .map(|&t| {
+            let rise = lift * (1.0 - 1.7 * t).clamp(0.0, 1.0).powf(1.3);
+            v(t * length, wiggle * (PI * t).sin(), rise - 0.03)
+        })
+        .collect();
     let radii = [0.8, 0.85, 0.8, 1.0, 1.05, 0.7].map(|r| r * w);
     let mut parts = vec![part("sole", chain(nodes, radii).flat(v(0.0, 0.0, 1.0), flatness))];
     match name {
@@ -83,20 +87,19 @@ fn upper(
         return;
     }
     let (x, r) = (0.2, 1.02 * w);
-    let opening = |bottom: f64| {
-        chain([v(x, 0.0, bottom), v(x + 0.03, 0.0, lift + top + 0.4)], [0.62 * r, 0.66 * r]).field()
-    };
+    // What the foot goes into, from two heights on.
+    let [opening, tongue_opening] = [0.05, 0.06].map(|bottom| {
+        let axis = [v(x, 0.0, lift + bottom), v(x + 0.03, 0.0, lift + top + 0.4)];
+        chain(axis, [0.62 * r, 0.66 * r]).field()
+    });
     let flare = draw.between(0.85, 1.05);
     let shell = chain([v(x, 0.0, lift + 0.02), v(x + 0.02, 0.0, lift + top)], [r, r * flare])
         .field()
-        .minus(opening(lift + 0.05))
+        .minus(opening)
         .below(v(x, 0.0, lift + top), v(0.1, 0.0, 1.0));
     parts.push(grip("collar", shell, Grip::XBelow(x + 0.02 * draw.between(0.95, 1.15))));
     if name != "heel" {
         let nodes = [v(x + 0.05, 0.0, 0.8 * lift + 0.05), v(0.48 * length, 0.0, 0.1 + 0.3 * lift)];
-        parts.push(part(
-            "tongue",
-            chain(nodes, [0.9 * r, 0.9 * w]).field().minus(opening(lift + 0.06)),
-        ));
+        parts.push(part("tongue", chain(nodes, [0.9 * r, 0.9 * w]).field().minus(tongue_opening)));
     }
 }

@@ -5,6 +5,7 @@ use std::collections::btree_map::Entry;
 use std::path::Path;
 
 use foxglove::Decode;
+use semfm_geom::io::FormatError;
 
 use super::reader::Message;
 use crate::{Error, Result};
@@ -94,7 +95,7 @@ pub(super) fn check_count(path: &Path, topic: &str, expected: usize, found: usiz
 /// The [`Error::Format`] of a message: it names the file, the topic and which message of it.
 pub fn message_error(path: &Path, message: &Message<'_>, expected: &str, found: String) -> Error {
     let place = format!("topic {}, message {}", message.channel.topic, message.index);
-    Error::Format { path: path.to_path_buf(), place, expected: expected.to_owned(), found }
+    FormatError::new(path, place, expected, found).into()
 }
 
 /// An error that names a topic.
@@ -104,10 +105,5 @@ pub(super) fn topic_error(
     expected: &str,
     found: impl Into<String>,
 ) -> Error {
-    Error::Format {
-        path: path.to_path_buf(),
-        place: format!("topic {topic}"),
-        expected: expected.to_owned(),
-        found: found.into(),
-    }
+    FormatError::new(path, format!("topic {topic}"), expected, found).into()
 }

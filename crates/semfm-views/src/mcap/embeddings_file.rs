@@ -116,7 +116,7 @@ impl EmbeddingsFile {
     /// # Errors
     /// [`Error::OtherMesh`], naming both.
     pub fn check_mesh(&self, mesh: &Mesh) -> Result<()> {
-        self.metadata.views.mesh.check(mesh, &self.path)
+        self.metadata.views.check_mesh(mesh, &self.path)
     }
 
     /// Dimension of the embeddings; 0 without views.

@@ -6,10 +6,10 @@
 //! `simulated` (`true`) where no network was asked. Other keys are kept as they are.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
-use semfm_geom::{Mesh, MeshHash};
+use semfm_geom::io::FormatError;
+use semfm_geom::{Mesh, MeshHash, MeshIdentity};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
 
@@ -18,43 +18,6 @@ use crate::{Error, Result};
 
 /// Name of the metadata record in which our files describe themselves.
 pub const METADATA_NAME: &str = "semfm";
-
-/// Which mesh a file was made of, as read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MeshIdentity {
-    /// Hash of positions and triangles.
-    pub hash: MeshHash,
-    /// Number of vertices.
-    pub n_vertices: usize,
-    /// Number of triangles.
-    pub n_triangles: usize,
-}
-
-impl MeshIdentity {
-    /// The identity of a mesh.
-    pub fn of(mesh: &Mesh) -> Self {
-        Self { hash: mesh.hash(), n_vertices: mesh.n_vertices(), n_triangles: mesh.n_faces() }
-    }
-
-    /// Refuses another mesh than this one; `path` is the file that names this one.
-    ///
-    /// # Errors
-    /// [`Error::OtherMesh`], naming both.
-    pub fn check(&self, mesh: &Mesh, path: &Path) -> Result<()> {
-        let found = Self::of(mesh);
-        if *self == found {
-            return Ok(());
-        }
-        let (expected, found) = (self.to_string(), found.to_string());
-        Err(Error::OtherMesh { path: path.to_path_buf(), expected, found })
-    }
-}
-
-impl fmt::Display for MeshIdentity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({} vertices, {} triangles)", self.hash, self.n_vertices, self.n_triangles)
-    }
-}
 
 /// What a file of views says of itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +64,6 @@ const EMBEDDINGS_FORMAT: &str = "semfm.embeddings/1";
 #[derive(Serialize, Deserialize)]
 struct ViewsRecord {
     format: String,
-    #[serde(with = "hash_text")]
     mesh_hash: MeshHash,
     n_vertices: u64,
     n_triangles: u64,
@@ -141,24 +103,6 @@ fn is_false(truth: &bool) -> bool {
     !truth
 }
 
-/// A mesh's hash as its text.
-mod hash_text {
-    use semfm_geom::MeshHash;
-    use serde::de::{Error, Unexpected};
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub fn serialize<S: Serializer>(hash: &MeshHash, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(hash)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<MeshHash, D::Error> {
-        let text = String::deserialize(from)?;
-        let expected = "`blake3:` and 64 hexadecimal digits";
-        MeshHash::parse(&text)
-            .ok_or_else(|| D::Error::invalid_value(Unexpected::Str(&text), &expected))
-    }
-}
-
 impl ViewsMetadata {
     /// Metadata for views of `mesh`; the rest is for the caller to fill.
     pub fn of(mesh: &Mesh, width: u32, height: u32) -> Self {
@@ -171,6 +115,18 @@ impl ViewsMetadata {
             seed: 0,
             more: BTreeMap::new(),
         }
+    }
+
+    /// Refuses another mesh than the one that the file `path` was made of.
+    ///
+    /// # Errors
+    /// [`Error::OtherMesh`], naming both.
+    pub fn check_mesh(&self, mesh: &Mesh, path: &Path) -> Result<()> {
+        self.mesh.check(mesh).map_err(|_| Error::OtherMesh {
+            path: path.to_path_buf(),
+            expected: self.mesh.to_string(),
+            found: MeshIdentity::of(mesh).to_string(),
+        })
     }
 
     /// The record's entries for a file of `n_views` views.
@@ -254,12 +210,9 @@ fn own_record<'r>(
     let entries = match (ours.next(), ours.next()) {
         (Some((_, entries)), None) => entries,
         (first, _) => {
-            return Err(Error::Format {
-                path: path.to_path_buf(),
-                place: "metadata".to_owned(),
-                expected: format!("one record named `{METADATA_NAME}`"),
-                found: if first.is_none() { "none" } else { "more than one" }.to_owned(),
-            });
+            let expected = format!("one record named `{METADATA_NAME}`");
+            let found = if first.is_none() { "none" } else { "more than one" };
+            return Err(FormatError::new(path, "metadata", expected, found).into());
         }
     };
     let (key, expected) = ("format".to_owned(), format.to_owned());
@@ -272,12 +225,8 @@ fn own_record<'r>(
 
 fn at_fault(path: &Path, error: EntryError) -> Error {
     let EntryError { key, expected, found } = error;
-    Error::Format {
-        path: path.to_path_buf(),
-        place: format!("metadata record `{METADATA_NAME}`, key `{key}`"),
-        expected,
-        found,
-    }
+    let place = format!("metadata record `{METADATA_NAME}`, key `{key}`");
+    FormatError::new(path, place, expected, found).into()
 }
 
 fn count(path: &Path, key: &str, n: u64) -> Result<usize> {

@@ -31,7 +31,7 @@ pub use embeddings_file::{Dtype, EmbeddingsFile};
 pub use embeddings_message::PATCH_EMBEDDINGS;
 pub use inspect::{AttachmentReport, ChannelReport, McapReport, inspect};
 pub use messages::{Colors, find_mesh, read_mesh};
-pub use metadata::{EmbeddingsMetadata, METADATA_NAME, MeshIdentity, ViewsMetadata};
+pub use metadata::{EmbeddingsMetadata, METADATA_NAME, ViewsMetadata};
 pub use pose_array::{POSES_TOPIC, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};
 pub use topics::TF;

@@ -42,7 +42,7 @@ pub fn write_views<V: Borrow<View>>(
     colors: Option<&[[u8; 3]]>,
     metadata: &ViewsMetadata,
 ) -> Result<()> {
-    metadata.mesh.check(mesh, path)?;
+    metadata.check_mesh(mesh, path)?;
     if views.is_empty() {
         return Err(Error::invalid("views", "at least one", "none"));
     }

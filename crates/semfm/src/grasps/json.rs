@@ -4,13 +4,14 @@ use std::path::Path;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
+use semfm_geom::MeshIdentity;
+use semfm_geom::io::write_json;
 use semfm_grasp::Grasp;
 use semfm_robot::{Gripper, GripperPart, Role};
 use serde_json::{Map, Value, json};
 
 use super::{GraspAnswer, position_and_rotation};
 use crate::Result;
-use crate::region_file::write_json;
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.grasps/1";
@@ -28,7 +29,7 @@ pub fn write_grasps(
     for (key, entry) in about {
         value[key] = entry;
     }
-    write_json(path, &value)
+    Ok(write_json(path, &value)?)
 }
 
 /// The content of `grasps.json`. Matrices are 4 × 4, row-major, points as columns; lengths are
@@ -44,11 +45,7 @@ pub fn grasps_json(answer: &GraspAnswer<'_>) -> Value {
         .collect();
     json!({
         "format": FORMAT,
-        "mesh": {
-            "n_vertices": answer.mesh.n_vertices(),
-            "n_triangles": answer.mesh.n_faces(),
-            "hash": answer.mesh.hash().to_string(),
-        },
+        "mesh": MeshIdentity::of(answer.mesh),
         "object_scale": answer.object_scale,
         "camera_from_object": answer.camera_from_object.map(rows),
         "gripper": gripper_json(answer.gripper),

@@ -101,12 +101,11 @@ impl<'a> Accessors<'a> {
         let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
         let json = self.get(accessor)?;
         let component = self.component(accessor, json, kind, allowed)?;
-        let decode = |bytes: &[u8]| {
+        self.elements(accessor, json, N * component.size(), [0.0; N], |bytes: &[u8]| {
             std::array::from_fn(|c| {
                 component.decode(&bytes[c * component.size()..], json.normalized)
             })
-        };
-        self.elements(accessor, json, N * component.size(), [0.0; N], decode)
+        })
     }
 
     /// Vertex indices.
@@ -114,8 +113,9 @@ impl<'a> Accessors<'a> {
         let json = self.get(accessor)?;
         let allowed = [Component::U8, Component::U16, Component::U32];
         let component = self.component(accessor, json, "SCALAR", &allowed)?;
-        let decode = |bytes: &[u8]| component.decode(bytes, false) as u32;
-        self.elements(accessor, json, component.size(), 0, decode)
+        self.elements(accessor, json, component.size(), 0, |bytes: &[u8]| {
+            component.decode(bytes, false) as u32
+        })
     }
 
     fn component(

@@ -168,9 +168,10 @@ fn decode_percent(uri: &str) -> Option<String> {
     while let Some((&first, tail)) = rest.split_first() {
         rest = tail;
         if first == b'%' {
-            let digit = |i: usize| char::from(*tail.get(i)?).to_digit(16);
-            bytes.push((digit(0)? * 16 + digit(1)?) as u8);
-            rest = &tail[2..];
+            let (&[high, low], after) = tail.split_first_chunk()?;
+            let [high, low] = [high, low].map(|digit| char::from(digit).to_digit(16));
+            bytes.push((high? * 16 + low?) as u8);
+            rest = after;
         } else {
             bytes.push(first);
         }

@@ -16,8 +16,10 @@ pub(crate) struct Whole(pub usize);
 impl<'de> Deserialize<'de> for Whole {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let number = serde_json::Number::deserialize(deserializer)?;
-        let exact = |x: &f64| x.fract() == 0.0 && (0.0..9e15).contains(x);
-        let whole = number.as_u64().or_else(|| number.as_f64().filter(exact).map(|x| x as u64));
+        let whole = number.as_u64().or_else(|| {
+            let exact = number.as_f64().filter(|x| x.fract() == 0.0 && (0.0..9e15).contains(x));
+            exact.map(|x| x as u64)
+        });
         let size = whole.and_then(|whole| usize::try_from(whole).ok());
         size.map(Self)
             .ok_or_else(|| D::Error::custom(format!("{number} is not a whole number from 0")))

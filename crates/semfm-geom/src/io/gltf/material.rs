@@ -84,21 +84,19 @@ fn load(
     let texture = root.textures.get(info.index.0).ok_or("its texture does not exist")?;
     let source = texture.source.ok_or("its texture has no image that we read")?;
     let image = root.images.get(source.0).ok_or("it does not exist")?;
-    let words = |error: crate::Error| error.to_string();
     let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => {
-            accessors.buffers.resolve(&format!("image {}", source.0), uri).map_err(words)?
-        }
-        (None, Some(view)) => Bytes::Own(accessors.buffers.view(view.0).map_err(words)?),
+        (Some(uri), _) => accessors.buffers.resolve(&format!("image {}", source.0), uri),
+        (None, Some(view)) => accessors.buffers.view(view.0).map(Bytes::Own),
         (None, None) => return Err("it has neither a uri nor a buffer view".into()),
     };
+    let bytes = bytes.map_err(|error| error.to_string())?;
     let sampler = texture.sampler.and_then(|id| root.samplers.get(id.0));
-    let wrap = |code: Option<Whole>| match code.map(|code| code.0) {
-        Some(33_071) => Wrap::Clamp,
-        Some(33_648) => Wrap::Mirror,
+    let codes = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)];
+    let wrap = codes.map(|code| match code {
+        Some(Whole(33_071)) => Wrap::Clamp,
+        Some(Whole(33_648)) => Wrap::Mirror,
         _ => Wrap::Repeat,
-    };
-    let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
+    });
     let budget = budget.get_or_insert_with(|| ImageBudget::of_file(accessors.buffers.n_loaded()));
     Texture::decode(&bytes, wrap, budget)
 }

@@ -11,12 +11,13 @@ mod buffers;
 mod json;
 mod material;
 mod scene;
+mod write;
 
 use self::accessor::Accessors;
 use self::buffers::Buffers;
 use self::json::{Asset, Root, Versioned};
 use self::scene::SceneReader;
-use super::MeshParts;
+use super::format_row::{FormatRow, FormatWriter, MeshParts};
 use super::input::{Input, quote};
 use crate::Result;
 
@@ -29,8 +30,35 @@ const KNOWN_EXTENSIONS: [&str; 5] = [
     "KHR_animation_pointer",
 ];
 
+/// The row of glTF as JSON in the table of formats.
+pub(super) const GLTF: FormatRow = FormatRow {
+    name: "gltf",
+    extensions: &["gltf"],
+    summary: "glTF 2.0 as JSON",
+    recognise: |bytes| bytes.trim_ascii_start().starts_with(b"{"),
+    read,
+    read_points: None,
+    writer: None,
+};
+
+/// The row of glTF in one binary file.
+pub(super) const GLB: FormatRow = FormatRow {
+    name: "glb",
+    extensions: &["glb"],
+    summary: "glTF 2.0 in one binary file",
+    recognise: |bytes| bytes.starts_with(b"glTF"),
+    read,
+    read_points: None,
+    writer: Some(FormatWriter {
+        write: write::write,
+        holds_colors: true,
+        holds_scalars: true,
+        is_single_precision: true,
+    }),
+};
+
 /// Reads a glTF file, which is JSON, or a GLB, which has it in its first chunk.
-pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
+fn read(input: Input<'_>) -> Result<MeshParts> {
     let is_glb =
         input.bytes.starts_with(b"glTF") || input.path.extension().is_some_and(|e| e == "glb");
     let (json, chunk) = if is_glb { glb_chunks(input)? } else { (input.bytes, None) };
@@ -48,21 +76,14 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
 
 /// The JSON chunk and the binary chunk of a GLB (glTF 2.0, section 4.4).
 fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
-    let word = |offset: usize| -> Result<usize> {
-        let bytes = input.bytes.get(offset..offset + 4).and_then(|b| b.try_into().ok());
-        let bytes = bytes.ok_or_else(|| {
-            input.error(format!("byte {offset}"), "4 bytes", "the end of the file")
-        })?;
-        Ok(u32::from_le_bytes(bytes) as usize)
-    };
-    if !input.bytes.starts_with(b"glTF") || word(4)? != 2 {
+    if !input.bytes.starts_with(b"glTF") || word(input, 4)? != 2 {
         return Err(input.error(
             "byte 0",
             "glTF and version 2",
             quote(&input.bytes[..input.bytes.len().min(8)]),
         ));
     }
-    let length = word(8)?;
+    let length = word(input, 8)?;
     if length < 20 || length > input.bytes.len() {
         let found = format!("{length} in the header and a file of {} bytes", input.bytes.len());
         return Err(input.error("byte 8", "the length of the file", found));
@@ -71,7 +92,7 @@ fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
     let mut offset = 12;
     // Chunks after the second are for extensions; what follows the announced length is not ours.
     while offset + 8 <= length && chunks.len() < 2 {
-        let (n_bytes, kind) = (word(offset)?, word(offset + 4)?);
+        let (n_bytes, kind) = (word(input, offset)?, word(input, offset + 4)?);
         let start = offset + 8;
         let end = start.saturating_add(n_bytes);
         if end > length {
@@ -94,6 +115,14 @@ fn glb_chunks(input: Input<'_>) -> Result<(&[u8], Option<&[u8]>)> {
     }
 }
 
+/// The number in the four bytes at `offset`.
+fn word(input: Input<'_>, offset: usize) -> Result<usize> {
+    let bytes = input.bytes.get(offset..offset + 4).and_then(|b| b.try_into().ok());
+    let bytes = bytes
+        .ok_or_else(|| input.error(format!("byte {offset}"), "4 bytes", "the end of the file"))?;
+    Ok(u32::from_le_bytes(bytes) as usize)
+}
+
 /// Chunks are padded with blanks; some writers pad with zeros.
 fn trim_padding(mut json: &[u8]) -> &[u8] {
     while let Some(head) = json.strip_suffix(b"\0") {
@@ -102,30 +131,32 @@ fn trim_padding(mut json: &[u8]) -> &[u8] {
     json
 }
 
+/// Major and minor number of a version.
+fn version_parts(version: &str) -> Option<[u32; 2]> {
+    let (major, minor) = version.split_once('.')?;
+    Some([major.parse().ok()?, minor.parse().ok()?])
+}
+
 fn check_version(input: Input<'_>, asset: &Asset) -> Result<()> {
-    let parts = |version: &str| -> Option<(u32, u32)> {
-        let (major, minor) = version.split_once('.')?;
-        Some((major.parse().ok()?, minor.parse().ok()?))
-    };
     let needed = asset.min_version.as_ref().unwrap_or(&asset.version);
     // A later 2.x may be read by a 2.0 reader unless `minVersion` says otherwise.
-    let newest = if asset.min_version.is_some() { (2, 0) } else { (2, u32::MAX) };
-    let major = parts(&asset.version).map(|version| version.0);
-    if major != Some(2) || parts(needed).is_none_or(|version| version > newest) {
+    let newest = if asset.min_version.is_some() { [2, 0] } else { [2, u32::MAX] };
+    let major = version_parts(&asset.version).map(|[major, _]| major);
+    if major != Some(2) || version_parts(needed).is_none_or(|version| version > newest) {
         return Err(input.error("asset", "glTF version 2", quote(needed.as_bytes())));
     }
     Ok(())
 }
 
+fn is_known_extension(name: &str) -> bool {
+    let material = name.starts_with("KHR_materials_");
+    // Image formats are a matter of appearance: a missing image is noted.
+    let image = matches!(name, "EXT_texture_webp" | "KHR_texture_basisu" | "EXT_texture_avif");
+    material || image || KNOWN_EXTENSIONS.contains(&name)
+}
+
 fn check_extensions(input: Input<'_>, root: &Root) -> Result<()> {
-    let known = |name: &String| {
-        let material = name.starts_with("KHR_materials_");
-        // Image formats are a matter of appearance: a missing image is noted.
-        let image =
-            matches!(name.as_str(), "EXT_texture_webp" | "KHR_texture_basisu" | "EXT_texture_avif");
-        material || image || KNOWN_EXTENSIONS.contains(&name.as_str())
-    };
-    match root.extensions_required.iter().find(|name| !known(name)) {
+    match root.extensions_required.iter().find(|name| !is_known_extension(name)) {
         Some(name) => {
             Err(input.error("extensionsRequired", "extensions we follow", quote(name.as_bytes())))
         }

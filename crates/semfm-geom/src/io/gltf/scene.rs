@@ -1,15 +1,15 @@
-//! Walking the scene and gathering its triangles.
+//! Traversal of the scene, which gathers its triangles.
 
 use std::collections::HashMap;
 
 use super::accessor::{Accessors, Component};
 use super::json::{Node, Primitive, Whole};
 use super::material::Surface;
-use crate::Result;
-use crate::io::MeshParts;
 use crate::io::appearance::{Appearance, MISSING_UV, rgba_from_floats};
+use crate::io::format_row::MeshParts;
 use crate::io::image::ImageBudget;
 use crate::math::{DAffine3, DMat4, DQuat, DVec3};
+use crate::{Error, Result};
 
 /// Vertices and triangles that a file of no size may make out of repeated instances; a file may
 /// have more in proportion to its bytes. With 24 bytes a vertex and 36 a triangle this stays within
@@ -48,9 +48,9 @@ impl<'a> SceneReader<'a> {
             None => root.scenes.first(),
         };
         match scene {
-            Some(scene) => self.walk(&scene.nodes)?,
+            Some(scene) => self.traverse(&scene.nodes)?,
             None if root.nodes.iter().any(|node| node.mesh.is_some()) => {
-                self.walk(&parentless(&root.nodes))?
+                self.traverse(&parentless(&root.nodes))?
             }
             None => {
                 for mesh in 0..root.meshes.len() {
@@ -63,23 +63,18 @@ impl<'a> SceneReader<'a> {
 
     /// Visits nodes depth first, children in order. A node met twice would make the tree a graph,
     /// or a ring without end, both of which glTF forbids.
-    fn walk(&mut self, roots: &[Whole]) -> Result<()> {
+    fn traverse(&mut self, roots: &[Whole]) -> Result<()> {
         let root = self.accessors.root;
         let mut met = vec![false; root.nodes.len()];
         let mut stack: Vec<(usize, DAffine3)> =
             roots.iter().rev().map(|node| (node.0, DAffine3::IDENTITY)).collect();
         while let Some((id, scene_from_parent)) = stack.pop() {
-            let place = || format!("node {id}");
             let Some(node) = root.nodes.get(id) else {
                 let found = format!("{} of them", root.nodes.len());
-                return Err(self.accessors.input.error(place(), "a node that exists", found));
+                return Err(self.error_at_node(id, "a node that exists", found));
             };
             if std::mem::replace(&mut met[id], true) {
-                return Err(self.accessors.input.error(
-                    place(),
-                    "one parent",
-                    "the node is met twice",
-                ));
+                return Err(self.error_at_node(id, "one parent", "the node is met twice".into()));
             }
             let scene_from_node = scene_from_parent * self.transform(id, node)?;
             if let Some(mesh) = node.mesh {
@@ -93,32 +88,35 @@ impl<'a> SceneReader<'a> {
 
     /// `parent_from_node`: the matrix, or translation × rotation × scale.
     fn transform(&self, id: usize, node: &Node) -> Result<DAffine3> {
-        let refuse = |expected: &str, found: String| {
-            Err(self.accessors.input.error(format!("node {id}"), expected, found))
-        };
-        let mut numbers = node.matrix.iter().flatten().chain(node.translation.iter().flatten());
-        let mut more = node.rotation.iter().flatten().chain(node.scale.iter().flatten());
+        let vectors = node.translation.iter().flatten().chain(node.rotation.iter().flatten());
+        let mut numbers =
+            node.matrix.iter().flatten().chain(vectors).chain(node.scale.iter().flatten());
         // Renderers keep these in 32 bits; beyond them nothing sensible is meant.
-        let in_range = |x: &&f64| x.abs() > f64::from(f32::MAX);
-        if let Some(x) = numbers.find(in_range).or_else(|| more.find(in_range)) {
-            return refuse("a transform of finite 32-bit numbers", format!("{x:e}"));
+        if let Some(x) = numbers.find(|x| x.abs() > f64::from(f32::MAX)) {
+            let expected = "a transform of finite 32-bit numbers";
+            return Err(self.error_at_node(id, expected, format!("{x:e}")));
         }
         if let Some(matrix) = &node.matrix {
             let matrix = DMat4::from_cols_array(matrix);
             if matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
-                return refuse("a matrix whose last row is 0 0 0 1", matrix.row(3).to_string());
+                let expected = "a matrix whose last row is 0 0 0 1";
+                return Err(self.error_at_node(id, expected, matrix.row(3).to_string()));
             }
             return Ok(DAffine3::from_mat4(matrix));
         }
         let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
         if rotation.length_squared() == 0.0 {
-            return refuse("a unit quaternion", rotation.to_string());
+            return Err(self.error_at_node(id, "a unit quaternion", rotation.to_string()));
         }
         Ok(DAffine3::from_scale_rotation_translation(
             DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
             rotation.normalize(),
             DVec3::from_array(node.translation.unwrap_or_default()),
         ))
+    }
+
+    fn error_at_node(&self, id: usize, expected: &str, found: String) -> Error {
+        self.accessors.input.error(format!("node {id}"), expected, found)
     }
 
     fn add_mesh(&mut self, mesh: usize, scene_from_mesh: DAffine3) -> Result<()> {
@@ -162,7 +160,7 @@ impl<'a> SceneReader<'a> {
             Some(indices) => self.accessors.get(indices.0)?.count.0,
             None => n_vertices,
         };
-        self.require_room(place, n_vertices, n_corners)?;
+        self.check_budget(place, n_vertices, n_corners)?;
         let quantized =
             self.accessors.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
         let allowed: &[Component] = if quantized {
@@ -185,8 +183,8 @@ impl<'a> SceneReader<'a> {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let offset = self.parts.vertices.len();
-        let place_in_scene = |p: [f64; 3]| scene_from_mesh.transform_point3(DVec3::from_array(p));
-        self.parts.vertices.extend(positions.into_iter().map(place_in_scene));
+        let positions = positions.into_iter().map(DVec3::from_array);
+        self.parts.vertices.extend(positions.map(|p| scene_from_mesh.transform_point3(p)));
         self.add_colors(place, primitive, offset, n_vertices);
         self.add_material(place, primitive, n_vertices, &triangles);
         let shifted = triangles.into_iter().map(|triangle| triangle.map(|id| id + offset as u32));
@@ -195,7 +193,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Refuses what instances multiply beyond measure, before anything is reserved for it.
-    fn require_room(&self, place: &str, n_vertices: usize, n_corners: usize) -> Result<()> {
+    fn check_budget(&self, place: &str, n_vertices: usize, n_corners: usize) -> Result<()> {
         let n_bytes = self.accessors.buffers.n_loaded();
         let max_vertices = FREE_VERTICES + n_bytes / 4;
         let max_triangles = FREE_TRIANGLES + n_bytes / 2;
@@ -315,10 +313,10 @@ fn parentless(nodes: &[Node]) -> Vec<Whole> {
 /// The triangles of a list (4), a strip (5) or a fan (6), with the corner order of glTF 2.0,
 /// section 3.7.2.1; `None` for another mode. Corners that do not complete a triangle are left over.
 fn triangles(mode: usize, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
-    let windows = || corners.windows(3).enumerate();
+    let strip = corners.windows(3).enumerate();
     match mode {
         4 => Some(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()),
-        5 => Some(windows().map(|(i, c)| [c[0], c[1 + i % 2], c[2 - i % 2]]).collect()),
+        5 => Some(strip.map(|(i, c)| [c[0], c[1 + i % 2], c[2 - i % 2]]).collect()),
         6 => Some(corners.windows(2).skip(1).map(|c| [c[0], c[1], corners[0]]).collect()),
         _ => None,
     }

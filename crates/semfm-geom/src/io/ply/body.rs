@@ -37,11 +37,13 @@ impl<'a> Body<'a> {
         self.element.clone_from(&element.name);
         self.row = 0;
         // The least that a row takes: its scalars and empty lists.
-        let least = |property: &Property| match self.source {
-            Source::Text(_) => 2, // a digit and a blank
-            Source::Binary { .. } => property.length.unwrap_or(property.scalar).size(),
+        let row: usize = match self.source {
+            Source::Text(_) => 2 * element.properties.len(), // a digit and a blank each
+            Source::Binary { .. } => {
+                let lengths = element.properties.iter().map(|p| p.length.unwrap_or(p.scalar));
+                lengths.map(Scalar::size).sum()
+            }
         };
-        let row: usize = element.properties.iter().map(least).sum();
         if row == 0 && element.count > 0 {
             let found = format!("element {} without properties", element.name);
             return Err(self.input.error(

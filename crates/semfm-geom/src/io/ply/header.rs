@@ -177,19 +177,22 @@ fn element(
     Ok(Element { name, count, properties: Vec::new() })
 }
 
+fn scalar(input: Input<'_>, line: Line<'_>, name: &[u8]) -> Result<Scalar> {
+    Scalar::from_name(name)
+        .ok_or_else(|| input.error(line.place(), "a PLY number type", quote(name)))
+}
+
 fn parse_property(
     input: Input<'_>,
     line: Line<'_>,
     element: &Element,
     words: &[&[u8]],
 ) -> Result<Property> {
-    let scalar = |name: &[u8]| {
-        Scalar::from_name(name)
-            .ok_or_else(|| input.error(line.place(), "a PLY number type", quote(name)))
-    };
     let (length, kind, name) = match *words {
-        [b"list", length, kind, name] => (Some(scalar(length)?), scalar(kind)?, name),
-        [kind, name] => (None, scalar(kind)?, name),
+        [b"list", length, kind, name] => {
+            (Some(scalar(input, line, length)?), scalar(input, line, kind)?, name)
+        }
+        [kind, name] => (None, scalar(input, line, kind)?, name),
         _ => {
             return Err(input.error(
                 line.place(),

@@ -1,23 +1,41 @@
 //! PLY: vertices, faces and triangle strips of an ascii or binary file, in file order.
 //!
-//! Any further elements and properties are walked over. Colours come from `red green blue [alpha]`
+//! Any further elements and properties are skipped. Colours come from `red green blue [alpha]`
 //! (bytes, or floats in 0..1), texture coordinates from `s t`, `u v` or `texture_u texture_v` of the
 //! vertices or from the list `texcoord` of the faces.
 
 mod body;
 mod header;
+mod write;
 
 use self::body::Body;
 use self::header::{Element, Header, Property};
+use super::PointCloud;
 use super::appearance::{Appearance, rgba_from_floats};
+use super::format_row::{FormatRow, FormatWriter, MeshParts};
 use super::input::Input;
 use super::polygon::{NO_UV, Polygons, Triangles};
-use super::{MeshParts, PointCloud};
 use crate::Result;
 use crate::math::DVec3;
 
+/// The row of the table of formats.
+pub(super) const FORMAT: FormatRow = FormatRow {
+    name: "ply",
+    extensions: &["ply"],
+    summary: "Stanford's Polygon File Format, ascii or binary",
+    recognise: |bytes| bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r"),
+    read,
+    read_points: Some(read_points),
+    writer: Some(FormatWriter {
+        write: write::write,
+        holds_colors: true,
+        holds_scalars: true,
+        is_single_precision: false,
+    }),
+};
+
 /// Reads a PLY file as a mesh.
-pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
+fn read(input: Input<'_>) -> Result<MeshParts> {
     let file = PlyFile::read(input)?;
     let Triangles { n_faces, faces, corner_uvs } =
         file.polygons.into_triangles(&file.vertices, &file.uvs);
@@ -26,7 +44,7 @@ pub(crate) fn read(input: Input<'_>) -> Result<MeshParts> {
 }
 
 /// Reads the vertices of a PLY file; it needs no faces.
-pub(crate) fn read_points(input: Input<'_>) -> Result<PointCloud> {
+fn read_points(input: Input<'_>) -> Result<PointCloud> {
     let file = PlyFile::read(input)?;
     Ok(PointCloud { points: file.vertices, colors: file.colors })
 }
@@ -71,13 +89,14 @@ impl PlyFile {
         body: &mut Body<'_>,
         element: &Element,
     ) -> Result<()> {
-        let place = || format!("header, element {}", element.name);
-        let columns = |names: &[&str]| columns(element, names);
-        let Some(xyz) = columns(&["x", "y", "z"]).filter(|_| element.count < NO_UV as usize) else {
-            return Err(input.error(place(), "properties x, y and z", "other ones"));
+        let xyz = columns(element, &["x", "y", "z"]);
+        let Some(xyz) = xyz.filter(|_| element.count < NO_UV as usize) else {
+            let place = format!("header, element {}", element.name);
+            return Err(input.error(place, "properties x, y and z", "other ones"));
         };
-        let rgb = columns(&["red", "green", "blue"]).or_else(|| columns(&["r", "g", "b"]));
-        let alpha = columns(&["alpha"]).or_else(|| columns(&["a"]));
+        let rgb = columns(element, &["red", "green", "blue"]);
+        let rgb = rgb.or_else(|| columns(element, &["r", "g", "b"]));
+        let alpha = columns(element, &["alpha"]).or_else(|| columns(element, &["a"]));
         let uv = uv_columns(element);
         // Face corners may have pushed their own already.
         let face_uvs = std::mem::take(&mut self.uvs);
@@ -94,18 +113,11 @@ impl PlyFile {
             body.end_row()?;
             self.vertices.push(DVec3::new(values[xyz[0]], values[xyz[1]], values[xyz[2]]));
             if let Some(rgb) = &rgb {
-                let channel = |column: usize| {
-                    let full =
-                        if element.properties[column].scalar.is_integer() { 255.0 } else { 1.0 };
-                    (values[column] / full) as f32
-                };
-                let a = alpha.as_ref().map_or(f32::NAN, |alpha| channel(alpha[0]));
-                colors.push(rgba_from_floats([
-                    channel(rgb[0]),
-                    channel(rgb[1]),
-                    channel(rgb[2]),
-                    a,
-                ]));
+                let alpha = alpha.as_ref().map(|alpha| alpha[0]);
+                let channels = [Some(rgb[0]), Some(rgb[1]), Some(rgb[2]), alpha];
+                colors.push(rgba_from_floats(channels.map(|column| {
+                    column.map_or(f32::NAN, |column| channel(element, &values, column))
+                })));
             }
             if let Some(uv) = &uv {
                 // PLY counts v from the bottom of the image.
@@ -118,6 +130,12 @@ impl PlyFile {
     }
 }
 
+/// A colour's number in 0..1: whole numbers stand for 255ths.
+fn channel(element: &Element, values: &[f64], column: usize) -> f32 {
+    let full = if element.properties[column].scalar.is_integer() { 255.0 } else { 1.0 };
+    (values[column] / full) as f32
+}
+
 /// How the rows of `face` or `tristrips` are to be read.
 struct Faces<'a> {
     element: &'a Element,
@@ -125,13 +143,15 @@ struct Faces<'a> {
     vertex_uvs: bool,
 }
 
+/// Whether a property is the list of a face's vertices.
+fn is_ids(property: &Property) -> bool {
+    matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
+        && property.length.is_some()
+        && property.scalar.is_integer()
+}
+
 impl Faces<'_> {
     fn read(&self, input: Input<'_>, body: &mut Body<'_>, file: &mut PlyFile) -> Result<()> {
-        let is_ids = |p: &Property| {
-            matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
-                && p.length.is_some()
-                && p.scalar.is_integer()
-        };
         if !self.element.properties.iter().any(is_ids) {
             let place = format!("header, element {}", self.element.name);
             return Err(input.error(place, "a list vertex_indices of whole numbers", "none"));

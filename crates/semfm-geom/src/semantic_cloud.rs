@@ -1,4 +1,4 @@
-//! Surface points with meaning.
+//! Surface points with image features.
 
 use crate::math::DVec3;
 use crate::{Error, Result};
@@ -34,11 +34,8 @@ impl SemanticCloud {
             let found = format!("{} points of {dim} dimensions", points.len());
             return Err(Error::OutOfRange { what: "semantic cloud", expected, found });
         }
-        let length = |what, expected, found| {
-            if expected == found { Ok(()) } else { Err(Error::Length { what, expected, found }) }
-        };
-        length("features (points × dimensions)", points.len() * dim, features.len())?;
-        length("view counts", points.len(), n_views.len())?;
+        Error::check_length("features (points × dimensions)", points.len() * dim, features.len())?;
+        Error::check_length("view counts", points.len(), n_views.len())?;
         if let Some(j) = points.iter().position(|p| !p.is_finite()) {
             let (what, expected) = ("semantic cloud point", "finite coordinates".into());
             return Err(Error::OutOfRange {

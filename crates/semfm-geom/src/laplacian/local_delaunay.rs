@@ -1,4 +1,4 @@
-//! The Delaunay triangles around one point of the plane.
+//! The Delaunay triangles around one point of the plane: its star in the triangulation.
 
 use crate::math::DVec2;
 
@@ -44,14 +44,21 @@ struct CellCorner {
     neighbour: Option<u32>,
 }
 
+impl CellCorner {
+    /// x · q − `limit`: positive beyond the bisector towards a neighbour at q.
+    fn beyond(&self, q: DVec2, limit: f64) -> f64 {
+        self.position.dot(q) - limit
+    }
+}
+
 /// Finds stars one after the other, reusing its memory.
 #[derive(Default)]
-pub(super) struct StarFinder {
+pub(super) struct LocalDelaunay {
     cell: Vec<CellCorner>,
     clipped: Vec<CellCorner>,
 }
 
-impl StarFinder {
+impl LocalDelaunay {
     /// Pairs (i, j) of `neighbours`, counter-clockwise, such that (centre, i, j) is a triangle of
     /// the Delaunay triangulation of the centre (at the origin) and its neighbours.
     ///
@@ -80,14 +87,13 @@ impl StarFinder {
 
     /// Keeps the side x · q ≤ `limit` of the bisector towards neighbour `id` at q.
     fn clip(&mut self, q: DVec2, limit: f64, id: u32) {
-        let beyond = |corner: &CellCorner| corner.position.dot(q) - limit;
-        if self.cell.iter().all(|corner| beyond(corner) <= 0.0) {
+        if self.cell.iter().all(|corner| corner.beyond(q, limit) <= 0.0) {
             return;
         }
         self.clipped.clear();
         for (k, corner) in self.cell.iter().enumerate() {
             let following = &self.cell[(k + 1) % self.cell.len()];
-            let (here, there) = (beyond(corner), beyond(following));
+            let (here, there) = (corner.beyond(q, limit), following.beyond(q, limit));
             if here <= 0.0 {
                 self.clipped.push(*corner);
             }
@@ -116,7 +122,7 @@ mod tests {
         let neighbours: Vec<_> = positions
             .map(|(i, position)| Neighbour { position, lift: lift(i + 1) - lift(0) })
             .collect();
-        let mut star: Vec<_> = StarFinder::default().star(&neighbours).collect();
+        let mut star: Vec<_> = LocalDelaunay::default().star(&neighbours).collect();
         star.sort_unstable();
         star
     }

@@ -2,18 +2,23 @@
 
 use std::io::{Result, Write};
 
-use super::{Paint, write_blocks};
 use crate::Mesh;
+use crate::io::VertexAttributes;
+use crate::io::blocks::write_blocks;
 
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Result<()> {
+pub(super) fn write(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+) -> Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.n_vertices())?;
     writeln!(out, "property double x\nproperty double y\nproperty double z")?;
-    if paint.colors.is_some() {
+    if attributes.colors.is_some() {
         for channel in ["red", "green", "blue", "alpha"] {
             writeln!(out, "property uchar {channel}")?;
         }
     }
-    for (name, _) in paint.scalars {
+    for (name, _) in attributes.scalars {
         writeln!(out, "property float {name}")?;
     }
     writeln!(
@@ -23,10 +28,10 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Resu
     )?;
     write_blocks(out, mesh.vertices().iter().enumerate(), |block, (i, p)| {
         block.extend(p.to_array().iter().flat_map(|x| x.to_le_bytes()));
-        if let Some(colors) = paint.colors {
+        if let Some(colors) = attributes.colors {
             block.extend(colors[i]);
         }
-        for (_, values) in paint.scalars {
+        for (_, values) in attributes.scalars {
             block.extend((values[i] as f32).to_le_bytes());
         }
     })?;

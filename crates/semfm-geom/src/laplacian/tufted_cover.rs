@@ -20,22 +20,18 @@ struct Fans {
 
 impl Fans {
     fn new(n_vertices: usize, faces: &[[u32; 3]]) -> Self {
-        let ends = |h: usize| {
-            let face = faces[h / 3];
-            let (tail, tip) = (face[h % 3], face[(h + 1) % 3]);
-            (tail.min(tip) as usize, tail.max(tip))
-        };
         let n_halfedges = 3 * faces.len();
         // Counting sort by the lower end, then a small sort by (upper end, half-edge) in each bin.
         let mut bins = vec![0usize; n_vertices + 1];
-        (0..n_halfedges).for_each(|h| bins[ends(h).0 + 1] += 1);
+        (0..n_halfedges).for_each(|h| bins[ends(faces, h)[0] as usize + 1] += 1);
         (0..n_vertices).for_each(|v| bins[v + 1] += bins[v]);
         let mut keys = vec![0u64; n_halfedges];
         let mut fill = bins.clone();
         for h in 0..n_halfedges {
-            let (low, high) = ends(h);
-            keys[fill[low]] = u64::from(high) << 32 | h as u64;
-            fill[low] += 1;
+            let [low, high] = ends(faces, h);
+            let slot = &mut fill[low as usize];
+            keys[*slot] = u64::from(high) << 32 | h as u64;
+            *slot += 1;
         }
         let mut starts = Vec::with_capacity(n_halfedges / 2);
         for bin in bins.windows(2) {
@@ -53,6 +49,13 @@ impl Fans {
     fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).map(|range| &self.halfedges[range[0]..range[1]])
     }
+}
+
+/// The ends of front half-edge h, lower id first.
+fn ends(faces: &[[u32; 3]], h: usize) -> [u32; 2] {
+    let face = faces[h / 3];
+    let (tail, tip) = (face[h % 3], face[(h + 1) % 3]);
+    [tail.min(tip), tail.max(tip)]
 }
 
 /// The tufted cover of a triangle soup, its edge lengths mollified; `None` where all edges have
@@ -121,14 +124,13 @@ fn mirror(h: usize) -> usize {
 /// With the triangles in order of falling angle, a half-edge that runs against the edge is on the
 /// side that looks towards the next triangle. For one or two triangles every order is the same.
 fn glue(cover: &mut IntrinsicTriangulation, fan: &[u32], tail: u32) {
-    let along = |cover: &IntrinsicTriangulation, h: usize| cover.tail[h] == tail;
     let mut current = front(fan[0]);
-    if along(cover, current) {
+    if cover.tail[current] == tail {
         current = mirror(current);
     }
     for i in 0..fan.len() {
         let mut next = front(fan[(i + 1) % fan.len()]);
-        if !along(cover, next) {
+        if cover.tail[next] != tail {
             next = mirror(next);
         }
         cover.twin[current] = next as u32;
@@ -147,28 +149,35 @@ fn sort_by_angle(
     fan: &[u32],
     by_angle: &mut Vec<(f64, u32)>,
 ) {
-    let corner = |h: u32, k: usize| points[faces[h as usize / 3][(h as usize + k) % 3] as usize];
-    let (tail, tip) = (corner(fan[0], 0), corner(fan[0], 1));
+    let [tail, tip, _] = corners_from(points, faces, fan[0]);
     let axis = (tip - tail).normalize_or(DVec3::Z);
     let right = axis.any_orthonormal_vector();
     let up = axis.cross(right);
     let met = std::iter::once(fan[0]).chain(fan[1..].iter().rev().copied());
     by_angle.clear();
     by_angle.extend(met.map(|h| {
-        let out = corner(h, 2) - tail;
+        let [_, _, opposite] = corners_from(points, faces, h);
+        let out = opposite - tail;
         (up.dot(out).atan2(right.dot(out)), h)
     }));
     by_angle.sort_by(|a, b| b.0.total_cmp(&a.0));
 }
 
+/// The corners of the triangle of half-edge h: its tail, its tip, and the one opposite.
+fn corners_from(points: &[DVec3], faces: &[[u32; 3]], h: u32) -> [DVec3; 3] {
+    let h = h as usize;
+    [0, 1, 2].map(|k| points[faces[h / 3][(h + k) % 3] as usize])
+}
+
 /// The length by which all edges must grow so that the sides a, b, c of each triangle keep
-/// a + b − c ≥ `slack`.
+/// a + b − c ≥ `slack`: the largest 2 max(a, b, c) − (a + b + c) + `slack`.
 fn mollification(lengths: &[f64], slack: f64) -> f64 {
-    let missing = |sides: &[f64]| {
+    let mut growth = 0.0f64;
+    for sides in lengths.chunks_exact(3) {
         let longest = sides[0].max(sides[1]).max(sides[2]);
-        2.0 * longest - (sides[0] + sides[1] + sides[2]) + slack
-    };
-    lengths.chunks_exact(3).map(missing).fold(0.0, f64::max)
+        growth = growth.max(2.0 * longest - (sides[0] + sides[1] + sides[2]) + slack);
+    }
+    growth
 }
 
 #[cfg(test)]
@@ -187,10 +196,10 @@ mod tests {
             let cover = tufted_cover(mesh.vertices(), &faces, 1e-5).unwrap();
             for h in 0..cover.twin.len() {
                 let twin = cover.twin[h] as usize;
-                let tip = |h: usize| cover.tail[h - h % 3 + (h + 1) % 3];
                 assert_eq!(cover.twin[twin] as usize, h, "{name}: gluing is mutual");
                 assert_ne!(twin, h, "{name}: no edge is glued to itself");
-                assert_eq!((cover.tail[twin], tip(twin)), (tip(h), cover.tail[h]), "{name}");
+                let [tip, twin_tip] = [h, twin].map(|h| cover.tail[h - h % 3 + (h + 1) % 3]);
+                assert_eq!((cover.tail[twin], twin_tip), (tip, cover.tail[h]), "{name}");
                 assert_eq!(cover.length[twin], cover.length[h], "{name}");
             }
         }
@@ -199,8 +208,9 @@ mod tests {
     #[test]
     fn neighbours_in_a_book_look_at_each_other() {
         // Three pages around the z axis at 0°, 120° and 240°, wound alike.
-        let page = |angle: f64| DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
-        let points = [DVec3::ZERO, DVec3::Z, page(0.0), page(120.0), page(240.0)];
+        let [a, b, c] = [0.0f64, 120.0, 240.0]
+            .map(|angle| DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0));
+        let points = [DVec3::ZERO, DVec3::Z, a, b, c];
         let cover = tufted_cover(&points, &[[0, 1, 2], [0, 1, 3], [0, 1, 4]], 1e-5).unwrap();
         // The front of a page a→b at angle θ has its normal towards growing θ, so it faces the
         // back of the next page.

@@ -1,7 +1,8 @@
-//! The nearest point of another group: a k-d tree whose nodes know whether they are all of one.
+//! The nearest point with another label: a k-d tree whose nodes know whether all their points have
+//! one label.
 //!
 //! This is the search inside Borůvka's algorithm for the Euclidean minimum spanning tree (March,
-//! Ram & Gray 2010): a branch in which every point has the asker's own label cannot hold the
+//! Ram & Gray 2010): a branch in which every point has the query's own label cannot hold the
 //! answer, so a point deep inside its own component is done after a few steps.
 
 use crate::math::{DVec3, bounds};
@@ -21,7 +22,7 @@ struct Node {
 }
 
 /// A k-d tree over points with labels, which may be changed.
-pub(super) struct ForeignIndex {
+pub(super) struct LabelledTree {
     points: Vec<DVec3>,
     /// Position in the caller's order of each sorted point.
     ids: Vec<u32>,
@@ -39,15 +40,29 @@ pub(super) struct Link {
 }
 
 impl Link {
+    /// No link yet, and none to be taken that is longer than this.
+    pub fn limit(distance_squared: f64) -> Self {
+        Self { distance_squared, from: u32::MAX, to: u32::MAX }
+    }
+
+    /// Whether it joins two points, rather than being a limit.
+    pub fn is_found(&self) -> bool {
+        self.to != u32::MAX
+    }
+
     /// Shorter first; among equals the one with the smaller ids, whichever way it runs.
-    pub fn is_before(&self, other: &Link) -> bool {
-        let key = |l: &Link| (l.from.min(l.to), l.from.max(l.to));
+    pub fn is_before(&self, other: &Self) -> bool {
         self.distance_squared < other.distance_squared
-            || (self.distance_squared == other.distance_squared && key(self) < key(other))
+            || (self.distance_squared == other.distance_squared && self.ends() < other.ends())
+    }
+
+    /// Its two points, the smaller id first.
+    pub fn ends(&self) -> [u32; 2] {
+        [self.from.min(self.to), self.from.max(self.to)]
     }
 }
 
-impl ForeignIndex {
+impl LabelledTree {
     pub fn new(points: &[DVec3], labels: &[u32]) -> Self {
         let mut ids: Vec<u32> = (0..points.len() as u32).collect();
         let mut nodes = Vec::with_capacity(4 * points.len() / LEAF + 1);
@@ -93,8 +108,9 @@ impl ForeignIndex {
             return;
         }
         if let Some([left, right]) = node.halves {
-            let near = |half: usize| self.nodes[half].distance_squared(point);
-            let order = if near(left) <= near(right) { [left, right] } else { [right, left] };
+            let [to_left, to_right] =
+                [left, right].map(|half| self.nodes[half].distance_squared(point));
+            let order = if to_left <= to_right { [left, right] } else { [right, left] };
             order.into_iter().for_each(|half| self.search(half, from, point, label, best));
             return;
         }
@@ -124,8 +140,8 @@ fn build(points: &[DVec3], ids: &mut [u32], start: usize, nodes: &mut Vec<Node>)
         let axis = (high - low).max_position();
         let middle = ids.len() / 2;
         ids.select_nth_unstable_by(middle, |&a, &b| {
-            let along = |id: u32| points[id as usize][axis];
-            along(a).total_cmp(&along(b)).then(a.cmp(&b))
+            let [along_a, along_b] = [a, b].map(|id| points[id as usize][axis]);
+            along_a.total_cmp(&along_b).then(a.cmp(&b))
         });
         let (left, right) = ids.split_at_mut(middle);
         let left = build(points, left, start, nodes);
@@ -145,11 +161,10 @@ mod tests {
         let points = zoo::spiral_cloud(700);
         let mut labels: Vec<u32> =
             points.iter().map(|p| u32::from(p.z > 0.3) + u32::from(p.x > 0.0)).collect();
-        let mut index = ForeignIndex::new(&points, &labels);
+        let mut index = LabelledTree::new(&points, &labels);
         for _ in 0..2 {
             for (i, &point) in points.iter().enumerate() {
-                let none = Link { distance_squared: f64::INFINITY, from: u32::MAX, to: u32::MAX };
-                let found = index.nearest(i as u32, point, labels[i], none);
+                let found = index.nearest(i as u32, point, labels[i], Link::limit(f64::INFINITY));
                 let expected = (0..points.len())
                     .filter(|&j| labels[j] != labels[i])
                     .map(|j| points[j].distance_squared(point))

@@ -8,17 +8,22 @@ use std::io::{Error, Result, Write};
 
 use serde_json::{Value, json};
 
-use super::{Paint, write_blocks};
 use crate::Mesh;
+use crate::io::VertexAttributes;
+use crate::io::blocks::write_blocks;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_INT: u32 = 5125;
 
-pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Result<()> {
+pub(super) fn write(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+) -> Result<()> {
     let n = mesh.n_vertices();
     let mut arrays = Arrays::default();
-    let mut attributes = serde_json::Map::new();
+    let mut accessors = serde_json::Map::new();
     let (low, high) = mesh.bounds();
     let position = arrays.add(
         12 * n,
@@ -27,15 +32,15 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Resu
             "min": low.as_vec3().to_array(), "max": high.as_vec3().to_array(),
         }),
     );
-    attributes.insert("POSITION".into(), position);
-    if paint.colors.is_some() {
+    accessors.insert("POSITION".into(), position);
+    if attributes.colors.is_some() {
         let color =
             json!({"componentType": UNSIGNED_BYTE, "type": "VEC4", "count": n, "normalized": true});
-        attributes.insert("COLOR_0".into(), arrays.add(4 * n, color));
+        accessors.insert("COLOR_0".into(), arrays.add(4 * n, color));
     }
-    for (name, _) in paint.scalars {
+    for (name, _) in attributes.scalars {
         let scalar = json!({"componentType": FLOAT, "type": "SCALAR", "count": n});
-        attributes.insert(format!("_{}", name.to_ascii_uppercase()), arrays.add(4 * n, scalar));
+        accessors.insert(format!("_{}", name.to_ascii_uppercase()), arrays.add(4 * n, scalar));
     }
     let n_indices = 3 * mesh.n_faces();
     let index = json!({"componentType": UNSIGNED_INT, "type": "SCALAR", "count": n_indices});
@@ -43,14 +48,13 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Resu
     let json = json!({
         "asset": {"version": "2.0", "generator": "SemFM"},
         "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": indices}]}],
+        "meshes": [{"primitives": [{"attributes": accessors, "indices": indices}]}],
         "accessors": arrays.accessors, "bufferViews": arrays.views,
         "buffers": [{"byteLength": arrays.n_bytes}],
     });
     let mut json = json.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
 
-    let word = |n: usize| u32::try_from(n).map_err(|_| Error::other("a GLB holds at most 4 GiB"));
     let total = word(12 + 8 + json.len() + 8 + arrays.n_bytes)?;
     for part in [&b"glTF"[..], &2u32.to_le_bytes(), &total.to_le_bytes()] {
         out.write_all(part)?;
@@ -64,11 +68,16 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, paint: &Paint<'_>) -> Resu
     write_blocks(out, mesh.vertices(), |block, p| {
         block.extend(p.as_vec3().to_array().iter().flat_map(|x| x.to_le_bytes()));
     })?;
-    write_blocks(out, paint.colors.unwrap_or_default(), |block, color| block.extend(color))?;
-    for (_, values) in paint.scalars {
+    write_blocks(out, attributes.colors.unwrap_or_default(), |block, color| block.extend(color))?;
+    for (_, values) in attributes.scalars {
         write_blocks(out, *values, |block, &x| block.extend((x as f32).to_le_bytes()))?;
     }
     write_blocks(out, mesh.faces().as_flattened(), |block, id| block.extend(id.to_le_bytes()))
+}
+
+/// A length in a GLB.
+fn word(n: usize) -> Result<u32> {
+    u32::try_from(n).map_err(|_| Error::other("a GLB holds at most 4 GiB"))
 }
 
 /// Arrays one after the other in one buffer; all have elements of 4 bytes or a multiple.

@@ -1,6 +1,6 @@
 //! The Laplacian of points without triangles (Sharp & Crane 2020).
 
-use super::star::{Neighbour, StarFinder, lift};
+use super::local_delaunay::{LocalDelaunay, Neighbour, lift};
 use super::tufted::{delaunay_cover_of_soup, laplacian_of_cover};
 use super::{Laplacian, TuftedSettings};
 use crate::math::{DMat3, DVec2, DVec3};
@@ -56,8 +56,8 @@ pub fn point_cloud_laplacian(points: &[DVec3], settings: &CloudSettings) -> Resu
 fn union_of_stars(points: &[DVec3], n_neighbors: usize) -> Result<Vec<[u32; 3]>> {
     let index = PointIndex::new(points)?;
     let mut triangles = Vec::with_capacity(6 * points.len());
-    let mut finder = StarFinder::default();
-    let (mut ids, mut offsets, mut flat) = (Vec::new(), Vec::new(), Vec::new());
+    let mut finder = LocalDelaunay::default();
+    let (mut ids, mut offsets, mut projected) = (Vec::new(), Vec::new(), Vec::new());
     for (center, &point) in points.iter().enumerate() {
         ids.clear();
         // One more than asked, for the point itself is among them.
@@ -66,13 +66,15 @@ fn union_of_stars(points: &[DVec3], n_neighbors: usize) -> Result<Vec<[u32; 3]>>
         offsets.clear();
         offsets.extend(ids.iter().map(|&id| points[id] - point));
         let Some((right, up)) = tangent_plane(&offsets) else { continue };
-        flat.clear();
-        flat.extend(ids.iter().zip(&offsets).map(|(&id, v)| Neighbour {
+        projected.clear();
+        projected.extend(ids.iter().zip(&offsets).map(|(&id, v)| Neighbour {
             position: DVec2::new(right.dot(*v), up.dot(*v)),
             lift: lift(id) - lift(center),
         }));
-        let corner = |i: u32| ids[i as usize] as u32;
-        triangles.extend(finder.star(&flat).map(|(i, j)| [center as u32, corner(i), corner(j)]));
+        triangles.extend(finder.star(&projected).map(|(i, j)| {
+            let [i, j] = [i, j].map(|neighbour| ids[neighbour as usize] as u32);
+            [center as u32, i, j]
+        }));
     }
     Ok(triangles)
 }
@@ -80,11 +82,16 @@ fn union_of_stars(points: &[DVec3], n_neighbors: usize) -> Result<Vec<[u32; 3]>>
 /// Variance across a line of points, as a share of the whole, below which they span no plane.
 const LINE: f64 = 1e-12;
 
+/// v vᵀ.
+fn outer(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v.x * v, v.y * v, v.z * v)
+}
+
 /// Two unit vectors that span the plane of best fit to a point and its neighbours' `offsets` from
 /// it: the directions of largest variance about the common mean. `None` for points on a line.
 fn tangent_plane(offsets: &[DVec3]) -> Option<(DVec3, DVec3)> {
     let mean = offsets.iter().sum::<DVec3>() / (offsets.len() + 1) as f64;
-    let outer = |v: DVec3| DMat3::from_cols(v.x * v, v.y * v, v.z * v);
+    // Scatter Σ (v − mean)(v − mean)ᵀ, the point itself (offset 0) included.
     let scatter = offsets.iter().fold(outer(mean), |sum, &v| sum + outer(v - mean));
     // Scaled to trace one, where the closed form is at its best.
     let trace = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;

@@ -1,4 +1,4 @@
-//! Triangles laid flat: what gradients and divergences need besides the Laplacian.
+//! Triangles laid out in the plane: what gradients and divergences need besides the Laplacian.
 
 use super::{
     Laplacian, LaplacianKind, TuftedSettings, cotan_laplacian, intrinsic::IntrinsicTriangulation,
@@ -9,7 +9,7 @@ use crate::{Mesh, Result};
 
 /// A triangle in its own plane, first corner at the origin, second on the x axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FlatTriangle {
+pub(crate) struct PlanarTriangle {
     /// Vertices.
     pub ids: [u32; 3],
     second: f64,
@@ -18,7 +18,7 @@ pub(crate) struct FlatTriangle {
     share: f64,
 }
 
-impl FlatTriangle {
+impl PlanarTriangle {
     /// From its sides ab, bc, ca; `None` for a triangle without area.
     fn new(ids: [u32; 3], [ab, bc, ca]: [f64; 3], share: f64) -> Option<Self> {
         let area4 = super::intrinsic::quadruple_area(ab, bc, ca);
@@ -50,12 +50,12 @@ impl FlatTriangle {
     }
 }
 
-/// The Laplacian of a kind, and the flat triangles that it belongs to.
-pub(crate) fn flat_laplacian(
+/// The Laplacian of a kind, and the triangles that it belongs to.
+pub(crate) fn laplacian_and_triangles(
     mesh: &Mesh,
     kind: LaplacianKind,
     settings: &TuftedSettings,
-) -> Result<(Laplacian, Vec<FlatTriangle>)> {
+) -> Result<(Laplacian, Vec<PlanarTriangle>)> {
     match kind {
         LaplacianKind::Tufted => {
             let cover = tufted::delaunay_cover(mesh, settings)?;
@@ -65,18 +65,18 @@ pub(crate) fn flat_laplacian(
         LaplacianKind::Cotan => {
             let triangles = mesh.faces().iter().enumerate().filter_map(|(face, &ids)| {
                 let [a, b, c] = mesh.corners(face);
-                FlatTriangle::new(ids, [a.distance(b), b.distance(c), c.distance(a)], 1.0)
+                PlanarTriangle::new(ids, [a.distance(b), b.distance(c), c.distance(a)], 1.0)
             });
             Ok((cotan_laplacian(mesh)?, triangles.collect()))
         }
     }
 }
 
-fn triangles_of_cover(cover: &IntrinsicTriangulation) -> Vec<FlatTriangle> {
+fn triangles_of_cover(cover: &IntrinsicTriangulation) -> Vec<PlanarTriangle> {
     let corners = cover.tail.chunks_exact(3).zip(cover.length.chunks_exact(3));
     corners
         .filter_map(|(ids, sides)| {
-            FlatTriangle::new([ids[0], ids[1], ids[2]], [sides[0], sides[1], sides[2]], 0.5)
+            PlanarTriangle::new([ids[0], ids[1], ids[2]], [sides[0], sides[1], sides[2]], 0.5)
         })
         .collect()
 }
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn a_linear_function_has_the_flux_of_its_own_stiffness() {
         // u = 2y on a right triangle: X = −ŷ, so −∇·X is that of the function −y.
-        let triangle = FlatTriangle::new([0, 1, 2], [3.0, 5.0, 4.0], 1.0).unwrap();
+        let triangle = PlanarTriangle::new([0, 1, 2], [3.0, 5.0, 4.0], 1.0).unwrap();
         let flux = triangle.unit_descent_flux([0.0, 0.0, 8.0]);
         for (found, expected) in flux.into_iter().zip([1.5, 0.0, -1.5]) {
             assert!((found - expected).abs() < 1e-14, "{flux:?}");

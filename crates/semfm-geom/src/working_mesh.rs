@@ -20,19 +20,30 @@ pub struct WorkingMesh {
     /// For each working vertex, the original vertex that it is; ascending.
     pub to_original: Vec<u32>,
     /// For each vertex of the original (n), the point of the working surface that stands for it.
-    pub carriers: Vec<Carrier>,
+    pub point_of_original: Vec<BarycentricPoint>,
+}
+
+/// A working mesh, and what was done to get it.
+#[derive(Clone, Debug)]
+pub struct PreparedWorkingMesh {
+    /// The working mesh.
+    pub working: WorkingMesh,
+    /// What cleaning did.
+    pub cleaning: CleanReport,
+    /// What simplification did; `None` where the mesh was small enough, or nothing smaller stayed close enough to it.
+    pub simplification: Option<SimplifyReport>,
 }
 
 /// A point of the working surface as a mix of three working vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Carrier {
+pub struct BarycentricPoint {
     /// Working vertices.
     pub corners: [u32; 3],
     /// Their weights, each in [0, 1], adding up to 1.
     pub weights: [f64; 3],
 }
 
-impl Carrier {
+impl BarycentricPoint {
     /// A working vertex itself.
     pub fn vertex(id: u32) -> Self {
         Self { corners: [id; 3], weights: [1.0, 0.0, 0.0] }
@@ -40,6 +51,19 @@ impl Carrier {
 
     fn on(mesh: &Mesh, place: &SurfacePoint) -> Self {
         Self { corners: mesh.faces()[place.face as usize], weights: place.barycentric }
+    }
+
+    /// The corner nearest to `position`; among equals the first.
+    fn nearest_corner(&self, mesh: &Mesh, position: DVec3) -> u32 {
+        let mut nearest = self.corners[0];
+        for id in self.corners {
+            let [here, there] =
+                [nearest, id].map(|id| mesh.vertices()[id as usize].distance_squared(position));
+            if there < here {
+                nearest = id;
+            }
+        }
+        nearest
     }
 
     /// The mix of the corners' values; `values` has one per working vertex.
@@ -62,66 +86,72 @@ impl WorkingMesh {
         cleaning: &CleanSettings,
         simplification: &SimplifySettings,
         task: &Task,
-    ) -> Result<(Self, CleanReport, Option<SimplifyReport>)> {
+    ) -> Result<PreparedWorkingMesh> {
         let Cleaned { mesh: cleaned, of_original: clean_of, to_original: of_clean, report } =
             clean(original, cleaning)?;
         let Some(simplified) = simplify(&cleaned, simplification, task)? else {
-            let kept = |&clean: &Option<u32>| clean.map(Carrier::vertex);
-            let carriers = placed(original, &cleaned, clean_of.iter().map(kept).collect())?;
-            return Ok((Self::with(original, cleaned, of_clean, carriers), report, None));
+            let kept = clean_of.iter().map(|clean| clean.map(BarycentricPoint::vertex));
+            let points = completed(original, &cleaned, kept.collect())?;
+            let working = Self::with(original, cleaned, of_clean, points);
+            return Ok(PreparedWorkingMesh { working, cleaning: report, simplification: None });
         };
         let Simplified { mesh, to_before, of_before, report: simplification } = simplified;
-        let mut on_working: Vec<Carrier> =
-            of_before.iter().map(|place| Carrier::on(&mesh, place)).collect();
+        let mut on_working: Vec<BarycentricPoint> =
+            of_before.iter().map(|place| BarycentricPoint::on(&mesh, place)).collect();
         for (id, &clean) in (0u32..).zip(&to_before) {
-            on_working[clean as usize] = Carrier::vertex(id);
+            on_working[clean as usize] = BarycentricPoint::vertex(id);
         }
-        let carriers = clean_of.iter().map(|clean| clean.map(|id| on_working[id as usize]));
-        let carriers = placed(original, &mesh, carriers.collect())?;
+        let known = clean_of.iter().map(|clean| clean.map(|id| on_working[id as usize]));
+        let points = completed(original, &mesh, known.collect())?;
         let to_original = to_before.iter().map(|&clean| of_clean[clean as usize]).collect();
-        Ok((Self::with(original, mesh, to_original, carriers), report, Some(simplification)))
+        let working = Self::with(original, mesh, to_original, points);
+        Ok(PreparedWorkingMesh { working, cleaning: report, simplification: Some(simplification) })
     }
 
-    fn with(original: &Mesh, mesh: Mesh, to_original: Vec<u32>, carriers: Vec<Carrier>) -> Self {
-        let nearest_corner = |(carrier, p): (&Carrier, &DVec3)| {
-            let distance = |&id: &u32| mesh.vertices()[id as usize].distance_squared(*p);
-            let [a, b, c] = carrier.corners;
-            [b, c]
-                .into_iter()
-                .fold(a, |best, id| if distance(&id) < distance(&best) { id } else { best })
-        };
-        let of_original = carriers.iter().zip(original.vertices()).map(nearest_corner).collect();
-        Self { mesh, of_original, to_original, carriers }
+    fn with(
+        original: &Mesh,
+        mesh: Mesh,
+        to_original: Vec<u32>,
+        point_of_original: Vec<BarycentricPoint>,
+    ) -> Self {
+        let of_original = (point_of_original.iter().zip(original.vertices()))
+            .map(|(point, &position)| point.nearest_corner(&mesh, position))
+            .collect();
+        Self { mesh, of_original, to_original, point_of_original }
     }
 
     /// Values on the working vertices, carried onto the original's vertices: exact where a vertex
     /// was kept, linear on the working triangle nearest to it where it was not.
     pub fn onto_original(&self, values: &[f64]) -> Vec<f64> {
         assert_eq!(values.len(), self.mesh.n_vertices(), "one value per working vertex");
-        self.carriers.iter().map(|carrier| carrier.mix(values)).collect()
+        self.point_of_original.iter().map(|point| point.mix(values)).collect()
     }
 
     /// Values on the original's vertices, read off at the vertices that were kept.
     pub fn onto_working(&self, values: &[f64]) -> Vec<f64> {
-        assert_eq!(values.len(), self.carriers.len(), "one value per original vertex");
+        assert_eq!(values.len(), self.point_of_original.len(), "one value per original vertex");
         self.to_original.iter().map(|&id| values[id as usize]).collect()
     }
 }
 
-/// Fills in, by the nearest point of the surface, the carriers of vertices that cleaning dropped.
-fn placed(original: &Mesh, working: &Mesh, known: Vec<Option<Carrier>>) -> Result<Vec<Carrier>> {
+/// Fills in, by the nearest point of the surface, the points of vertices that cleaning dropped.
+fn completed(
+    original: &Mesh,
+    working: &Mesh,
+    known: Vec<Option<BarycentricPoint>>,
+) -> Result<Vec<BarycentricPoint>> {
     if let Some(all) = known.iter().copied().collect() {
         return Ok(all);
     }
     let surface = SurfaceIndex::new(working)?;
-    let place = |(known, &p): (Option<Carrier>, &DVec3)| {
+    let points = known.into_par_iter().zip(original.vertices()).map(|(known, &p)| {
         // A vertex so far out that its squared distance overflows gets vertex 0: nothing refers to
         // it, or cleaning would have kept it.
-        known.unwrap_or_else(|| {
-            surface.closest(p).map_or(Carrier::vertex(0), |place| Carrier::on(working, &place))
-        })
-    };
-    Ok(known.into_par_iter().zip(original.vertices()).map(place).collect())
+        known
+            .or_else(|| surface.closest(p).map(|place| BarycentricPoint::on(working, &place)))
+            .unwrap_or(BarycentricPoint::vertex(0))
+    });
+    Ok(points.collect())
 }
 
 #[cfg(test)]
@@ -133,7 +163,7 @@ mod tests {
         let simplification = SimplifySettings { target_vertices, most_distance: 0.2 };
         WorkingMesh::new(mesh, &CleanSettings::default(), &simplification, &Task::default())
             .unwrap()
-            .0
+            .working
     }
 
     #[test]
