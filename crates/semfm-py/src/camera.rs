@@ -255,9 +255,8 @@ pub fn camera_towards(
     let settings = RigSettings { size, fill, ..Default::default() };
     let (direction, up) = (arrays::point(direction, "direction")?, arrays::point(up, "up")?);
     let held = from_any(mesh, "mesh")?;
-    let camera = run(mesh.py(), None, move |_| {
-        Ok(views::rig::camera_towards(&held, direction, up, &settings)?)
-    })?;
+    let camera =
+        run(mesh.py(), None, move |_| Ok(views::camera_towards(&held, direction, up, &settings)?))?;
     Ok(Camera { camera })
 }
 

@@ -88,9 +88,9 @@ fn a_scene_holds_its_meshes_clouds_and_frames() {
     .unwrap();
     // Two meshes, a cloud, a label, links, a camera, a picture, three frames.
     assert_eq!(contents.n_messages(), 10);
-    let (name, entries) = &contents.metadata[0];
+    let record = &contents.metadata[0];
     assert_eq!(
-        (name.as_str(), entries["json"].as_str()),
+        (record.name.as_str(), record.entries["json"].as_str()),
         (METADATA_NAME, r#"{"verdict":"accept"}"#)
     );
     // One wide each, a quarter apart.

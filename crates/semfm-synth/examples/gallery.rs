@@ -9,7 +9,7 @@ use std::error::Error;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Task, principal_axes};
 use semfm_synth::{Category, ObjectSettings, SynthObject, make_object};
-use semfm_views::rig::camera_towards;
+use semfm_views::camera_towards;
 use semfm_views::{RenderSettings, RigSettings, SurfaceColor, render};
 
 const KINDS: usize = 6;

@@ -11,7 +11,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The ground floor refused.
+    /// A mesh, a camera or a task: what `semfm-geom` reports.
     #[error(transparent)]
     Geom(#[from] semfm_geom::Error),
     /// A number or an array outside what it may be.

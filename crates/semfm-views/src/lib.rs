@@ -5,24 +5,24 @@
 //! surface as a [`SemanticCloud`](semfm_geom::SemanticCloud). Views and embeddings travel in MCAP
 //! files (feature `mcap`).
 
-pub mod embeddings;
+mod embeddings;
 mod error;
 #[cfg(feature = "gpu")]
-pub mod gpu;
-pub mod lift;
+mod gpu;
+mod lift;
 #[cfg(feature = "mcap")]
 pub mod mcap;
-pub mod render;
-pub mod renderer;
-pub mod rig;
-pub mod view;
+mod render;
+mod renderer;
+mod rig;
+mod view;
 
 pub use embeddings::{EmbeddedView, PatchEmbeddings, PatchGrid};
 pub use error::{Error, Fault, Result};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuRenderer;
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
-pub use render::{RenderSettings, SurfaceColor, render};
+pub use render::{CornerNormals, RenderSettings, SurfaceColor, openness, render};
 pub use renderer::{Renderer, RendererChoice};
-pub use rig::{RigSettings, rig};
+pub use rig::{CLOSE_UP, RigSettings, camera_towards, fibonacci_directions, rig};
 pub use view::View;

@@ -76,37 +76,24 @@ impl RigSettings {
     }
 
     fn check(&self) -> Result<()> {
-        let allow = |ok: bool, what: &str, expected: &str, found: String| {
-            if ok { Ok(()) } else { Err(Error::invalid(what, expected, found)) }
+        let Self { count, size, field_of_view, fill, max_zoom, close_ups, .. } = *self;
+        let (field, expected, found) = if !(1..=4096).contains(&count) {
+            ("views of the rig", "1 to 4096".to_owned(), count.to_string())
+        } else if !(1..=MAX_IMAGE_SIDE).contains(&size) {
+            ("image size", format!("1 to {MAX_IMAGE_SIDE} pixels"), size.to_string())
+        } else if !(field_of_view > 0.0 && field_of_view < 3.0) {
+            let expected = "more than 0 and less than 3 rad".to_owned();
+            ("field of view", expected, field_of_view.to_string())
+        } else if close_ups > MAX_CLOSE_UPS {
+            ("close-ups", format!("at most {MAX_CLOSE_UPS}"), close_ups.to_string())
+        } else if !(fill > 0.0 && fill <= 1.0) {
+            ("fill", "more than 0 and at most 1".to_owned(), fill.to_string())
+        } else if !(max_zoom >= 1.0 && max_zoom.is_finite()) {
+            ("largest zoom", "a finite factor of at least 1".to_owned(), max_zoom.to_string())
+        } else {
+            return Ok(());
         };
-        allow(
-            (1..=4096).contains(&self.count),
-            "views of the rig",
-            "1 to 4096",
-            self.count.to_string(),
-        )?;
-        let side = format!("1 to {MAX_IMAGE_SIDE} pixels");
-        let size_ok = (1..=MAX_IMAGE_SIDE).contains(&self.size);
-        allow(size_ok, "image size", &side, self.size.to_string())?;
-        let fov = self.field_of_view;
-        allow(
-            fov > 0.0 && fov < 3.0,
-            "field of view",
-            "more than 0 and less than 3 rad",
-            fov.to_string(),
-        )?;
-        let close_ups = self.close_ups;
-        let most = format!("at most {MAX_CLOSE_UPS}");
-        allow(close_ups <= MAX_CLOSE_UPS, "close-ups", &most, close_ups.to_string())?;
-        let fill = self.fill;
-        allow(fill > 0.0 && fill <= 1.0, "fill", "more than 0 and at most 1", fill.to_string())?;
-        let zoom = self.max_zoom;
-        allow(
-            zoom >= 1.0 && zoom.is_finite(),
-            "largest zoom",
-            "a finite factor of at least 1",
-            zoom.to_string(),
-        )
+        Err(Error::invalid(field, expected, found))
     }
 }
 
@@ -116,7 +103,7 @@ impl RigSettings {
 ///
 /// ```
 /// use semfm_geom::{Mesh, Pinhole, math::DVec3};
-/// use semfm_views::rig::{RigSettings, rig};
+/// use semfm_views::{RigSettings, rig};
 /// let mesh = Mesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]])?;
 /// let cameras = rig(&mesh, &RigSettings { count: 6, ..Default::default() })?;
 /// assert_eq!(cameras.len(), 6);
@@ -152,16 +139,17 @@ pub fn camera_towards(
     settings: &RigSettings,
 ) -> Result<Pinhole> {
     settings.check()?;
-    let unit = |what: &str, v: DVec3| {
-        v.try_normalize()
-            .ok_or_else(|| Error::invalid(what, "a finite vector of some length", v.to_string()))
-    };
-    let (direction, up) = (unit("view direction", direction)?, unit("up", up)?);
+    let (direction, up) = (unit_vector("view direction", direction)?, unit_vector("up", up)?);
     let frame =
         DMat3::from_cols(up.any_orthonormal_vector().cross(up), up.any_orthonormal_vector(), up);
     let frame = frame.transpose();
     let object = Extent::new(mesh, frame);
     object.camera(frame * direction, settings)
+}
+
+fn unit_vector(what: &str, v: DVec3) -> Result<DVec3> {
+    v.try_normalize()
+        .ok_or_else(|| Error::invalid(what, "a finite vector of some length", v.to_string()))
 }
 
 /// `count` unit vectors spread evenly over the sphere along a golden-angle spiral, from +z down to
@@ -208,6 +196,8 @@ impl Extent {
         let up = direction.cross(right);
         let camera_from_frame = DMat3::from_cols(right, -up, -direction).transpose();
         let rotation = camera_from_frame * self.frame;
+        // A sphere of radius r at distance d fills the full angle 2·asin(r/d), so that it fills the
+        // field of view φ at d = r / sin(φ/2).
         let distance = STAND_OFF * self.radius / (settings.field_of_view / 2.0).sin();
         let translation = DVec3::Z * distance - rotation * self.centre;
         let camera_from_object = DAffine3::from_mat3_translation(rotation, translation);
@@ -215,6 +205,10 @@ impl Extent {
         let (low, high) = self.silhouette(camera_from_object);
         let half = ((high - low) / 2.0).truncate().max_element();
         let half_of_sphere = self.radius / distance;
+        // A slope s = x/z reaches f·s pixels from the principal point. The silhouette's half h is to
+        // fill the share `fill` of half a side, but zoomed no farther than `max_zoom` beyond the
+        // sphere's half r/d:
+        //   f = fill · side/2 / max(h, (r/d)/max_zoom),   c = side/2 − f · middle
         let side = f64::from(settings.size);
         let focal = settings.fill * side / 2.0 / half.max(half_of_sphere / settings.max_zoom);
         let middle = (low + high) / 2.0;
@@ -251,16 +245,18 @@ impl Extent {
         let (side, focal) = (f64::from(settings.size), whole.fx() / CLOSE_UP);
         // At either end the silhouette keeps the margin that it has in the whole view.
         let travel = ((extent[axis] - settings.fill * side / focal) / 2.0).max(0.0);
-        let close_up = |k: usize| {
+        let mut cameras = Vec::with_capacity(settings.close_ups);
+        for k in 0..settings.close_ups {
             let last = settings.close_ups as f64 - 1.0;
             let along = if last > 0.0 { 2.0 * k as f64 / last - 1.0 } else { 0.0 };
             let mut centre = middle;
             centre[axis] += along * travel;
             let [cx, cy] = [centre.x, centre.y].map(|slope| side / 2.0 - focal * slope);
             let intrinsics = Intrinsics { fx: focal, fy: focal, cx, cy, ..whole.intrinsics() };
-            Ok(Pinhole::with_pixel_centres_at_half(intrinsics, whole.camera_from_world())?)
-        };
-        (0..settings.close_ups).map(close_up).collect()
+            let pose = whole.camera_from_world();
+            cameras.push(Pinhole::with_pixel_centres_at_half(intrinsics, pose)?);
+        }
+        Ok(cameras)
     }
 }
 

@@ -4,7 +4,7 @@ mod shapes;
 
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
-use semfm_views::render::openness;
+use semfm_views::openness;
 use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
 use shapes::{ellipsoid, lumpy_torus, together};
 

@@ -133,7 +133,7 @@ fn views_come_back_whole_and_one_by_one() {
     for (view, (found, expected)) in file.views.iter().zip(views()).enumerate() {
         assert_same_camera(&found.camera, &expected.camera);
         assert_eq!(*found, View { camera: found.camera, ..expected });
-        assert_eq!(read_view(&path, view).unwrap().1, *found);
+        assert_eq!(read_view(&path, view).unwrap().view, *found);
     }
     let error = read_view(&path, 2).unwrap_err();
     assert!(error.to_string().starts_with("view: expected 000 to 001"), "{error}");

@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args};
 use semfm::geom::math::DVec3;
 use semfm::region_file::write_region;
 use semfm::regions;
-use semfm::views::mcap::read_view;
+use semfm::views::mcap::{SingleView, read_view};
 use semfm::{Mesh, Region};
 
 use super::Outcome;
@@ -97,7 +97,7 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
         .parse()
         .with_context(|| format!("--view: expected a number after #, found `{number}`"))?;
     let path = Path::new(path);
-    let (metadata, view) = read_view(path, number)?;
+    let SingleView { metadata, view } = read_view(path, number)?;
     metadata.check_mesh(mesh, path)?;
     let picture = image::open(mask).with_context(|| mask.display().to_string())?.into_luma8();
     let (width, height) = (view.camera.width(), view.camera.height());

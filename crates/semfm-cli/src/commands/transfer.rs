@@ -9,7 +9,7 @@ use semfm::geom::io::MeshFile;
 use semfm::grasp::Grasps;
 use semfm::output::stages_ms;
 use semfm::region_file::read_region;
-use semfm::views::lift::LiftSettings;
+use semfm::views::LiftSettings;
 use semfm::{
     Meaning, Method, PipelineSettings, PreparedObject, Region, Rule, Task, Transfer, Verdict,
     transfer,

@@ -2,7 +2,7 @@
 
 use semfm::geom::math::{DVec3, bounds};
 use semfm::geom::{Mesh, principal_axes};
-use semfm::views::rig::fibonacci_directions;
+use semfm::views::fibonacci_directions;
 
 use crate::Result;
 

@@ -4,8 +4,8 @@
 use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::geom::{Mesh, Pinhole, Task};
-use semfm::views::rig::{camera_towards, fibonacci_directions};
 use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, render};
+use semfm::views::{camera_towards, fibonacci_directions};
 
 use super::pair_rotation::{Standing, WeightedMesh, pair_rotation};
 use super::upright::upright;

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 
 /// A driver that has not finished a batch after this long hangs: lavapipe fills the largest there
 /// are in a tenth of it.
-const PATIENCE: Duration = Duration::from_secs(120);
+const DRIVER_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Less than what the driver has, so that tests meet its limits.
 pub(super) struct DriverLimits {
@@ -54,11 +54,11 @@ impl Device {
         let (device, queue) = pollster::block_on(adapter.request_device(&description))
             .map_err(|error| Error::Gpu { reason: error.to_string() })?;
         let fault = Arc::new(Mutex::new(None));
-        let heard = fault.clone();
-        device.on_uncaptured_error(Arc::new(move |error| note(&heard, error.to_string())));
-        let heard = fault.clone();
+        let kept = fault.clone();
+        device.on_uncaptured_error(Arc::new(move |error| note(&kept, error.to_string())));
+        let kept = fault.clone();
         device.set_device_lost_callback(move |_, message| {
-            note(&heard, format!("the device was lost: {message}"));
+            note(&kept, format!("the device was lost: {message}"));
         });
         Ok(Self { device, queue, adapter: adapter.get_info(), fault })
     }
@@ -97,7 +97,7 @@ impl Device {
     pub fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
         let poll = wgpu::PollType::Wait {
             submission_index: Some(submission.clone()),
-            timeout: Some(PATIENCE),
+            timeout: Some(DRIVER_TIMEOUT),
         };
         // The library panics where the driver is lost in this very moment.
         let waited = catch_unwind(AssertUnwindSafe(|| self.device.poll(poll)));

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use semfm_geom::Pinhole;
 
 use super::Driver;
+use super::device::Device;
 use super::gpu_mesh::GpuMesh;
 use super::pipelines::CameraBlock;
 use super::render_target::{COLOR_BYTES, Extent, ID_BYTES, RenderTarget, padded};
@@ -91,7 +92,6 @@ impl Draw<'_> {
             place[..size_of::<CameraBlock>()].copy_from_slice(bytemuck::bytes_of(&block));
         }
         let blocks = driver.buffer(&bytes, wgpu::BufferUsages::UNIFORM)?;
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera = entry(
             0,
             wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -100,16 +100,12 @@ impl Draw<'_> {
                 size: std::num::NonZero::new(size_of::<CameraBlock>() as u64),
             }),
         );
-        let group = |layout, entries: &[wgpu::BindGroupEntry<'_>]| {
-            let description = wgpu::BindGroupDescriptor { label: None, layout, entries };
-            driver.device.create_bind_group(&description)
-        };
         let samples = target.colors.as_ref().map(|colors| {
             let samples = entry(1, wgpu::BindingResource::TextureView(&colors.samples));
             let between = entry(2, wgpu::BindingResource::Sampler(&pipelines.between));
-            group(&pipelines.samples_layout, &[camera.clone(), samples, between])
+            group(driver, &pipelines.samples_layout, &[camera.clone(), samples, between])
         });
-        let camera = group(&pipelines.camera_layout, &[camera]);
+        let camera = group(driver, &pipelines.camera_layout, &[camera]);
         Ok(Bound { stride: stride as u32, camera, samples })
     }
 
@@ -184,6 +180,19 @@ fn each_tile(tiles: &[Tile], views: &mut [View], work: impl Fn(&mut View, &Tile)
 /// What a pixel holds that sees no triangle: number −1, and an endless depth.
 const NO_TRIANGLE: wgpu::Color =
     wgpu::Color { r: u32::MAX as f64, g: f32::INFINITY.to_bits() as f64, b: 0.0, a: 0.0 };
+
+fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry { binding, resource }
+}
+
+fn group(
+    device: &Device,
+    layout: &wgpu::BindGroupLayout,
+    entries: &[wgpu::BindGroupEntry<'_>],
+) -> wgpu::BindGroup {
+    let description = wgpu::BindGroupDescriptor { label: None, layout, entries };
+    device.device.create_bind_group(&description)
+}
 
 /// A pass that clears its target before it draws.
 fn begin<'a>(

@@ -67,8 +67,8 @@ fn a_lost_driver_is_an_error_and_is_opened_anew() {
 #[test]
 fn a_driver_that_is_lost_while_it_draws_is_an_error() {
     // Small buffers, so that there are several batches.
-    let limits = || DriverLimits { buffer_bytes: 150 << 10, ..Default::default() };
-    let Some(counted) = open(&limits()) else { return };
+    let limits = DriverLimits { buffer_bytes: 150 << 10, ..Default::default() };
+    let Some(counted) = open(&limits) else { return };
     let mut setup = setup();
     setup.mesh = zoo::torus(12, 8);
     let steps = Arc::new(AtomicUsize::new(0));
@@ -80,7 +80,7 @@ fn a_driver_that_is_lost_while_it_draws_is_an_error() {
     let n_steps = steps.load(Ordering::Relaxed);
     assert!(n_steps > 3, "{n_steps} steps");
     for lost_at in 0..n_steps {
-        let gpu = open(&limits()).unwrap();
+        let gpu = open(&limits).unwrap();
         let (driver, step) = (gpu.current(), AtomicUsize::new(0));
         let task = Task::with_progress(move |_| {
             if step.fetch_add(1, Ordering::Relaxed) == lost_at {

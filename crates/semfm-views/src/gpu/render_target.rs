@@ -64,36 +64,24 @@ pub(super) struct Colors {
 
 impl RenderTarget {
     pub fn new(device: &Device, extent: Extent, per_pixel: u32) -> Self {
-        let texture = |scale: u32, format, more| {
-            device.device.create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: extent.scaled(scale).texture(),
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | more,
-                view_formats: &[],
-            })
-        };
         let (read, none) = (wgpu::TextureUsages::COPY_SRC, wgpu::TextureUsages::empty());
-        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let samples = extent.scaled(per_pixel);
         let colors = (per_pixel > 0).then(|| {
             let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
-            let mean = texture(1, COLOR_FORMAT, read);
+            let mean = texture(device, extent, COLOR_FORMAT, read);
             Colors {
-                samples: view(&texture(per_pixel, COLOR_FORMAT, sampled)),
-                depth: view(&texture(per_pixel, DEPTH_FORMAT, none)),
+                samples: view(&texture(device, samples, COLOR_FORMAT, sampled)),
+                depth: view(&texture(device, samples, DEPTH_FORMAT, none)),
                 mean_view: view(&mean),
                 mean: ReadBack::new(device, mean, extent, COLOR_BYTES),
             }
         });
-        let ids = texture(1, ID_FORMAT, read);
+        let ids = texture(device, extent, ID_FORMAT, read);
         Self {
             extent,
             per_pixel,
             id_view: view(&ids),
-            id_depth: view(&texture(1, DEPTH_FORMAT, none)),
+            id_depth: view(&texture(device, extent, DEPTH_FORMAT, none)),
             colors,
             ids: ReadBack::new(device, ids, extent, ID_BYTES),
         }
@@ -133,6 +121,29 @@ impl RenderTarget {
         self.colors.iter().for_each(|colors| colors.mean.buffer.unmap());
         Ok(answer)
     }
+}
+
+/// A texture to be drawn into, and more.
+fn texture(
+    device: &Device,
+    extent: Extent,
+    format: wgpu::TextureFormat,
+    more: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    device.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: extent.texture(),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | more,
+        view_formats: &[],
+    })
+}
+
+fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&Default::default())
 }
 
 /// A texture and the buffer in which it comes back.

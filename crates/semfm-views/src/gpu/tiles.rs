@@ -73,22 +73,25 @@ pub(super) fn batches(
     let side = (limits.max_texture_dimension_2d / request.settings.supersampling).max(1) as usize;
     let on_cpu = device.adapter.device_type == wgpu::DeviceType::Cpu;
     let batch = if on_cpu { BATCH_BYTES_ON_CPU } else { BATCH_BYTES };
-    let within = |bytes: u64, scale: u32| bytes / u64::from(scale * scale);
-    let most = within(limits.max_buffer_size, scale);
-    let tile = within(TILE_BYTES, request.settings.supersampling).min(most);
-    let batch = within(batch, scale).min(tile);
+    let values_per_pixel = u64::from(scale * scale);
+    let samples_per_pixel = u64::from(request.settings.supersampling.pow(2));
+    let most = limits.max_buffer_size / values_per_pixel;
+    let tile = (TILE_BYTES / samples_per_pixel).min(most);
+    let batch = (batch / values_per_pixel).min(tile);
     pack(&windows, side, batch, tile)
 }
 
 fn window(request: &Request<'_>, camera: &Pinhole) -> [Range<usize>; 2] {
     let [columns, rows] = Projection::new(request.mesh, camera).window();
-    let wider = |pixels: Range<usize>, side: u32| {
-        if pixels.is_empty() {
-            return pixels;
-        }
-        pixels.start.saturating_sub(MARGIN)..(pixels.end + MARGIN).min(side as usize)
-    };
-    [wider(columns, camera.width()), wider(rows, camera.height())]
+    [with_margin(columns, camera.width()), with_margin(rows, camera.height())]
+}
+
+/// A range of pixels with its [`MARGIN`], within an image's side.
+fn with_margin(pixels: Range<usize>, side: u32) -> Range<usize> {
+    if pixels.is_empty() {
+        return pixels;
+    }
+    pixels.start.saturating_sub(MARGIN)..(pixels.end + MARGIN).min(side as usize)
 }
 
 /// Cuts windows to tiles of at most `side` pixels along each side and `tile_bytes`, and puts them in

@@ -48,11 +48,9 @@ pub(super) fn nearest_seen(samples: &[SurfaceSample], n_views: &[u32]) -> Result
     }
     let seen_points: Vec<DVec3> = seen.iter().map(|&j| samples[j].point).collect();
     let index = PointIndex::new(&seen_points)?;
-    let in_space = |j: usize| seen[index.nearest(samples[j].point).0];
-    Ok(source
-        .into_iter()
-        .enumerate()
-        .map(|(j, from)| from.unwrap_or_else(|| in_space(j)))
+    let sources = source.into_iter().zip(samples);
+    Ok(sources
+        .map(|(from, sample)| from.unwrap_or_else(|| seen[index.nearest(sample.point).0]))
         .collect())
 }
 

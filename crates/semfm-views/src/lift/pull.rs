@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use semfm_geom::sampling::SurfaceSample;
-use semfm_geom::{Mesh, PixelDepth, Task};
+use semfm_geom::{Mesh, Pinhole, PixelDepth, Task};
 
 use super::nearest_seen::nearest_seen;
 use super::{Features, nothing_in_sight};
@@ -18,7 +18,7 @@ const GRAZING_WEIGHT: f32 = 0.05;
 /// back on the neighbours when that patch has no say.
 const LEAST_BILINEAR: f32 = 1e-4;
 
-/// Patches covered by less than this share speak of the background: they count only where no
+/// Patches covered by less than this share describe the background: they count only where no
 /// better one is near.
 const LEAST_COVERAGE: f32 = 0.1;
 const BACKGROUND_WEIGHT: f32 = 1e-3;
@@ -30,6 +30,12 @@ struct Sighting {
     weight: f32,
 }
 
+/// The feature of a sample is the mean over the views v that see it,
+///
+/// > f = Σ_v (w_v / Σ_u w_u) Σ_k m_vk t_vk,   w_v = |cos θ_v| + .05,
+///
+/// where θ_v is the angle between the normal and the direction to the camera, and the four patches
+/// around the sample's pixel have the vectors t_vk and weights m_vk of sum 1 ([`patch_mix`]).
 pub(super) fn pull(
     mesh: &Mesh,
     samples: &[SurfaceSample],
@@ -90,13 +96,11 @@ fn sightings(
     tolerance: f64,
 ) -> Vec<Option<Sighting>> {
     let camera = &view.camera;
-    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
     let projected: Vec<PixelDepth> = samples.iter().map(|s| camera.project(s.point)).collect();
-    let in_image = |&PixelDepth { u, v, z }: &PixelDepth| {
-        z > 0.0 && (0.0..=width).contains(&u) && (0.0..=height).contains(&v)
-    };
-    let positions: Vec<[f64; 2]> =
-        projected.iter().map(|p| if in_image(p) { [p.u, p.v] } else { [f64::NAN; 2] }).collect();
+    let positions: Vec<[f64; 2]> = projected
+        .iter()
+        .map(|p| if in_image(camera, p) { [p.u, p.v] } else { [f64::NAN; 2] })
+        .collect();
     let nearest = inverse_depths(&Projection::new(mesh, camera), &positions);
     let eye = camera.eye();
     samples
@@ -105,7 +109,7 @@ fn sightings(
         .zip(&nearest)
         .map(|((sample, p), &inverse_depth)| {
             // No surface at all (1/0 = ∞) is rounding at the very edge of the silhouette.
-            if !in_image(p) || p.z > 1.0 / inverse_depth + tolerance {
+            if !in_image(camera, p) || p.z > 1.0 / inverse_depth + tolerance {
                 return None;
             }
             let patches = patch_mix(&view.patches, p.u, p.v)?;
@@ -113,6 +117,12 @@ fn sightings(
             Some(Sighting { patches, weight: cosine as f32 + GRAZING_WEIGHT })
         })
         .collect()
+}
+
+/// Whether a point falls into the image, in front of the camera.
+fn in_image(camera: &Pinhole, &PixelDepth { u, v, z }: &PixelDepth) -> bool {
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
+    z > 0.0 && (0.0..=width).contains(&u) && (0.0..=height).contains(&v)
 }
 
 /// The four patches around a pixel position with their weights (sum 1): bilinear between patch
@@ -124,8 +134,9 @@ fn patch_mix(patches: &PatchEmbeddings, u: f64, v: f64) -> Option<[(usize, f32);
     // images that are no multiple of the patch leave up to one patch of margin around it.
     let x = (u - left) / (right - left) * cols as f64 - 0.5;
     let y = (v - top) / (bottom - top) * rows as f64 - 0.5;
-    let inside = |x: f64, count: usize| (-1.5..=count as f64 + 0.5).contains(&x);
-    if !(inside(x, cols) && inside(y, rows)) {
+    let is_inside =
+        (-1.5..=cols as f64 + 0.5).contains(&x) && (-1.5..=rows as f64 + 0.5).contains(&y);
+    if !is_inside {
         return None;
     }
     let mut mix = [(0, 0.0); 4];

@@ -1,6 +1,7 @@
 //! What an MCAP file declares and holds beside its messages.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 
 use super::record::{Fields, Record, opcode};
@@ -32,6 +33,49 @@ pub struct Channel {
     pub metadata: BTreeMap<String, String>,
 }
 
+/// Earliest and latest of some times, in nanoseconds of the writer's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeRange {
+    /// The earliest.
+    pub first: u64,
+    /// The latest.
+    pub last: u64,
+}
+
+impl TimeRange {
+    /// The range that holds another time, too.
+    pub(super) fn with(range: Option<Self>, time: u64) -> Self {
+        let Self { first, last } = range.unwrap_or(Self { first: time, last: time });
+        Self { first: first.min(time), last: last.max(time) }
+    }
+}
+
+impl fmt::Display for TimeRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "times {} to {}", self.first, self.last)
+    }
+}
+
+/// A metadata record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MetadataRecord {
+    /// Its name.
+    pub name: String,
+    /// Its entries.
+    pub entries: BTreeMap<String, String>,
+}
+
+/// An attachment, without its data.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Attachment {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Bytes of data.
+    pub n_bytes: u64,
+}
+
 /// About what a map entry costs beside its text.
 const ENTRY_BYTES: usize = 128;
 
@@ -48,14 +92,14 @@ pub struct Contents {
     pub channels: BTreeMap<u16, Arc<Channel>>,
     /// Messages of each channel.
     pub n_messages_of: BTreeMap<u16, u64>,
-    /// Earliest and latest time of recording, `None` without messages.
-    pub log_times: Option<(u64, u64)>,
+    /// When the messages were recorded, `None` without messages.
+    pub log_times: Option<TimeRange>,
     /// Number of chunks.
     pub n_chunks: usize,
-    /// Metadata records, name and entries, in file order.
-    pub metadata: Vec<(String, BTreeMap<String, String>)>,
-    /// Attachments in file order: name, media type, bytes of data.
-    pub attachments: Vec<(String, String, u64)>,
+    /// Metadata records in file order.
+    pub metadata: Vec<MetadataRecord>,
+    /// Attachments in file order.
+    pub attachments: Vec<Attachment>,
 }
 
 impl Contents {

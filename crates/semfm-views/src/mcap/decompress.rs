@@ -19,8 +19,9 @@ const CHUNK_BYTES_AT_MOST: usize = 256 << 20;
 /// where there is no compression.
 ///
 /// # Errors
-/// Sizes over the limits (before anything is allocated), unknown compressions, broken streams and
-/// streams that give another size.
+/// [`Fault::OverLimit`] for sizes over the limits (before anything is allocated),
+/// [`Fault::Unsupported`] for unknown compressions, [`Fault::Decompress`] for broken streams, and
+/// [`Fault::Size`] for those that give another size.
 pub(super) fn decompress<'a>(
     compression: &str,
     stored: &'a [u8],
@@ -29,12 +30,13 @@ pub(super) fn decompress<'a>(
     buffer: &'a mut Vec<u8>,
     place: Place<'_>,
 ) -> Result<&'a [u8]> {
-    let wrong_size =
-        |found: String| place.error(Fault::Size, format!("{size} bytes decompressed"), found);
     if compression.is_empty() {
         return match stored.len() as u64 == size {
             true => Ok(stored),
-            false => Err(wrong_size(format!("{} stored without compression", stored.len()))),
+            false => {
+                let found = format!("{} stored without compression", stored.len());
+                Err(wrong_size(place, size, found))
+            }
         };
     }
     if !matches!(compression, "lz4" | "zstd") {
@@ -50,30 +52,52 @@ pub(super) fn decompress<'a>(
         place.error(Fault::OverLimit, format!("at most {limit} bytes decompressed"), size)
     })?;
     buffer.resize(length, 0);
-    let broken = |error: std::io::Error| {
-        place.error(Fault::Decompress, format!("a sound {compression} stream"), error)
+    let written = match compression {
+        "zstd" => fill_from_zstd(stored, buffer),
+        _ => fill_from_lz4(stored, buffer),
     };
-    if compression == "zstd" {
-        // In one go: the streaming decoder would allocate whatever window the stream asks for.
-        let written = zstd::bulk::decompress_to_buffer(stored, &mut buffer[..]).map_err(broken)?;
-        if written != length {
-            return Err(wrong_size(written.to_string()));
+    match written {
+        Ok(Written::All) => Ok(buffer),
+        Ok(Written::Other(found)) => Err(wrong_size(place, size, found)),
+        Err(error) => {
+            let expected = format!("a sound {compression} stream");
+            Err(place.error(Fault::Decompress, expected, error))
         }
-    } else {
-        let mut decoder = lz4::Decoder::new(stored).map_err(broken)?;
-        let mut written = 0;
-        while written < length {
-            match decoder.read(&mut buffer[written..]).map_err(broken)? {
-                0 => return Err(wrong_size(written.to_string())),
-                n => written += n,
-            }
-        }
-        if decoder.read(&mut [0]).map_err(broken)? != 0 {
-            return Err(wrong_size("more".to_owned()));
-        }
-        decoder.finish().1.map_err(broken)?;
     }
-    Ok(buffer)
+}
+
+/// How much a stream gave.
+enum Written {
+    /// Exactly what was to be filled.
+    All,
+    /// Another number of bytes, in words.
+    Other(String),
+}
+
+/// In one go: the streaming decoder would allocate whatever window the stream demands.
+fn fill_from_zstd(stored: &[u8], buffer: &mut [u8]) -> std::io::Result<Written> {
+    let written = zstd::bulk::decompress_to_buffer(stored, buffer)?;
+    Ok(if written == buffer.len() { Written::All } else { Written::Other(written.to_string()) })
+}
+
+fn fill_from_lz4(stored: &[u8], buffer: &mut [u8]) -> std::io::Result<Written> {
+    let mut decoder = lz4::Decoder::new(stored)?;
+    let mut written = 0;
+    while written < buffer.len() {
+        match decoder.read(&mut buffer[written..])? {
+            0 => return Ok(Written::Other(written.to_string())),
+            n => written += n,
+        }
+    }
+    if decoder.read(&mut [0])? != 0 {
+        return Ok(Written::Other("more".to_owned()));
+    }
+    decoder.finish().1?;
+    Ok(Written::All)
+}
+
+fn wrong_size(place: Place<'_>, size: u64, found: String) -> crate::Error {
+    place.error(Fault::Size, format!("{size} bytes decompressed"), found)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use half::slice::HalfFloatSliceExt;
 use semfm_geom::Mesh;
 
 use super::cameras::{Cameras, check_camera};
-use super::decode::{check_count, decode, insert_once, message_error, topic_error};
+use super::decode::{Mismatch, check_count, decode, insert_once, message_error, topic_error};
 use super::embeddings_message::{PATCH_EMBEDDINGS, PatchEmbeddingsMessage};
 use super::messages::{camera_calibration, camera_transform, timestamp};
 use super::metadata::{EmbeddingsMetadata, METADATA_NAME};
@@ -89,8 +89,9 @@ impl EmbeddingsFile {
         let size = (metadata.views.width, metadata.views.height);
         let cameras = cameras.finish(path, n_views, size)?;
         let views = cameras.into_iter().enumerate().map(|(view, camera)| {
-            let missing = || topic_error(path, &topic(view, "embeddings"), "one message", "none");
-            let patches = patches.remove(&view).ok_or_else(missing)?;
+            let patches = patches.remove(&view).ok_or_else(|| {
+                topic_error(path, &topic(view, "embeddings"), "one message", "none")
+            })?;
             Ok(EmbeddedView { camera, patches })
         });
         Ok(Self { path: path.to_path_buf(), metadata, views: views.collect::<Result<_>>()? })
@@ -126,7 +127,7 @@ impl EmbeddingsFile {
 
     fn check(&self) -> Result<()> {
         if self.views.is_empty() {
-            return Err(invalid("views".to_owned(), "at least one", "none"));
+            return Err(Error::invalid("views", "at least one", "none"));
         }
         let size = (self.metadata.views.width, self.metadata.views.height);
         for (view, embedded) in self.views.iter().enumerate() {
@@ -134,20 +135,20 @@ impl EmbeddingsFile {
             let found = (embedded.camera.width(), embedded.camera.height());
             if found != size {
                 let what = format!("image size of view {view:03}");
-                return Err(invalid(what, format!("{size:?}"), format!("{found:?}")));
+                return Err(Error::invalid(
+                    what,
+                    format!("{} × {}", size.0, size.1),
+                    format!("{} × {}", found.0, found.1),
+                ));
             }
             let found = embedded.patches.dim();
             if found != self.dim() {
                 let expected = format!("dimension {}, as in view 000", self.dim());
-                return Err(invalid(format!("view {view:03}"), expected, found.to_string()));
+                return Err(Error::invalid(format!("view {view:03}"), expected, found.to_string()));
             }
         }
         Ok(())
     }
-}
-
-fn invalid(what: String, expected: impl Into<String>, found: impl Into<String>) -> Error {
-    Error::Invalid { what, expected: expected.into(), found: found.into() }
 }
 
 fn write_view(
@@ -180,8 +181,8 @@ fn write_view(
 }
 
 fn count(n: usize) -> Result<u32> {
-    let error = |_| invalid("rows, cols or dim".to_owned(), "less than 2^32", n.to_string());
-    u32::try_from(n).map_err(error)
+    u32::try_from(n)
+        .map_err(|_| Error::invalid("rows, cols or dim", "less than 2^32", n.to_string()))
 }
 
 /// Numbers are converted in blocks of this many, which stay in the cache.
@@ -194,12 +195,11 @@ fn encode(view: usize, patches: &PatchEmbeddings, dtype: Dtype) -> Result<Bytes>
     match dtype {
         Dtype::F32 => extend(&mut bytes, numbers, f32::to_le_bytes),
         Dtype::F16 => {
-            let is_over = |x: &f32| x.is_finite() && f16::from_f32(*x).is_infinite();
             // Everything from here on rounds to infinity.
             let any_large = numbers.iter().fold(false, |any, x| any | (x.abs() >= 65_520.0));
-            if any_large && let Some(at) = numbers.iter().position(is_over) {
+            if any_large && let Some(at) = numbers.iter().position(|&x| is_beyond_half(x)) {
                 let what = format!("view {view:03}, number {at}");
-                return Err(invalid(what, "at most 65504 for f16", numbers[at].to_string()));
+                return Err(Error::invalid(what, "at most 65504 for f16", numbers[at].to_string()));
             }
             let mut halves = [f16::ZERO; BLOCK];
             for numbers in numbers.chunks(BLOCK) {
@@ -210,6 +210,11 @@ fn encode(view: usize, patches: &PatchEmbeddings, dtype: Dtype) -> Result<Bytes>
         }
     }
     Ok(bytes.into())
+}
+
+/// Finite, but not in half precision.
+fn is_beyond_half(x: f32) -> bool {
+    x.is_finite() && f16::from_f32(x).is_infinite()
 }
 
 /// Appends numbers as little-endian bytes: in one go where the machine holds them so already.
@@ -226,23 +231,30 @@ fn extend<T: bytemuck::NoUninit, const N: usize>(
 
 /// One grid, checked but for its dimension, which the first view sets.
 fn read_grid(path: &Path, view: usize, message: &Message<'_>) -> Result<PatchEmbeddings> {
-    let error = |expected: &str, found: String| message_error(path, message, expected, found);
     let grid: PatchEmbeddingsMessage = decode(path, message, PATCH_EMBEDDINGS)?;
+    patches_of(view, grid).map_err(|mismatch| mismatch.in_message(path, message))
+}
+
+fn patches_of(
+    view: usize,
+    grid: PatchEmbeddingsMessage,
+) -> std::result::Result<PatchEmbeddings, Mismatch> {
     if grid.frame_id != frame(view) {
-        return Err(error(&format!("the frame `{}`", frame(view)), format!("`{}`", grid.frame_id)));
+        let found = format!("`{}`", grid.frame_id);
+        return Err(Mismatch::new(format!("the frame `{}`", frame(view)), found));
     }
     let dtype = Dtype::parse(&grid.dtype)
-        .ok_or_else(|| error("the dtype `f16` or `f32`", format!("`{}`", grid.dtype)))?;
+        .ok_or_else(|| Mismatch::new("the dtype `f16` or `f32`", format!("`{}`", grid.dtype)))?;
     let product = u64::from(grid.rows).checked_mul(grid.cols.into());
     let product = product.and_then(|n| n.checked_mul(grid.dim.into()));
     let n_bytes = product.and_then(|n| n.checked_mul(dtype.n_bytes() as u64));
     if n_bytes != Some(grid.data.len() as u64) {
         let PatchEmbeddingsMessage { rows, cols, dim, .. } = grid;
         let expected = format!("{rows} × {cols} × {dim} numbers of {} bytes", dtype.n_bytes());
-        return Err(error(&expected, format!("{} bytes of data", grid.data.len())));
+        return Err(Mismatch::new(expected, format!("{} bytes of data", grid.data.len())));
     }
     if let Some(byte) = grid.valid.iter().find(|&&valid| valid > 1) {
-        return Err(error("0 or 1 for the validity of a patch", byte.to_string()));
+        return Err(Mismatch::new("0 or 1 for the validity of a patch", byte.to_string()));
     }
     let place = PatchGrid {
         rows: grid.rows as usize,
@@ -254,9 +266,9 @@ fn read_grid(path: &Path, view: usize, message: &Message<'_>) -> Result<PatchEmb
     PatchEmbeddings::new(place, grid.dim as usize, data, grid.coverage.to_vec(), valid).map_err(
         |refusal| match refusal {
             Error::Invalid { what, expected, found } => {
-                error(&format!("{what}: {expected}"), found)
+                Mismatch::new(format!("{what}: {expected}"), found)
             }
-            other => other,
+            other => Mismatch::new("sound patches", other.to_string()),
         },
     )
 }

@@ -72,20 +72,6 @@ impl Decode for PatchEmbeddingsMessage {
 
 /// The schema record's data: a `FileDescriptorSet` of our message and the timestamp it uses.
 fn descriptor() -> Vec<u8> {
-    let field = |name: &str, number: i32, kind: Type| FieldDescriptorProto {
-        name: Some(name.to_owned()),
-        json_name: Some(name.to_owned()),
-        number: Some(number),
-        label: Some(Label::Optional.into()),
-        r#type: Some(kind.into()),
-        type_name: (kind == Type::Message).then(|| ".google.protobuf.Timestamp".to_owned()),
-        ..Default::default()
-    };
-    let message = |name: &str, field: Vec<FieldDescriptorProto>| DescriptorProto {
-        name: Some(name.to_owned()),
-        field,
-        ..Default::default()
-    };
     let timestamp = FileDescriptorProto {
         name: Some("google/protobuf/timestamp.proto".to_owned()),
         package: Some("google.protobuf".to_owned()),
@@ -122,4 +108,20 @@ fn descriptor() -> Vec<u8> {
         ..Default::default()
     };
     FileDescriptorSet { file: vec![timestamp, embeddings] }.encode_to_vec()
+}
+
+fn field(name: &str, number: i32, kind: Type) -> FieldDescriptorProto {
+    FieldDescriptorProto {
+        name: Some(name.to_owned()),
+        json_name: Some(name.to_owned()),
+        number: Some(number),
+        label: Some(Label::Optional.into()),
+        r#type: Some(kind.into()),
+        type_name: (kind == Type::Message).then(|| ".google.protobuf.Timestamp".to_owned()),
+        ..Default::default()
+    }
+}
+
+fn message(name: &str, field: Vec<FieldDescriptorProto>) -> DescriptorProto {
+    DescriptorProto { name: Some(name.to_owned()), field, ..Default::default() }
 }

@@ -7,8 +7,7 @@ use std::str::FromStr;
 
 use serde::de::value::StrDeserializer;
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess,
-    Unexpected, Visitor,
+    DeserializeOwned, DeserializeSeed, Deserializer, Expected, MapAccess, Unexpected, Visitor,
 };
 use serde::{Serialize, forward_to_deserialize_any};
 
@@ -22,11 +21,14 @@ pub(super) type Entries = BTreeMap<String, String>;
 pub(super) fn to_entries(record: &impl Serialize) -> Entries {
     let value = serde_json::to_value(record).expect("fields of a record have values of JSON");
     let serde_json::Value::Object(fields) = value else { panic!("a record is a struct") };
-    let text = |value| match value {
+    fields.into_iter().map(|(key, value)| (key, as_text(value))).collect()
+}
+
+fn as_text(value: serde_json::Value) -> String {
+    match value {
         serde_json::Value::String(text) => text,
         other => other.to_string(),
-    };
-    fields.into_iter().map(|(key, value)| (key, text(value))).collect()
+    }
 }
 
 /// A struct out of entries.
@@ -100,10 +102,10 @@ impl<'de> MapAccess<'de> for Record<'de> {
         seed: K,
     ) -> Result<Option<K::Value>, EntryError> {
         self.current = self.left.next().map(|(key, text)| (key.as_str(), text.as_str()));
-        let key = |(key, _): (&'de str, _)| -> StrDeserializer<'de, EntryError> {
-            key.into_deserializer()
-        };
-        self.current.map(|entry| seed.deserialize(key(entry))).transpose()
+        match self.current {
+            None => Ok(None),
+            Some((key, _)) => seed.deserialize(StrDeserializer::<EntryError>::new(key)).map(Some),
+        }
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::contents::Contents;
+use super::contents::{Attachment, Contents};
 use super::metadata::METADATA_NAME;
 use super::reader::read_messages;
 use crate::Result;
 
-/// A sound MCAP file at a glance.
+/// What a sound MCAP file holds.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct McapReport {
     /// Number of messages.
@@ -18,7 +18,7 @@ pub struct McapReport {
     /// Channels in the order of their ids.
     pub channels: Vec<ChannelReport>,
     /// Attachments in file order.
-    pub attachments: Vec<AttachmentReport>,
+    pub attachments: Vec<Attachment>,
     /// Names of the metadata records, in file order.
     pub metadata: Vec<String>,
     /// Our own metadata record, where the file has one.
@@ -28,7 +28,7 @@ pub struct McapReport {
     /// The program that wrote the file.
     pub library: String,
     /// Earliest and latest time of recording in nanoseconds, `None` without messages.
-    pub log_times: Option<(u64, u64)>,
+    pub log_times: Option<[u64; 2]>,
 }
 
 /// One channel of a file.
@@ -44,17 +44,6 @@ pub struct ChannelReport {
     pub n_messages: u64,
 }
 
-/// One attachment of a file.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct AttachmentReport {
-    /// Its name.
-    pub name: String,
-    /// Its media type.
-    pub media_type: String,
-    /// Bytes of data.
-    pub n_bytes: u64,
-}
-
 /// Reads a whole MCAP file strictly and says what is in it.
 ///
 /// # Errors
@@ -66,7 +55,6 @@ pub fn inspect(path: &Path) -> Result<McapReport> {
 
 impl McapReport {
     fn of(contents: Contents) -> Self {
-        let n_messages_of = |id| contents.n_messages_of.get(id).copied().unwrap_or(0);
         Self {
             n_messages: contents.n_messages(),
             n_chunks: contents.n_chunks,
@@ -77,27 +65,19 @@ impl McapReport {
                     topic: channel.topic.clone(),
                     schema: channel.schema.as_ref().map(|schema| schema.name.clone()),
                     encoding: channel.message_encoding.clone(),
-                    n_messages: n_messages_of(id),
+                    n_messages: contents.n_messages_of.get(id).copied().unwrap_or(0),
                 })
                 .collect(),
-            attachments: contents
-                .attachments
-                .iter()
-                .map(|(name, media_type, n_bytes)| AttachmentReport {
-                    name: name.clone(),
-                    media_type: media_type.clone(),
-                    n_bytes: *n_bytes,
-                })
-                .collect(),
-            metadata: contents.metadata.iter().map(|(name, _)| name.clone()).collect(),
+            metadata: contents.metadata.iter().map(|record| record.name.clone()).collect(),
             semfm: contents
                 .metadata
                 .iter()
-                .find(|(name, _)| name == METADATA_NAME)
-                .map(|(_, entries)| entries.clone()),
+                .find(|record| record.name == METADATA_NAME)
+                .map(|record| record.entries.clone()),
+            attachments: contents.attachments,
             profile: contents.profile,
             library: contents.library,
-            log_times: contents.log_times,
+            log_times: contents.log_times.map(|times| [times.first, times.last]),
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::contents::TimeRange;
+
 /// Where the data section's records lie.
 #[derive(Default)]
 pub(super) struct Layout {
@@ -15,12 +17,28 @@ pub(super) struct Layout {
 pub(super) struct StoredChunk {
     pub offset: u64,
     pub length: u64,
-    pub times: (u64, u64),
+    pub times: TimeRange,
     pub compression: String,
     pub compressed_size: u64,
     pub size: u64,
     pub message_indexes: BTreeMap<u16, u64>,
     pub message_index_length: u64,
+}
+
+impl StoredChunk {
+    /// Lengths and compression, for comparison and for messages.
+    pub fn sizes(&self) -> String {
+        let Self { length, compression, compressed_size, size, .. } = self;
+        format!("{length} bytes, `{compression}`, {compressed_size} for {size} bytes")
+    }
+
+    /// Where its message indexes are, for messages.
+    pub fn indexes(&self) -> String {
+        let places = self.message_indexes.iter();
+        let places: Vec<String> =
+            places.map(|(channel, at)| format!("channel {channel} at byte {at}")).collect();
+        format!("message indexes ({}) in {} bytes", places.join(", "), self.message_index_length)
+    }
 }
 
 /// What an Attachment Index record says of an attachment.

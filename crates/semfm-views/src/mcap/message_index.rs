@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::contents::TimeRange;
 use super::record::{Fields, Place};
 use crate::{Fault, Result};
 
@@ -30,14 +31,12 @@ impl ChunkMessages {
     }
 
     /// The chunk's own times are those of its earliest and latest message.
-    pub fn check_times(&self, start: u64, end: u64, place: Place<'_>) -> Result<()> {
-        let times = || self.messages.iter().map(|message| message.log_time);
-        match (times().min(), times().max()) {
-            (Some(first), Some(last)) if (first, last) != (start, end) => Err(place.error(
-                Fault::Count,
-                format!("messages from time {start} to {end}"),
-                format!("from {first} to {last}"),
-            )),
+    pub fn check_times(&self, stated: TimeRange, place: Place<'_>) -> Result<()> {
+        let times = self.messages.iter().map(|message| message.log_time);
+        match times.fold(None, |range, time| Some(TimeRange::with(range, time))) {
+            Some(found) if found != stated => {
+                Err(place.error(Fault::Count, format!("messages of {stated}"), found))
+            }
             _ => Ok(()),
         }
     }

@@ -13,6 +13,7 @@ use semfm_geom::{Mesh, MeshHash, MeshIdentity};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
 
+use super::contents::MetadataRecord;
 use super::entries::{Entries, EntryError, from_entries, to_entries};
 use crate::{Error, Result};
 
@@ -150,7 +151,7 @@ impl ViewsMetadata {
     }
 
     /// Reads the record of a views file; also the number of views that it names.
-    pub(super) fn read(path: &Path, records: &[(String, Entries)]) -> Result<(Self, usize)> {
+    pub(super) fn read(path: &Path, records: &[MetadataRecord]) -> Result<(Self, usize)> {
         let entries = own_record(path, records, VIEWS_FORMAT)?;
         Self::of_record(from_entries(entries).map_err(|error| at_fault(path, error))?, path)
     }
@@ -186,7 +187,7 @@ impl EmbeddingsMetadata {
     }
 
     /// Reads the record of an embeddings file; also the number of views that it names.
-    pub(super) fn read(path: &Path, records: &[(String, Entries)]) -> Result<(Self, usize)> {
+    pub(super) fn read(path: &Path, records: &[MetadataRecord]) -> Result<(Self, usize)> {
         let entries = own_record(path, records, EMBEDDINGS_FORMAT)?;
         let record: EmbeddingsRecord =
             from_entries(entries).map_err(|error| at_fault(path, error))?;
@@ -201,14 +202,10 @@ impl EmbeddingsMetadata {
 }
 
 /// The one record of ours in a file, which must be of the given format.
-fn own_record<'r>(
-    path: &Path,
-    records: &'r [(String, Entries)],
-    format: &str,
-) -> Result<&'r Entries> {
-    let mut ours = records.iter().filter(|(name, _)| name == METADATA_NAME);
+fn own_record<'r>(path: &Path, records: &'r [MetadataRecord], format: &str) -> Result<&'r Entries> {
+    let mut ours = records.iter().filter(|record| record.name == METADATA_NAME);
     let entries = match (ours.next(), ours.next()) {
-        (Some((_, entries)), None) => entries,
+        (Some(record), None) => &record.entries,
         (first, _) => {
             let expected = format!("one record named `{METADATA_NAME}`");
             let found = if first.is_none() { "none" } else { "more than one" };

@@ -3,7 +3,7 @@
 //! A views file ([`write_views`], [`ViewsFile`]) holds Foxglove's well-known messages and opens in
 //! any viewer that knows those; an embeddings file ([`EmbeddingsFile`]) holds
 //! `semfm.PatchEmbeddings` with the cameras. Everything is read by [`read_messages`], which
-//! believes no length, offset, count or checksum that it has not compared with the bytes.
+//! uses no length, offset, count or checksum that it has not compared with the bytes.
 
 mod cameras;
 mod contents;
@@ -25,15 +25,15 @@ mod topics;
 mod views_file;
 mod writer;
 
-pub use contents::{Channel, Contents, Schema};
+pub use contents::{Attachment, Channel, Contents, MetadataRecord, Schema, TimeRange};
 pub use decode::{decode, message_error};
 pub use embeddings_file::{Dtype, EmbeddingsFile};
 pub use embeddings_message::PATCH_EMBEDDINGS;
-pub use inspect::{AttachmentReport, ChannelReport, McapReport, inspect};
+pub use inspect::{ChannelReport, McapReport, inspect};
 pub use messages::{Colors, find_mesh, read_mesh};
 pub use metadata::{EmbeddingsMetadata, METADATA_NAME, ViewsMetadata};
 pub use pose_array::{POSES_TOPIC, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};
 pub use topics::TF;
-pub use views_file::{ViewsFile, read_view, write_views};
+pub use views_file::{SingleView, ViewsFile, read_view, write_views};
 pub use writer::{ChunkCompression, McapWriter, write_mcap};

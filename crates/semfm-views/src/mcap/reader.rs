@@ -20,7 +20,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::contents::{Channel, Contents};
+use super::contents::{Attachment, Channel, Contents, MetadataRecord, TimeRange};
 use super::decompress::decompress;
 use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
 use super::message_index::ChunkMessages;
@@ -91,27 +91,28 @@ pub fn read_bytes(
 
 /// The file without the magic at its end; offsets keep counting from its start.
 fn between_magics<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
-    let error = |offset, fault, found: &str| {
-        let place = Place { path, opcode: None, offset, chunk: None };
-        place.error(fault, "the magic bytes of MCAP version 0 (89 4d 43 41 50 30 0d 0a)", found)
-    };
+    let start = Place { path, opcode: None, offset: 0, chunk: None };
     if bytes.is_empty() {
-        return Err(error(0, Fault::Truncated, "an empty file"));
+        return Err(start.error(Fault::Truncated, MAGIC_BYTES, "an empty file"));
     }
     if !bytes.starts_with(MAGIC) {
         return Err(match MAGIC.starts_with(bytes) {
-            true => error(0, Fault::Truncated, "only the first of them"),
-            false => error(0, Fault::Magic, "other bytes: this is no MCAP file"),
+            true => start.error(Fault::Truncated, MAGIC_BYTES, "only the first of them"),
+            false => start.error(Fault::Magic, MAGIC_BYTES, "other bytes: this is no MCAP file"),
         });
     }
     match bytes[MAGIC.len()..].strip_suffix(MAGIC) {
         Some(rest) => Ok(&bytes[..MAGIC.len() + rest.len()]),
         None => {
+            let end = Place { offset: bytes.len().saturating_sub(MAGIC.len()), ..start };
             let found = "other bytes at the end of the file: it was cut or never finished";
-            Err(error(bytes.len().saturating_sub(MAGIC.len()), Fault::Truncated, found))
+            Err(end.error(Fault::Truncated, MAGIC_BYTES, found))
         }
     }
 }
+
+/// What stands at both ends of a file, for messages.
+const MAGIC_BYTES: &str = "the magic bytes of MCAP version 0 (89 4d 43 41 50 30 0d 0a)";
 
 /// Schemas and channels out of chunks may take this much memory whatever the size of the file,
 const KEPT_BYTES: usize = 16 << 20;
@@ -203,8 +204,7 @@ impl<'a> Pass<'a, '_> {
         let count = self.contents.n_messages_of.entry(id).or_default();
         let index = *count;
         *count += 1;
-        let (first, last) = self.contents.log_times.unwrap_or((log_time, log_time));
-        self.contents.log_times = Some((first.min(log_time), last.max(log_time)));
+        self.contents.log_times = Some(TimeRange::with(self.contents.log_times, log_time));
         if let Some(messages) = &mut self.chunk_messages {
             messages.push(id, record.place.offset, log_time);
         }
@@ -214,7 +214,7 @@ impl<'a> Pass<'a, '_> {
 
     fn chunk(&mut self, record: &Record<'_>) -> Result<()> {
         let mut fields = record.fields();
-        let (start_time, end_time) = (fields.u64()?, fields.u64()?);
+        let times = TimeRange { first: fields.u64()?, last: fields.u64()? };
         let (size, crc) = (fields.u64()?, fields.u32()?);
         let compression = fields.text()?;
         let stored = fields.long_bytes()?;
@@ -235,12 +235,12 @@ impl<'a> Pass<'a, '_> {
         }
         self.buffer = buffer;
         if let Some(messages) = &self.chunk_messages {
-            messages.check_times(start_time, end_time, place)?;
+            messages.check_times(times, place)?;
         }
         self.layout.chunks.push(StoredChunk {
             offset: place.offset as u64,
             length: record.length() as u64,
-            times: (start_time, end_time),
+            times,
             compression: compression.to_owned(),
             compressed_size: stored.len() as u64,
             size,
@@ -295,7 +295,11 @@ impl<'a> Pass<'a, '_> {
             name: name.to_owned(),
             media_type: media_type.to_owned(),
         });
-        self.contents.attachments.push((name.to_owned(), media_type.to_owned(), data_size));
+        self.contents.attachments.push(Attachment {
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            n_bytes: data_size,
+        });
         Ok(())
     }
 
@@ -307,7 +311,7 @@ impl<'a> Pass<'a, '_> {
             length: record.length() as u64,
             name: name.clone(),
         });
-        self.contents.metadata.push((name, fields.text_map()?));
+        self.contents.metadata.push(MetadataRecord { name, entries: fields.text_map()? });
         Ok(())
     }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::contents::Contents;
+use super::contents::{Contents, TimeRange};
 use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
 use super::record::{Fields, HEAD, Place, Record, Records, check_crc, opcode};
 use crate::{Fault, Result};
@@ -95,9 +95,8 @@ impl<'a> Summary<'a> {
 
     fn chunk_index(&mut self, record: &Record<'_>) -> Result<()> {
         let mut fields = record.fields();
-        let times = (fields.u64()?, fields.u64()?);
         let found = StoredChunk {
-            times,
+            times: TimeRange { first: fields.u64()?, last: fields.u64()? },
             offset: fields.u64()?,
             length: fields.u64()?,
             message_indexes: fields.channel_map()?,
@@ -110,29 +109,18 @@ impl<'a> Summary<'a> {
         let chunk = at.ok().map(|at| &self.layout.chunks[at]);
         let place = record.place;
         let chunk = self.listed(record, found.offset, chunk)?;
-        let sizes = |c: &StoredChunk| {
-            let StoredChunk { length, compression, compressed_size, size, .. } = c;
-            format!("{length} bytes, `{compression}`, {compressed_size} for {size} bytes")
-        };
-        if sizes(chunk) != sizes(&found) {
-            return Err(place.error(Fault::Size, sizes(chunk), sizes(&found)));
+        if chunk.sizes() != found.sizes() {
+            return Err(place.error(Fault::Size, chunk.sizes(), found.sizes()));
         }
         if chunk.times != found.times {
-            let times = |c: &StoredChunk| format!("times {} to {}", c.times.0, c.times.1);
-            return Err(place.error(Fault::Count, times(chunk), times(&found)));
+            return Err(place.error(Fault::Count, chunk.times, found.times));
         }
         // An empty map says that there is no message index to be used.
         let is_left_out = found.message_indexes.is_empty() && found.message_index_length == 0;
         let agrees = found.message_index_length == chunk.message_index_length
             && (found.message_indexes.is_empty() || found.message_indexes == chunk.message_indexes);
         if !is_left_out && !agrees {
-            let indexes = |c: &StoredChunk| {
-                format!(
-                    "message indexes {:?} in {} bytes",
-                    c.message_indexes, c.message_index_length
-                )
-            };
-            return Err(place.error(Fault::Offset, indexes(chunk), indexes(&found)));
+            return Err(place.error(Fault::Offset, chunk.indexes(), found.indexes()));
         }
         Ok(())
     }
@@ -250,34 +238,38 @@ fn check_statistics(
     let n_messages = fields.u64()?;
     let (n_schemas, n_channels) = (fields.u16()?, fields.u32()?);
     let (n_attachments, n_metadata, n_chunks) = (fields.u32()?, fields.u32()?, fields.u32()?);
-    let times = (fields.u64()?, fields.u64()?);
+    let times = TimeRange { first: fields.u64()?, last: fields.u64()? };
     let counts = fields.channel_map()?;
-    let count = |what: &str, true_count: u64, stated: u64| match true_count == stated {
-        true => Ok(()),
-        false => Err(record.place.error(Fault::Count, format!("{true_count} {what}"), stated)),
-    };
-    count("messages", contents.n_messages(), n_messages)?;
+    check_count(record, "messages", contents.n_messages(), n_messages)?;
     if u64::from(n_schemas) != n_declared[0] as u64 {
-        count("schemas", contents.schemas.len() as u64, n_schemas.into())?;
+        check_count(record, "schemas", contents.schemas.len() as u64, n_schemas.into())?;
     }
     if u64::from(n_channels) != n_declared[1] as u64 {
-        count("channels", contents.channels.len() as u64, n_channels.into())?;
+        check_count(record, "channels", contents.channels.len() as u64, n_channels.into())?;
     }
-    count("attachments", layout.attachments.len() as u64, n_attachments.into())?;
-    count("metadata records", layout.metadata.len() as u64, n_metadata.into())?;
-    count("chunks", layout.chunks.len() as u64, n_chunks.into())?;
-    if let Some((first, last)) = contents.log_times {
-        count("as time of the first message", first, times.0)?;
-        count("as time of the last message", last, times.1)?;
+    check_count(record, "attachments", layout.attachments.len() as u64, n_attachments.into())?;
+    check_count(record, "metadata records", layout.metadata.len() as u64, n_metadata.into())?;
+    check_count(record, "chunks", layout.chunks.len() as u64, n_chunks.into())?;
+    if let Some(TimeRange { first, last }) = contents.log_times {
+        check_count(record, "as time of the first message", first, times.first)?;
+        check_count(record, "as time of the last message", last, times.last)?;
     }
     if !counts.is_empty() {
         for id in contents.n_messages_of.keys().chain(counts.keys()) {
             let true_count = contents.n_messages_of.get(id).copied().unwrap_or(0);
             let stated = counts.get(id).copied().unwrap_or(0);
-            count(&format!("messages on channel {id}"), true_count, stated)?;
+            check_count(record, &format!("messages on channel {id}"), true_count, stated)?;
         }
     }
     Ok(())
+}
+
+/// A count of the statistics is the true one.
+fn check_count(record: &Record<'_>, what: &str, true_count: u64, stated: u64) -> Result<()> {
+    match true_count == stated {
+        true => Ok(()),
+        false => Err(record.place.error(Fault::Count, format!("{true_count} {what}"), stated)),
+    }
 }
 
 fn check_footer(
@@ -293,15 +285,16 @@ fn check_footer(
     let (summary_start, offset_start) = (fields.u64()?, fields.u64()?);
     let footer_start = place.offset;
     let summary_end = first_offset.map_or(footer_start, |record| record.place.offset);
-    let check = |what, found: u64, expected: usize, may_be_zero: bool| {
-        if found == expected as u64 || (found == 0 && may_be_zero) {
-            return Ok(());
-        }
-        let expected = format!("{what} at byte {expected}");
-        Err(place.error(Fault::Offset, expected, format!("byte {found}")))
-    };
-    check("the summary section", summary_start, data_end, summary_end == data_end)?;
-    check("the summary offsets", offset_start, summary_end, first_offset.is_none())
+    // Zero says that there is none.
+    if !(summary_start == data_end as u64 || (summary_start == 0 && summary_end == data_end)) {
+        let expected = format!("the summary section at byte {data_end}");
+        return Err(place.error(Fault::Offset, expected, format!("byte {summary_start}")));
+    }
+    if !(offset_start == summary_end as u64 || (offset_start == 0 && first_offset.is_none())) {
+        let expected = format!("the summary offsets at byte {summary_end}");
+        return Err(place.error(Fault::Offset, expected, format!("byte {offset_start}")));
+    }
+    Ok(())
 }
 
 /// The checksum of the summary and of the footer's first two fields, compared before the summary is

@@ -1,10 +1,9 @@
-//! `NAME.views.mcap`: rendered views with cameras, depth and triangles, for encoders and for eyes.
+//! `NAME.views.mcap`: rendered views with cameras, depth and triangles, for encoders and viewers.
 
 use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use foxglove::bytes::Bytes;
 use foxglove::messages::{CompressedImage, RawImage};
 use semfm_geom::{Mesh, Pinhole};
 
@@ -74,9 +73,7 @@ impl ViewsFile {
     /// [`Error::Container`] for a damaged file; [`Error::Format`] with topic and message for
     /// anything missing, of the wrong size, or of another encoding than ours.
     pub fn read(path: &Path) -> Result<Self> {
-        let (metadata, pictures, cameras) = gather(path, None)?;
-        let n_views = metadata.1;
-        let metadata = metadata.0;
+        let Stored { metadata, n_views, pictures, cameras } = gather(path, None)?;
         check_count(path, "/views/NNN/image", n_views, pictures.images.len())?;
         let size = (metadata.width, metadata.height);
         let cameras = cameras.finish(path, n_views, size)?;
@@ -86,19 +83,37 @@ impl ViewsFile {
     }
 }
 
+/// One view of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SingleView {
+    /// What the file says of all its views.
+    pub metadata: ViewsMetadata,
+    /// The view.
+    pub view: View,
+}
+
 /// Reads one view of a file, as in `V.views.mcap#003`, without keeping the others.
 ///
 /// # Errors
-/// As [`ViewsFile::read`]; [`Error::Invalid`] where the file has no such view.
-pub fn read_view(path: &Path, view: usize) -> Result<(ViewsMetadata, View)> {
-    let ((metadata, n_views), pictures, cameras) = gather(path, Some(view))?;
+/// [`Error::Container`] and [`Error::Format`] as in [`ViewsFile::read`]; [`Error::Invalid`] where the
+/// file has no such view.
+pub fn read_view(path: &Path, view: usize) -> Result<SingleView> {
+    let Stored { metadata, n_views, pictures, cameras } = gather(path, Some(view))?;
     if view >= n_views {
         let expected = format!("000 to {:03} in {}", n_views.saturating_sub(1), path.display());
         return Err(Error::invalid("view", expected, format!("{view:03}")));
     }
     let camera = cameras.camera(path, view, (metadata.width, metadata.height))?;
     let view = pictures.view(path, view, camera, &metadata)?;
-    Ok((metadata, view))
+    Ok(SingleView { metadata, view })
+}
+
+/// What a file holds, with pictures and cameras as they stand in it.
+struct Stored {
+    metadata: ViewsMetadata,
+    n_views: usize,
+    pictures: Pictures,
+    cameras: Cameras,
 }
 
 /// The pictures of a file, encoded as they are in it.
@@ -109,7 +124,7 @@ struct Pictures {
     triangles: BTreeMap<usize, RawImage>,
 }
 
-fn gather(path: &Path, only: Option<usize>) -> Result<((ViewsMetadata, usize), Pictures, Cameras)> {
+fn gather(path: &Path, only: Option<usize>) -> Result<Stored> {
     let mut cameras = Cameras::default();
     let mut pictures = Pictures::default();
     let contents = read_messages(path, |message| match parse_topic(&message.channel.topic) {
@@ -119,24 +134,12 @@ fn gather(path: &Path, only: Option<usize>) -> Result<((ViewsMetadata, usize), P
         None if message.channel.topic == TF => cameras.transform(path, &message),
         None => Ok(()),
     })?;
-    Ok((ViewsMetadata::read(path, &contents.metadata)?, pictures, cameras))
+    let (metadata, n_views) = ViewsMetadata::read(path, &contents.metadata)?;
+    Ok(Stored { metadata, n_views, pictures, cameras })
 }
 
 impl Pictures {
     fn take(&mut self, path: &Path, view: usize, what: &str, message: &Message<'_>) -> Result<()> {
-        let raw = |encoding: &str| -> Result<RawImage> {
-            let image: RawImage = decode(path, message, "foxglove.RawImage")?;
-            let length = u64::from(image.step) * u64::from(image.height);
-            let is_packed = u64::from(image.step) == 4 * u64::from(image.width);
-            if image.encoding != encoding || !is_packed || length != image.data.len() as u64 {
-                let RawImage { width, height, step, encoding: found, data, .. } = &image;
-                let expected = format!("a packed {encoding} image");
-                let found =
-                    format!("{width} × {height} {found}, step {step}, {} bytes", data.len());
-                return Err(message_error(path, message, &expected, found));
-            }
-            Ok(image)
-        };
         match what {
             "image" => {
                 let image: CompressedImage = decode(path, message, "foxglove.CompressedImage")?;
@@ -146,8 +149,14 @@ impl Pictures {
                 }
                 insert_once(&mut self.images, view, image, path, message)
             }
-            "depth" => insert_once(&mut self.depths, view, raw("32FC1")?, path, message),
-            "triangles" => insert_once(&mut self.triangles, view, raw("32SC1")?, path, message),
+            "depth" => {
+                let image = packed_image(path, message, "32FC1")?;
+                insert_once(&mut self.depths, view, image, path, message)
+            }
+            "triangles" => {
+                let image = packed_image(path, message, "32SC1")?;
+                insert_once(&mut self.triangles, view, image, path, message)
+            }
             _ => Ok(()),
         }
     }
@@ -179,6 +188,20 @@ impl Pictures {
     }
 }
 
+/// A raw image of four bytes a pixel, without padding between its rows.
+fn packed_image(path: &Path, message: &Message<'_>, encoding: &str) -> Result<RawImage> {
+    let image: RawImage = decode(path, message, "foxglove.RawImage")?;
+    let length = u64::from(image.step) * u64::from(image.height);
+    let is_packed = u64::from(image.step) == 4 * u64::from(image.width);
+    if image.encoding != encoding || !is_packed || length != image.data.len() as u64 {
+        let RawImage { width, height, step, encoding: found, data, .. } = &image;
+        let expected = format!("a packed {encoding} image");
+        let found = format!("{width} × {height} {found}, step {step}, {} bytes", data.len());
+        return Err(message_error(path, message, &expected, found));
+    }
+    Ok(image)
+}
+
 /// The pixels of a raw image of the camera's size.
 fn numbers<T>(
     path: &Path,
@@ -201,12 +224,13 @@ fn numbers<T>(
 
 /// Depth and triangles agree on what is background, and name triangles that exist.
 fn check_pixels(view: &View, n_triangles: usize) -> std::result::Result<(), Mismatch> {
-    let is_wrong = |(&depth, &triangle): (&f32, &i32)| match triangle {
+    let mut pixels = view.depth.iter().zip(&view.triangles);
+    let wrong = pixels.position(|(&depth, &triangle)| match triangle {
         -1 => depth != f32::INFINITY,
         0.. => triangle as usize >= n_triangles || !(depth.is_finite() && depth > 0.0),
         _ => true,
-    };
-    match view.depth.iter().zip(&view.triangles).position(is_wrong) {
+    });
+    match wrong {
         None => Ok(()),
         Some(pixel) => {
             let width = view.camera.width() as usize;
@@ -233,29 +257,34 @@ fn check_view(view: usize, rendered: &View, metadata: &ViewsMetadata) -> Result<
     let lengths = [rendered.rgb.len() / 3, rendered.depth.len(), rendered.triangles.len()];
     if !rendered.rgb.len().is_multiple_of(3) || lengths != [n_pixels; 3] {
         let expected = format!("{n_pixels} pixels in rgb, depth and triangles");
-        return Err(Error::invalid(what, expected, format!("{lengths:?}")));
+        let [rgb, depth, triangles] = lengths;
+        let found = format!("{rgb} in rgb, {depth} in depth, {triangles} in triangles");
+        return Err(Error::invalid(what, expected, found));
     }
     check_pixels(rendered, metadata.mesh.n_triangles).map_err(|mismatch| mismatch.of_argument(what))
 }
 
 fn write_view(file: &mut McapWriter<'_>, view: usize, rendered: &View) -> Result<()> {
-    let View { camera, depth, triangles, .. } = rendered;
-    let (width, height) = (camera.width(), camera.height());
+    let camera = &rendered.camera;
     let time = time_of(view);
     file.log(TF, time, &camera_transform(OBJECT, frame(view), time, camera))?;
     file.log(&topic(view, "camera"), time, &camera_calibration(frame(view), time, camera))?;
     file.log(&topic(view, "image"), time, &picture(frame(view), time, rendered)?)?;
-    let raw = |encoding: &str, data: Bytes| RawImage {
-        timestamp: Some(timestamp(time)),
+    let depth = rendered.depth.iter().flat_map(|z| z.to_le_bytes()).collect();
+    file.log(&topic(view, "depth"), time, &raw_image(view, camera, "32FC1", depth))?;
+    let triangles = rendered.triangles.iter().flat_map(|t| t.to_le_bytes()).collect();
+    file.log(&topic(view, "triangles"), time, &raw_image(view, camera, "32SC1", triangles))
+}
+
+/// An image of four bytes a pixel.
+fn raw_image(view: usize, camera: &Pinhole, encoding: &str, data: Vec<u8>) -> RawImage {
+    RawImage {
+        timestamp: Some(timestamp(time_of(view))),
         frame_id: frame(view),
-        width,
-        height,
+        width: camera.width(),
+        height: camera.height(),
         encoding: encoding.to_owned(),
-        step: 4 * width,
-        data,
-    };
-    let depth: Vec<u8> = depth.iter().flat_map(|z| z.to_le_bytes()).collect();
-    file.log(&topic(view, "depth"), time, &raw("32FC1", depth.into()))?;
-    let triangles: Vec<u8> = triangles.iter().flat_map(|t| t.to_le_bytes()).collect();
-    file.log(&topic(view, "triangles"), time, &raw("32SC1", triangles.into()))
+        step: 4 * camera.width(),
+        data: data.into(),
+    }
 }

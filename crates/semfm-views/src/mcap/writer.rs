@@ -99,15 +99,19 @@ impl McapWriter<'_> {
         message: &[u8],
     ) -> Result<()> {
         let Schema { name, encoding, data } = schema;
-        let failure = |error| failure(self.path, error);
-        let schema_id = self.writer.add_schema(name, encoding, data).map_err(failure)?;
+        let schema_id = self
+            .writer
+            .add_schema(name, encoding, data)
+            .map_err(|error| failure(self.path, error))?;
         let channel_id = self
             .writer
             .add_channel(schema_id, topic, message_encoding, &BTreeMap::new())
-            .map_err(failure)?;
+            .map_err(|error| failure(self.path, error))?;
         let header =
             mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
-        self.writer.write_to_known_channel(&header, message).map_err(failure)
+        self.writer
+            .write_to_known_channel(&header, message)
+            .map_err(|error| failure(self.path, error))
     }
 
     /// Writes a metadata record.
@@ -125,19 +129,18 @@ impl McapWriter<'_> {
             *count += 1;
             return Ok((*channel, *count));
         }
-        let failure = |error| failure(self.path, error);
         let schema_id = match T::get_schema() {
             Some(schema) => self
                 .writer
                 .add_schema(&schema.name, &schema.encoding, &schema.data)
-                .map_err(failure)?,
+                .map_err(|error| failure(self.path, error))?,
             None => 0,
         };
         let encoding = T::get_message_encoding();
         let channel = self
             .writer
             .add_channel(schema_id, topic, &encoding, &BTreeMap::new())
-            .map_err(failure)?;
+            .map_err(|error| failure(self.path, error))?;
         self.topics.insert(topic.to_owned(), (channel, 0));
         Ok((channel, 0))
     }

@@ -127,7 +127,7 @@ impl RenderSettings {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] for a camera, settings or paint out of range, or more than 2²⁸ pixels in all;
+/// [`Error::Invalid`] for a camera, settings or colours out of range, or more than 2²⁸ pixels in all;
 /// [`semfm_geom::Error::NoArea`] for a surface without area; [`semfm_geom::Error::Cancelled`].
 pub fn render(
     mesh: &Mesh,
@@ -188,10 +188,11 @@ impl<'a> Request<'a> {
         if mesh.area() <= 0.0 {
             return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
         }
-        let darkened = |open: f32| 1.0 - settings.occlusion as f32 * (1.0 - open);
+        let strength = settings.occlusion as f32;
         let is_lit = !matches!(color, SurfaceColor::Normals);
-        let occlusion = (is_lit && settings.occlusion > 0.0)
-            .then(|| openness(mesh).into_iter().map(darkened).collect());
+        let occlusion = (is_lit && settings.occlusion > 0.0).then(|| {
+            openness(mesh).into_iter().map(|open| 1.0 - strength * (1.0 - open)).collect()
+        });
         let normals = CornerNormals::new(mesh, settings.crease);
         Ok(Self { mesh, color, settings, normals, sphere: surface_sphere(mesh), occlusion })
     }
@@ -208,8 +209,8 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Colours a window of a view (columns and rows of pixels) of which somebody else found, for
-    /// every sample, the triangle and its depth.
+    /// Colours a window of a view (columns and rows of pixels) of which the triangle and its depth are
+    /// known for every sample.
     #[cfg(feature = "gpu")]
     pub fn shade_hits(
         &self,
@@ -225,7 +226,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Refuses a view that is larger than any encoder would look at.
+/// Refuses a view that is larger than any encoder takes.
 fn check_size(view: usize, camera: &Pinhole) -> Result<()> {
     for (field, side) in [("width", camera.width()), ("height", camera.height())] {
         if side > MAX_IMAGE_SIDE {

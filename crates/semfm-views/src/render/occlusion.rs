@@ -32,7 +32,9 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
         fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
     let normals: Vec<DVec3> =
         (0..mesh.n_faces()).map(|face| mesh.face_normal_scaled(face)).collect();
-    // What each eye sees, and how much that counts at each vertex.
+    // For each direction d: which vertices are in sight from there, and the weight w_d = Σ |N·d| over the
+    // scaled normals N of a vertex's triangles. The openness is
+    //   min(1, 2 · Σ_{d in sight} w_d / Σ_d w_d).
     let looks: Vec<(Vec<bool>, Vec<f64>)> = directions
         .par_iter()
         .map(|&direction| {

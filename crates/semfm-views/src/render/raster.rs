@@ -51,7 +51,7 @@ impl Raster {
         Self::with(per_pixel, columns, rows, hits)
     }
 
-    /// A window of pixels of which somebody else found the triangles (−1: none) and depths.
+    /// A window of pixels whose triangles (−1: none) and depths are known already.
     #[cfg(feature = "gpu")]
     pub fn of(
         per_pixel: u32,
@@ -59,11 +59,11 @@ impl Raster {
         rows: Range<usize>,
         samples: impl Iterator<Item = (i32, f32)>,
     ) -> Self {
-        let hit = |(triangle, depth): (i32, f32)| match u32::try_from(triangle) {
+        let hits = samples.map(|(triangle, depth)| match u32::try_from(triangle) {
             Ok(face) => Hit::new(1.0 / depth, face),
             Err(_) => Hit::NONE,
-        };
-        Self::with(per_pixel, columns, rows, samples.map(hit).collect())
+        });
+        Self::with(per_pixel, columns, rows, hits.collect())
     }
 
     fn with(per_pixel: u32, columns: Range<usize>, rows: Range<usize>, hits: Vec<Hit>) -> Self {
@@ -79,13 +79,15 @@ impl Raster {
 
     /// The grid columns and rows of a window that a rectangle can reach.
     fn within(&self, bounds: PixelBox) -> [Range<usize>; 2] {
-        let reach = |k: usize, allowed: &Range<usize>| {
-            let per_pixel = f64::from(self.per_pixel);
-            // `as` saturates: an endless box is the whole range, an empty one none.
-            let end = (bounds.high[k] * per_pixel + 0.5).max(0.0) as i32 as usize;
-            ceil(bounds.low[k] * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
-        };
-        [reach(0, &self.columns), reach(1, &self.rows)]
+        [self.reach(bounds, 0, &self.columns), self.reach(bounds, 1, &self.rows)]
+    }
+
+    /// Those along one axis.
+    fn reach(&self, bounds: PixelBox, axis: usize, allowed: &Range<usize>) -> Range<usize> {
+        let per_pixel = f64::from(self.per_pixel);
+        // `as` saturates: an endless box is the whole range, an empty one none.
+        let end = (bounds.high[axis] * per_pixel + 0.5).max(0.0) as i32 as usize;
+        ceil(bounds.low[axis] * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
     }
 
     fn draw(&mut self, face: u32, forms: &TriangleForms, [columns, rows]: [Range<usize>; 2]) {

@@ -20,7 +20,7 @@ pub enum SurfaceColor<'a> {
     Uniform([f32; 3]),
     /// A colour per vertex (n), mixed over each triangle.
     Vertices(&'a [[f32; 3]]),
-    /// A function of triangle and barycentric weights (sum 1): textures, corner colours.
+    /// A function of triangle and barycentric weights (sum 1): textures, corner colors.
     Surface(&'a (dyn Fn(usize, [f64; 3]) -> [f32; 3] + Sync)),
     /// The shading normal as a colour, not lit: x right, y up and z towards the viewer, each from
     /// −1 … 1 to 0 … 1.
@@ -33,9 +33,9 @@ impl SurfaceColor<'_> {
 
     pub(super) fn check(&self, mesh: &Mesh) -> Result<()> {
         match self {
-            Self::Vertices(colours) if colours.len() != mesh.n_vertices() => {
+            Self::Vertices(colors) if colors.len() != mesh.n_vertices() => {
                 let expected = format!("{}, one per vertex", mesh.n_vertices());
-                Err(Error::invalid("vertex colours", expected, colours.len().to_string()))
+                Err(Error::invalid("vertex colours", expected, colors.len().to_string()))
             }
             _ => Ok(()),
         }
@@ -52,7 +52,7 @@ impl fmt::Debug for SurfaceColor<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Uniform(colour) => f.debug_tuple("Uniform").field(colour).finish(),
-            Self::Vertices(colours) => f.debug_tuple("Vertices").field(&colours.len()).finish(),
+            Self::Vertices(colors) => f.debug_tuple("Vertices").field(&colors.len()).finish(),
             Self::Surface(_) => f.debug_tuple("Surface").finish_non_exhaustive(),
             Self::Normals => f.write_str("Normals"),
         }
@@ -129,13 +129,18 @@ impl<'a> Shader<'a> {
         Self { projection, request, settings, light }
     }
 
-    /// Paints the window of a raster: the mean of each pixel's samples. `rgb` starts at the window's
+    /// Colours the window of a raster: the mean of each pixel's samples. `rgb` starts at the window's
     /// first row and holds `width` pixels a row.
     pub fn mix(&self, raster: &Raster, rgb: &mut [u8], width: usize) {
         pulp::Arch::new().dispatch(Mix { shader: self, raster, rgb, width });
     }
 
-    /// Light on each corner of a triangle, on whichever side it comes from.
+    /// Light on each corner of a triangle, on whichever side it comes from:
+    ///
+    /// > b = (a + (1 − a)·|n·l|) · o
+    ///
+    /// with the ambient share a, the corner's normal n, the direction l of the light, and the share o
+    /// of the light that reaches the vertex.
     fn brightness(&self, face: usize) -> [f64; 3] {
         let (ambient, ids) = (self.settings.ambient, self.projection.mesh.faces()[face]);
         let normals = self.request.normals.0[face];
@@ -147,7 +152,7 @@ impl<'a> Shader<'a> {
         })
     }
 
-    /// The corners' normals in camera axes, on the side that the camera sees, as colours.
+    /// The corners' normals in camera axes, on the side that the camera sees, as colors.
     fn normal_colours(&self, face: usize) -> [[f32; 3]; 3] {
         let (mesh, camera) = (self.projection.mesh, self.projection.camera);
         let towards = camera.eye() - mesh.vertices()[mesh.faces()[face][0] as usize];
@@ -200,7 +205,7 @@ impl pulp::WithSimd for Mix<'_> {
             sums.iter_mut().for_each(|sums| sums.fill(0.0));
             for (hits, row) in grid.by_ref().take(per_pixel) {
                 shader.colour(raster, hits, raster.position(row), &mut line);
-                for (sums, line) in sums.iter_mut().zip(&line.colours) {
+                for (sums, line) in sums.iter_mut().zip(&line.colors) {
                     match per_pixel {
                         2 => add_pairs(sums, line),
                         _ => {
@@ -232,18 +237,18 @@ fn add_pairs(sums: &mut [f32], samples: &[f32]) {
 
 /// The colours of one row of samples.
 struct Line {
-    /// By channel, with room for a block of lanes beyond the end.
-    colours: [Vec<f32>; 3],
+    /// By channel, a block of lanes longer than the samples.
+    colors: [Vec<f32>; 3],
     known: Vec<Known>,
 }
 
-/// What the shader needs of a triangle.
+/// What the shader keeps of a triangle.
 #[derive(Clone, Copy)]
 struct Known {
     face: usize,
     forms: Option<TriangleForms>,
     light: [f64; 3],
-    /// Lit colours of the corners, where the paint has any.
+    /// Lit colours of the corners, where the surface's colours are those of its corners.
     corners: [[f32; 3]; 3],
 }
 
@@ -252,7 +257,7 @@ impl Line {
         let nothing =
             Known { face: usize::MAX, forms: None, light: [0.0; 3], corners: [[0.0; 3]; 3] };
         Self {
-            colours: [0; 3].map(|_| vec![0.0; n_columns + LANES]),
+            colors: [0; 3].map(|_| vec![0.0; n_columns + LANES]),
             known: vec![nothing; REMEMBERED],
         }
     }
@@ -267,7 +272,7 @@ impl Shader<'_> {
             let columns = column..column + run.len();
             column = columns.end;
             let Some(face) = run[0].face().map(|face| face as usize) else {
-                for (line, background) in line.colours.iter_mut().zip(self.settings.background) {
+                for (line, background) in line.colors.iter_mut().zip(self.settings.background) {
                     line[columns.clone()].fill(background);
                 }
                 continue;
@@ -277,16 +282,16 @@ impl Shader<'_> {
                 *known = self.look_up(face);
             }
             let Some(forms) = known.forms else {
-                line.colours.iter_mut().for_each(|line| line[columns.clone()].fill(0.0));
+                line.colors.iter_mut().for_each(|line| line[columns.clone()].fill(0.0));
                 continue;
             };
-            if let SurfaceColor::Surface(paint) = self.request.color {
+            if let SurfaceColor::Surface(color_at) = self.request.color {
                 for column in columns {
                     let u = raster.position(raster.columns.start + column);
                     let weights = forms.barycentric(u, v);
                     let light: f64 = weights.iter().zip(known.light).map(|(w, l)| w * l).sum();
-                    let colour = paint(face, weights).map(|c| c * light as f32);
-                    line.colours.iter_mut().zip(colour).for_each(|(line, c)| line[column] = c);
+                    let colour = color_at(face, weights).map(|c| c * light as f32);
+                    line.colors.iter_mut().zip(colour).for_each(|(line, c)| line[column] = c);
                 }
                 continue;
             }
@@ -297,8 +302,10 @@ impl Shader<'_> {
                     let u = raster.position(raster.columns.start + first + lane);
                     forms.barycentric(u, v).map(|weight| weight as f32)
                 });
-                for (k, line) in line.colours.iter_mut().enumerate() {
-                    let place = line[first..].first_chunk_mut().expect("room for a block");
+                for (k, line) in line.colors.iter_mut().enumerate() {
+                    let place = line[first..]
+                        .first_chunk_mut()
+                        .expect("a line is a block longer than its samples");
                     *place = weights.map(|[wa, wb, wc]| wa * a[k] + wb * b[k] + wc * c[k]);
                 }
             }
@@ -307,16 +314,19 @@ impl Shader<'_> {
 
     fn look_up(&self, face: usize) -> Known {
         let light = self.brightness(face);
-        let lit = |corner: usize, colour: [f32; 3]| colour.map(|c| c * light[corner] as f32);
         let ids = self.projection.mesh.faces()[face];
         let corners = match self.request.color {
-            SurfaceColor::Uniform(colour) => [0, 1, 2].map(|corner| lit(corner, *colour)),
-            SurfaceColor::Vertices(colours) => {
-                [0, 1, 2].map(|corner| lit(corner, colours[ids[corner] as usize]))
+            SurfaceColor::Uniform(colour) => light.map(|light| lit(*colour, light)),
+            SurfaceColor::Vertices(colors) => {
+                [0, 1, 2].map(|corner| lit(colors[ids[corner] as usize], light[corner]))
             }
             SurfaceColor::Normals => self.normal_colours(face),
             SurfaceColor::Surface(_) => [[0.0; 3]; 3],
         };
         Known { face, forms: self.projection.forms(face), light, corners }
     }
+}
+
+fn lit(color: [f32; 3], light: f64) -> [f32; 3] {
+    color.map(|c| c * light as f32)
 }

@@ -121,9 +121,13 @@ fn mesh_of(path: &Path, message: &Message<'_>) -> Result<(Mesh, Option<Colors>)>
         return Err(message_error(path, message, expected, found));
     }
     let vertices = list.points.iter().map(|p| DVec3::new(p.x, p.y, p.z)).collect();
-    let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
-    let colors = list.colors.iter().map(|c| [c.r, c.g, c.b].map(byte)).collect();
+    let colors = list.colors.iter().map(|c| [c.r, c.g, c.b].map(srgb_byte)).collect();
     let mesh = Mesh::new(vertices, faces.to_vec())
         .map_err(|error| message_error(path, message, "a sound mesh", error.to_string()))?;
     Ok((mesh, Some(colors).filter(|_| !list.colors.is_empty())))
+}
+
+/// An sRGB value from 0 to 1 as a byte.
+fn srgb_byte(x: f64) -> u8 {
+    (x.clamp(0.0, 1.0) * 255.0).round() as u8
 }
