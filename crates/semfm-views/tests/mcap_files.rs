@@ -10,8 +10,8 @@ use prost::Message as _;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{
-    Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsFile, ViewsMetadata, inspect, read_bytes,
-    read_messages, read_view, write_views,
+    Dtype, EmbeddingsFile, EmbeddingsMetadata, MetadataRecord, ViewsFile, ViewsMetadata, inspect,
+    read_bytes, read_messages, read_view, write_views,
 };
 use semfm_views::{EmbeddedView, Error, PatchEmbeddings, PatchGrid, View};
 
@@ -254,7 +254,7 @@ fn rewrite(
         Ok(())
     })
     .unwrap();
-    for (name, mut metadata) in contents.metadata {
+    for MetadataRecord { name, entries: mut metadata } in contents.metadata {
         edit_metadata(&mut metadata);
         writer.write_metadata(&mcap::records::Metadata { name, metadata }).unwrap();
     }
