@@ -10,11 +10,11 @@
 //!   Newton on the seven parameters, scale within bounds.
 //! * **Many starts**, spread over all rotations; a table of nearest samples makes each cost a fifth
 //!   of a millisecond. An initial pose narrows them down.
-//! * **A visibility check.** Observed points alone like a model that is too large, or one that hides
-//!   in a flat patch. So a pose must also explain itself: the side of the model that faces the
-//!   camera should have been seen where it is. What is not seen through and not seen either speaks
-//!   against it. Where the points leave a direction open (the scale of a box of which three faces
-//!   are seen), the same question settles it.
+//! * **A visibility check.** Observed points alone fit a model that is too large as well, or one that
+//!   lies behind a flat patch. So the side of the model that faces the camera is compared with what
+//!   was seen there, too: surface that the camera looked through, or did not see where it should
+//!   be, counts against a pose. Where the points leave a direction undetermined (the scale of a box
+//!   of which three faces are seen), the same comparison determines it.
 
 mod align;
 mod alignment;

@@ -106,8 +106,8 @@ impl Uncertainty {
 }
 
 /// The standard deviation that the cost itself shows when the pose is moved by 10° along a
-/// direction (per radian). The triangles of a ball hold a rotation as if it were determined, for a
-/// degree or two; turned by more, the ball costs no more than before.
+/// direction (per radian). The triangles of a ball resist a rotation of a degree or two as if it
+/// were determined; turned by more, the ball costs no more than before.
 ///
 /// > std = τ / √((min(cost(τ), cost(−τ)) − cost(0)) / σ²)
 fn measured_std(
@@ -143,7 +143,7 @@ fn robust_cost(problem: &Problem<'_>, pose: &Sim3, ids: &[u32], width: f64) -> f
     cost
 }
 
-/// A⁻¹BA⁻¹ by A's eigenvectors; a direction that A does not see has a variance of at least 1 (a
+/// A⁻¹BA⁻¹ by A's eigenvectors; a direction that A does not determine has a variance of at least 1 (a
 /// radian, a radius of the object, a factor e), which is to say that nothing is known.
 fn sandwich(a: Matrix7, b: Matrix7) -> Matrix7 {
     let eigen = SymmetricEigen::new(a);

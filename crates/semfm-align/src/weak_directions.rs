@@ -1,10 +1,10 @@
 //! Directions of the pose that surfaces alone do not determine.
 //!
-//! Point to plane cannot see a motion that carries every observed face along itself. Three faces of
-//! a box, say, stay where they are while the box grows out of their corner, and so its scale is
-//! unknown to the normal equations. The silhouette knows: if the box is too small, observed points
-//! lie beyond it; if too large, the camera saw nothing where it should be. So the pose is moved along
-//! the weak directions, one at a time, to where it explains most.
+//! Distances from points to planes do not change under a motion that carries every observed face
+//! along itself. Three faces of a box, say, stay where they are while the box grows out of their
+//! corner, so the normal equations do not determine its scale. The silhouette does: if the box is
+//! too small, observed points lie beyond it; if too large, the camera saw nothing where it should
+//! be. So the pose is moved along the weak directions, one at a time, to where it explains most.
 
 use semfm_geom::Task;
 
@@ -69,7 +69,7 @@ impl Problem<'_> {
         let ids = self.observed.subset(POINTS);
         let mut pose = start;
         let mut stds = vec![f64::INFINITY; weak.len()];
-        // Several directions know of each other only by turns.
+        // Each is searched with the others kept, so several take a second pass.
         for _ in 0..weak.len().min(2) {
             for (direction, std) in weak.iter().zip(&mut stds) {
                 task.check()?;

@@ -7,7 +7,7 @@ use semfm_geom::math::{DAffine3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, SurfaceIndex, Task, zoo};
 
-/// No two sides alike, in units of nobody, far from its own origin.
+/// No two sides alike, in no unit of length, far from its own origin.
 fn pebble() -> Mesh {
     let sphere = zoo::icosphere(4);
     let bumps = [
@@ -15,14 +15,17 @@ fn pebble() -> Mesh {
         (DVec3::new(-0.2, 1.0, -0.4), 0.35),
         (DVec3::new(0.1, -0.5, 1.0), -0.3),
     ];
-    let shape = |p: &DVec3| {
-        let bump = |&(at, height): &(DVec3, f64)| {
+    let mut points = Vec::new();
+    for p in sphere.vertices() {
+        let bumps = bumps.iter().map(|&(at, height): &(DVec3, f64)| {
             height * (-p.distance_squared(at.normalize()) / 0.3).exp()
-        };
-        let radius = 1.0 + bumps.iter().map(bump).sum::<f64>();
-        70.0 * radius * *p * DVec3::new(1.0, 0.75, 0.55) + DVec3::new(300.0, -50.0, 20.0)
-    };
-    Mesh::new(sphere.vertices().iter().map(shape).collect(), sphere.faces().to_vec()).unwrap()
+        });
+        let radius = 1.0 + bumps.sum::<f64>();
+        points.push(
+            70.0 * radius * *p * DVec3::new(1.0, 0.75, 0.55) + DVec3::new(300.0, -50.0, 20.0),
+        );
+    }
+    Mesh::new(points, sphere.faces().to_vec()).unwrap()
 }
 
 /// About 15 cm large, half a metre away.
@@ -188,7 +191,7 @@ fn what_a_view_does_not_determine_is_told_and_not_made_up() {
     let sheet = found(&grid, &points, &AlignSettings::default());
     assert_eq!(sheet.verdict, Verdict::Check, "{sheet:?}");
     assert!(sheet.reasons.iter().any(|reason| reason.contains("outline")), "{sheet:?}");
-    // The outline knows: a cell of the silhouette is a sixtieth of the sheet.
+    // The outline determines it: a cell of the silhouette is a sixtieth of the sheet.
     assert!((sheet.camera_from_object.scale / pose.scale - 1.0).abs() < 0.02, "{sheet:?}");
     assert!(sheet.scale_std / pose.scale > 0.002, "{sheet:?}");
 }
@@ -196,12 +199,13 @@ fn what_a_view_does_not_determine_is_told_and_not_made_up() {
 #[test]
 fn the_scale_of_a_box_seen_at_a_corner_comes_from_its_outline() {
     // Three faces leave the scale open: the box may grow out of their corner.
-    let corners = |i: u32| DVec3::from_array([i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from));
     let size = DVec3::new(8.0, 12.0, 20.0);
+    let corners = [0, 1, 2, 3, 4, 5, 6, 7u32]
+        .map(|i| DVec3::from_array([i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from)));
     let quads =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let cuboid = Mesh::new((0..8).map(|i| corners(i) * size).collect(), faces).unwrap();
+    let cuboid = Mesh::new(corners.map(|corner| corner * size).to_vec(), faces).unwrap();
     for (seed, angle) in [(1, 0.6), (2, 2.1), (3, 4.0)] {
         let rotation = DQuat::from_axis_angle(DVec3::new(1.0, 0.7, 0.4).normalize(), angle);
         let pose = Sim3 { scale: 0.01, rotation, translation: DVec3::new(0.0, 0.05, 0.7) };
@@ -235,12 +239,12 @@ fn a_guess_narrows_the_search() {
 fn the_same_seed_gives_the_same_pose_at_every_thread_count() {
     let mesh = pebble();
     let points = noisy(&visible(&mesh, &truth(), 4000, 2), 0.001, 3);
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let [one, three] = [1, 3].map(|n_threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
         let found = pool.install(|| found(&mesh, &points, &AlignSettings::default()));
         Alignment { stages_ms: Vec::new(), ..found }
-    };
-    assert_eq!(on(1), on(3));
+    });
+    assert_eq!(one, three);
 }
 
 #[test]

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use semfm_robot::{MeshPaths, MeshPlace, RobotDescription};
 
 fn shared(what: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join(what);
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
     if folder.exists() {
         return Some(folder);
     }

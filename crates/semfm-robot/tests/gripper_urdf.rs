@@ -59,17 +59,17 @@ fn load(text: &str) -> semfm_robot::Result<Gripper> {
 fn sliding_fingers_are_found_with_opening_pads_and_tcp() {
     let coupled = r#"<mimic joint="ja"/>"#;
     for mimic in [coupled, ""] {
-        let hand = load(&two_fingers(mimic)).unwrap();
-        assert!(*hand.opening.start() < 1e-12 && (hand.opening.end() - 0.06).abs() < 1e-12);
-        assert!((hand.pad[0] - 0.02).abs() < 1e-12 && (hand.pad[1] - 0.04).abs() < 1e-12);
-        let tcp = hand.flange_from_tcp;
+        let gripper = load(&two_fingers(mimic)).unwrap();
+        assert!(*gripper.opening.start() < 1e-12 && (gripper.opening.end() - 0.06).abs() < 1e-12);
+        assert!((gripper.pad[0] - 0.02).abs() < 1e-12 && (gripper.pad[1] - 0.04).abs() < 1e-12);
+        let tcp = gripper.flange_from_tcp;
         assert!((tcp.translation - DVec3::new(0.0, 0.0, 0.08)).length() < 1e-12);
         assert!(tcp.rotation.angle_between(Default::default()) < 1e-7);
         let roles: Vec<(&str, Role)> =
-            hand.parts.iter().map(|part| (part.link.as_str(), part.role)).collect();
+            gripper.parts.iter().map(|part| (part.link.as_str(), part.role)).collect();
         assert_eq!(roles, [("palm", Role::Palm), ("a", Role::Left), ("b", Role::Right)]);
         // By hand: at 40 mm the right finger's box is centred 20 + 5 mm from the middle.
-        let parts = hand.parts_at(0.04);
+        let parts = gripper.parts_at(0.04);
         assert!(
             (parts[2].tcp_from_part.translation - DVec3::new(0.0, 0.025, 0.0)).length() < 1e-12
         );
@@ -80,7 +80,7 @@ fn sliding_fingers_are_found_with_opening_pads_and_tcp() {
 }
 
 /// A four-bar finger: a crank of 50 mm about x, and a follower that turns the pad back.
-fn crank_hand() -> String {
+fn crank_gripper() -> String {
     let mut text = format!("<robot name=\"cranks\">{BASE}");
     for (side, sign, y) in [("l", 1.0, -0.03), ("r", -1.0, 0.03)] {
         let mimic = if side == "r" { r#"<mimic joint="l_crank" multiplier="-1"/>"# } else { "" };
@@ -105,27 +105,26 @@ fn crank_hand() -> String {
 
 #[test]
 fn a_linkage_keeps_the_tcp_between_the_pads_and_moves_the_palm() {
-    let hand = load(&crank_hand()).unwrap();
+    let gripper = load(&crank_gripper()).unwrap();
     // The tip's inner face lies 30 mm inside its joint: closed at angle 0, and at angle q each pad
     // is 50 mm · sin q out and 50 mm · (1 − cos q) lower.
     let open = 2.0 * 0.05 * 0.5f64.sin();
-    assert!(*hand.opening.start() < 1e-9 && (hand.opening.end() - open).abs() < 1e-9);
+    assert!(*gripper.opening.start() < 1e-9 && (gripper.opening.end() - open).abs() < 1e-9);
     for angle in [0.0, 0.1, 0.31, 0.5f64] {
         let width = 2.0 * 0.05 * angle.sin();
         let height = 0.06 + 0.05 * angle.cos() + 0.02;
-        let tcp = hand.flange_from_tcp_at(width).translation;
+        let tcp = gripper.flange_from_tcp_at(width).translation;
         // Chords of a table of 65 steps: 0.05 · (0.5 / 64)² / 8 = 0.4 µm.
         assert!((tcp - DVec3::Z * height).length() < 5e-7, "{angle}: {tcp}");
-        let palm = hand.parts_at(width)[0].tcp_from_part;
+        let palm = gripper.parts_at(width)[0].tcp_from_part;
         assert!((palm.translation.z - (0.03 - height)).abs() < 5e-7);
     }
-    assert!((hand.flange_from_tcp.translation.z - 0.13).abs() < 1e-9);
+    assert!((gripper.flange_from_tcp.translation.z - 0.13).abs() < 1e-9);
 }
 
 #[test]
 fn the_caller_may_name_fingers_flange_tcp_and_pad() {
     let file = file(&two_fingers(""));
-    let open = |settings: &GripperSettings| Gripper::from_urdf(&file.path, settings);
     let tcp = Pose::translation(0.0, 0.0, 0.09);
     let settings = GripperSettings {
         fingers: Some(["b".into(), "a".into()]),
@@ -134,16 +133,16 @@ fn the_caller_may_name_fingers_flange_tcp_and_pad() {
         pad: Some([0.01, 0.02]),
         ..Default::default()
     };
-    let hand = open(&settings).unwrap();
-    assert_eq!((hand.pad, hand.flange_from_tcp), ([0.01, 0.02], tcp));
-    assert!((hand.parts_at(0.0)[1].tcp_from_part.translation.z + 0.01).abs() < 1e-12);
+    let gripper = Gripper::from_urdf(&file.path, &settings).unwrap();
+    assert_eq!((gripper.pad, gripper.flange_from_tcp), ([0.01, 0.02], tcp));
+    assert!((gripper.parts_at(0.0)[1].tcp_from_part.translation.z + 0.01).abs() < 1e-12);
     let turned = Pose::from_parts(
         DVec3::Z * 0.08,
         parry3d_f64::math::Rotation::from_rotation_z(std::f64::consts::PI),
     );
-    let hand =
-        open(&GripperSettings { palm_from_tcp: Some(turned), ..Default::default() }).unwrap();
-    let right = hand.parts.iter().find(|part| part.role == Role::Right).unwrap();
+    let settings = GripperSettings { palm_from_tcp: Some(turned), ..Default::default() };
+    let gripper = Gripper::from_urdf(&file.path, &settings).unwrap();
+    let right = gripper.parts.iter().find(|part| part.role == Role::Right).unwrap();
     assert_eq!(right.link, "a");
     let aslant =
         Pose::from_parts(DVec3::Z * 0.08, parry3d_f64::math::Rotation::from_rotation_z(0.3));
@@ -153,7 +152,8 @@ fn the_caller_may_name_fingers_flange_tcp_and_pad() {
         GripperSettings { flange: Some("a".into()), ..Default::default() },
         GripperSettings { palm_from_tcp: Some(aslant), ..Default::default() },
     ] {
-        assert_eq!(open(&wrong).unwrap_err().code(), "no-gripper", "{wrong:?}");
+        let error = Gripper::from_urdf(&file.path, &wrong).unwrap_err();
+        assert_eq!(error.code(), "no-gripper", "{wrong:?}");
     }
 }
 
@@ -176,44 +176,52 @@ fn what_is_no_gripper_says_so() {
     }
 }
 
+/// The gripper of two fingers, its names led by a letter, as a piece of a larger robot.
+fn prefixed_gripper(k: &str) -> String {
+    two_fingers("")
+        .replace("<robot name=\"two\">", "")
+        .replace("</robot>", "")
+        .replace("\"palm\"", &format!("\"{k}palm\""))
+        .replace("name=\"a\"", &format!("name=\"{k}a\""))
+        .replace("name=\"b\"", &format!("name=\"{k}b\""))
+        .replace("link=\"a\"", &format!("link=\"{k}a\""))
+        .replace("link=\"b\"", &format!("link=\"{k}b\""))
+        .replace("\"ja\"", &format!("\"{k}ja\""))
+        .replace("\"jb\"", &format!("\"{k}jb\""))
+}
+
+/// The joint that carries it.
+fn arm_to(k: &str) -> String {
+    format!(
+        r#"<joint name="{k}arm" type="continuous"><parent link="body"/>
+        <child link="{k}palm"/><axis xyz="0 0 1"/></joint>"#
+    )
+}
+
 #[test]
-fn two_hands_want_to_be_told_which() {
-    let hand = |k: &str| {
-        two_fingers("")
-            .replace("<robot name=\"two\">", "")
-            .replace("</robot>", "")
-            .replace("\"palm\"", &format!("\"{k}palm\""))
-            .replace("name=\"a\"", &format!("name=\"{k}a\""))
-            .replace("name=\"b\"", &format!("name=\"{k}b\""))
-            .replace("link=\"a\"", &format!("link=\"{k}a\""))
-            .replace("link=\"b\"", &format!("link=\"{k}b\""))
-            .replace("\"ja\"", &format!("\"{k}ja\""))
-            .replace("\"jb\"", &format!("\"{k}jb\""))
-    };
-    let arm = |k: &str| {
-        format!(
-            r#"<joint name="{k}arm" type="continuous"><parent link="body"/>
-            <child link="{k}palm"/><axis xyz="0 0 1"/></joint>"#
-        )
-    };
+fn two_grippers_are_refused_until_one_is_named() {
     let text = format!(
         "<robot name=\"yu\"><link name=\"body\"/>{}{}{}{}</robot>",
-        hand("x"),
-        hand("y"),
-        arm("x"),
-        arm("y")
+        prefixed_gripper("x"),
+        prefixed_gripper("y"),
+        arm_to("x"),
+        arm_to("y")
     );
     let file = file(&text);
     let error = Gripper::from_urdf(&file.path, &GripperSettings::default()).unwrap_err();
     assert!(error.to_string().contains("`xa` and `xb`; `ya` and `yb`"), "{error}");
     let fingers = Some(["ya".into(), "yb".into()]);
-    let hand =
+    let gripper =
         Gripper::from_urdf(&file.path, &GripperSettings { fingers, ..Default::default() }).unwrap();
-    assert!(hand.parts.iter().all(|part| part.link.starts_with('y')));
+    assert!(gripper.parts.iter().all(|part| part.link.starts_with('y')));
+}
+
+fn n_palms(gripper: &Gripper) -> usize {
+    gripper.parts.iter().filter(|part| part.role == Role::Palm).count()
 }
 
 #[test]
-fn a_mesh_that_cannot_be_had_is_replaced_and_noted() {
+fn a_mesh_that_cannot_be_read_is_replaced_and_noted() {
     let mesh = r#"<mesh filename="palm.dae"/>"#;
     let box_shape = r#"<box size="0.06 0.2 0.06"/>"#;
     let inertial = r#"<inertial><mass value="1"/>
@@ -225,22 +233,21 @@ fn a_mesh_that_cannot_be_had_is_replaced_and_noted() {
     assert!(refused.to_string().contains("DAE is not supported"), "{refused}");
 
     let weighed = with_mesh.replacen("</link>", inertial, 1);
-    let hand = load(&weighed).unwrap();
-    assert!(hand.notes[0].contains("box of its inertia"), "{:?}", hand.notes);
-    let side = hand.parts[0].shape.compute_aabb(&Pose::IDENTITY).extents().x;
+    let gripper = load(&weighed).unwrap();
+    assert!(gripper.notes[0].contains("box of its inertia"), "{:?}", gripper.notes);
+    let side = gripper.parts[0].shape.compute_aabb(&Pose::IDENTITY).extents().x;
     assert!((side - (6.0f64 * 0.001).sqrt()).abs() < 1e-12);
 
     let known = with_mesh.replace("\"palm\"", "\"panda_hand\"");
-    let hand = load(&known).unwrap();
-    assert!(hand.notes[0].contains("boxes of `franka`"), "{:?}", hand.notes);
-    let palms = |hand: &Gripper| hand.parts.iter().filter(|p| p.role == Role::Palm).count();
-    assert_eq!(palms(&hand), palms(&Gripper::builtin("franka").unwrap()));
+    let gripper = load(&known).unwrap();
+    assert!(gripper.notes[0].contains("boxes of `franka`"), "{:?}", gripper.notes);
+    assert_eq!(n_palms(&gripper), n_palms(&Gripper::builtin("franka").unwrap()));
 
     let pads = r#"<box size="0.02 0.01 0.04"/>"#;
     let padless = known.replace(pads, r#"<mesh filename="package://p/finger.stl"/>"#);
-    let hand = load(&padless).unwrap();
-    assert_eq!(hand.name, "franka");
-    assert!(hand.notes[0].contains("instead of the description"), "{:?}", hand.notes);
+    let gripper = load(&padless).unwrap();
+    assert_eq!(gripper.name, "franka");
+    assert!(gripper.notes[0].contains("instead of the description"), "{:?}", gripper.notes);
 }
 
 #[test]
@@ -258,9 +265,9 @@ fn meshes_come_from_mapped_packages_only() {
     let file = file(&text);
     let settings =
         GripperSettings { packages: [("p".to_owned(), package)].into(), ..Default::default() };
-    let hand = Gripper::from_urdf(&file.path, &settings).unwrap();
-    let size = hand.parts[0].shape.compute_aabb(&Pose::IDENTITY).extents();
-    assert!((size - DVec3::new(0.06, 0.2, 0.06)).length() < 1e-9 && hand.notes.is_empty());
+    let gripper = Gripper::from_urdf(&file.path, &settings).unwrap();
+    let size = gripper.parts[0].shape.compute_aabb(&Pose::IDENTITY).extents();
+    assert!((size - DVec3::new(0.06, 0.2, 0.06)).length() < 1e-9 && gripper.notes.is_empty());
     assert!(load(&text).unwrap_err().to_string().contains("not mapped"));
     let escape = text.replace("package://p/m/palm.obj", "../../../../etc/passwd");
     assert_eq!(load(&escape).unwrap_err().code(), "path-outside");
@@ -277,13 +284,14 @@ fn a_file_or_a_name_opens() {
 }
 
 #[test]
-fn nothing_of_the_hand_reaches_between_open_pads() {
-    for text in [two_fingers(""), crank_hand()] {
-        let hand = load(&text).unwrap();
+fn no_part_reaches_between_open_pads() {
+    for text in [two_fingers(""), crank_gripper()] {
+        let gripper = load(&text).unwrap();
         for share in [0.1, 0.5, 1.0] {
-            let width = share * hand.opening.end();
-            let half = (DVec3::new(hand.pad[0], width, hand.pad[1]) - DVec3::splat(1e-5)) / 2.0;
-            for PosedPart { tcp_from_part: pose, part } in hand.parts_at(width) {
+            let width = share * gripper.opening.end();
+            let half =
+                (DVec3::new(gripper.pad[0], width, gripper.pad[1]) - DVec3::splat(1e-5)) / 2.0;
+            for PosedPart { tcp_from_part: pose, part } in gripper.parts_at(width) {
                 let gap = Cuboid::new(half);
                 let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
                     .unwrap()
@@ -294,15 +302,18 @@ fn nothing_of_the_hand_reaches_between_open_pads() {
     }
 }
 
+const LINKS: &str = r#"<link name="a"/><link name="b"/>"#;
+
+/// Two links and a revolute joint that holds what is given.
+fn joint(inside: &str) -> String {
+    format!(
+        "<robot name=\"r\">\n{LINKS}\n<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/>\
+         <child link=\"b\"/>{inside}</joint></robot>"
+    )
+}
+
 #[test]
 fn hostile_descriptions_are_refused_with_code_and_place() {
-    let links = r#"<link name="a"/><link name="b"/>"#;
-    let joint = |inside: &str| {
-        format!(
-            "<robot name=\"r\">\n{links}\n<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/>\
-             <child link=\"b\"/>{inside}</joint></robot>"
-        )
-    };
     let limit = r#"<limit lower="0" upper="1" effort="1" velocity="1"/>"#;
     let circle = r#"<joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>"#;
     let twin = r#"<joint name="j" type="fixed"><parent link="b"/><child link="c"/></joint>"#;
@@ -340,7 +351,7 @@ fn hostile_descriptions_are_refused_with_code_and_place() {
     assert!(error.to_string().starts_with("r.urdf: line 3: axis: xyz"), "{error}");
     // Sound as a fragment, refused as a tree.
     let twice = format!(
-        "<robot name=\"r\">{links}<link name=\"a\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint></robot>"
+        "<robot name=\"r\">{LINKS}<link name=\"a\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint></robot>"
     );
     let description = RobotDescription::parse(twice.as_bytes(), "r.urdf");
     assert_eq!(description.and_then(|d| d.tree()).unwrap_err().code(), "tree");

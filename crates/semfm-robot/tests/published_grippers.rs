@@ -1,4 +1,4 @@
-//! Published hands: what is found in their descriptions, beside their makers' figures and ours.
+//! Published grippers: what is found in their descriptions, beside their makers' figures and ours.
 #![allow(clippy::print_stderr)]
 
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ use semfm_geom::math::DVec3;
 use semfm_robot::{Gripper, GripperSettings, PosedPart, Role};
 
 fn shared(what: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or_else(beside, PathBuf::from).join(what);
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
     if folder.exists() {
         return Some(folder);
     }
@@ -29,7 +29,7 @@ struct Published {
     tcp: (f64, f64),
 }
 
-const HANDS: [Published; 3] = [
+const PUBLISHED: [Published; 3] = [
     Published {
         file: "panda/urdf/panda_local.urdf",
         builtin: "franka",
@@ -53,27 +53,28 @@ const HANDS: [Published; 3] = [
     },
 ];
 
-fn hands() -> Option<Vec<(Published, Gripper)>> {
+fn grippers() -> Option<Vec<(Published, Gripper)>> {
     let robots = shared("data/robots")?;
-    let load = |published: Published| {
-        let hand = Gripper::from_urdf(robots.join(published.file), &GripperSettings::default());
-        let hand = hand.unwrap_or_else(|error| panic!("{error}"));
-        (published, hand)
-    };
-    Some(HANDS.into_iter().map(load).collect())
+    let mut found = Vec::new();
+    for published in PUBLISHED {
+        let path = robots.join(published.file);
+        let gripper = Gripper::from_urdf(path, &GripperSettings::default());
+        found.push((published, gripper.unwrap_or_else(|error| panic!("{error}"))));
+    }
+    Some(found)
 }
 
 #[test]
 fn openings_and_tcps_are_those_that_the_makers_publish() {
-    for (published, hand) in hands().unwrap_or_default() {
+    for (published, gripper) in grippers().unwrap_or_default() {
         let name = published.builtin;
         let (stroke, off) = published.stroke;
-        assert!(*hand.opening.start() <= 2e-3, "{name}: {:?}", hand.opening);
-        assert!((hand.opening.end() - stroke).abs() <= off, "{name}: {:?}", hand.opening);
+        assert!(*gripper.opening.start() <= 2e-3, "{name}: {:?}", gripper.opening);
+        assert!((gripper.opening.end() - stroke).abs() <= off, "{name}: {:?}", gripper.opening);
         let (height, off) = published.tcp;
-        let tcp = hand.flange_from_tcp.translation;
+        let tcp = gripper.flange_from_tcp.translation;
         assert!((tcp - DVec3::Z * height).length() <= off, "{name}: {tcp}");
-        assert!(hand.notes.is_empty(), "{name}: {:?}", hand.notes);
+        assert!(gripper.notes.is_empty(), "{name}: {:?}", gripper.notes);
     }
 }
 
@@ -87,26 +88,26 @@ fn bounds_of(gripper: &Gripper, role: Role) -> Aabb {
 }
 
 #[test]
-fn the_built_in_hands_agree_with_the_descriptions() {
-    for (published, hand) in hands().unwrap_or_default() {
+fn the_built_in_grippers_agree_with_the_descriptions() {
+    for (published, gripper) in grippers().unwrap_or_default() {
         let name = published.builtin;
         let ours = Gripper::builtin(name).unwrap();
-        let (a, b) = (hand.flange_from_tcp, ours.flange_from_tcp);
+        let (a, b) = (gripper.flange_from_tcp, ours.flange_from_tcp);
         assert!(a.rotation.angle_between(b.rotation) < 1e-6, "{name}: {a:?} {b:?}");
-        for (found, ours) in hand.pad.iter().zip(ours.pad) {
-            assert!((found - ours).abs() <= 5e-3, "{name}: pad {:?}", hand.pad);
+        for (found, ours) in gripper.pad.iter().zip(ours.pad) {
+            assert!((found - ours).abs() <= 5e-3, "{name}: pad {:?}", gripper.pad);
         }
         // The same width, the same height of the palm, within what the strokes differ by.
         for width in [0.01, 0.04, 0.08] {
-            let drift = (hand.flange_from_tcp_at(width).translation
+            let drift = (gripper.flange_from_tcp_at(width).translation
                 - ours.flange_from_tcp_at(width).translation)
                 .length();
             assert!(drift < 4e-3, "{name} at {width}: {drift}");
         }
         // Outer size at a common width, finger by finger and palm by palm: our boxes neither miss
-        // a centimetre of the hand nor add two.
+        // a centimetre of the gripper nor add two.
         for role in [Role::Palm, Role::Left, Role::Right] {
-            let [found, ours] = [&hand, &ours].map(|gripper| bounds_of(gripper, role));
+            let [found, ours] = [&gripper, &ours].map(|one| bounds_of(one, role));
             let low = (found.mins - ours.mins).abs().max_element();
             let high = (found.maxs - ours.maxs).abs().max_element();
             assert!(low < 0.012 && high < 0.012, "{name} {role:?}: {found:?} {ours:?}");
@@ -116,12 +117,12 @@ fn the_built_in_hands_agree_with_the_descriptions() {
 
 #[test]
 fn the_space_between_open_pads_is_free() {
-    for (published, hand) in hands().unwrap_or_default() {
+    for (published, gripper) in grippers().unwrap_or_default() {
         for share in [0.3, 0.6, 1.0] {
-            let width = share * hand.opening.end();
-            let half = DVec3::new(hand.pad[0], width - 1e-4, hand.pad[1]) / 2.0;
+            let width = share * gripper.opening.end();
+            let half = DVec3::new(gripper.pad[0], width - 1e-4, gripper.pad[1]) / 2.0;
             let gap = Cuboid::new(half);
-            for PosedPart { tcp_from_part: pose, part } in hand.parts_at(width) {
+            for PosedPart { tcp_from_part: pose, part } in gripper.parts_at(width) {
                 let hit = intersection_test(&pose, &*part.shape, &Pose::IDENTITY, &gap)
                     .unwrap()
                     .intersecting;
@@ -132,7 +133,7 @@ fn the_space_between_open_pads_is_free() {
 }
 
 #[test]
-fn an_arm_without_a_hand_says_so() {
+fn an_arm_without_a_gripper_says_so() {
     let Some(robots) = shared("data/robots") else { return };
     let settings = GripperSettings::default();
     for arm in ["ur5/urdf/ur5_local.urdf", "ur5e/urdf/ur5e_local.urdf"] {

@@ -12,13 +12,13 @@ use crate::link::{Geometry, Inertial, Link, LinkGeometry};
 use crate::urdf::{MeshPaths, MeshPlace};
 use crate::{Error, Result};
 
-/// Most triangles of a collision mesh; hands in the wild have some thousands.
+/// Most triangles of a collision mesh; published grippers have some thousands.
 const MAX_TRIANGLES: usize = 300_000;
 /// A hull with more than this times the mesh's volume fills a space that is free (the bay between
-/// jaw and palm), and the mesh is cut into convex pieces. Hulls of the hands that we know are
+/// finger and palm), and the mesh is cut into convex pieces. Hulls of the grippers that we know are
 /// within 1.001.
 const MAX_HULL_RATIO: f64 = 1.15;
-/// Pieces of one mesh: with 11 for a whole three-box hand a query takes 5 µs; more buys little.
+/// Pieces of one mesh: with 11 for a whole gripper of three boxes a query takes 5 µs; more buys little.
 const MAX_PIECES: u32 = 16;
 /// Thinnest half edge of a box: what is flat still collides.
 const MIN_HALF: f64 = 1e-5;

@@ -37,7 +37,7 @@ pub struct Gripper {
     /// Its middle is the origin.
     pub pad: [f64; 2],
     /// The flange's frame that the robot moves, from the TCP, when the pads are as close as they
-    /// get. Where a linkage carries the pads along z it differs for other widths: ask
+    /// get. Where a linkage carries the pads along z it differs for other widths: see
     /// [`Gripper::flange_from_tcp_at`].
     pub flange_from_tcp: Pose,
     /// Rigid parts of palm and fingers.

@@ -48,8 +48,10 @@ pub(crate) fn build(robot: &urdf_rs::Robot) -> Result<Robot, Fault> {
 }
 
 fn link_by_name(by_name: &HashMap<&str, usize>, name: &str) -> Result<usize, Fault> {
-    let missing = || Fault::new("reference", "robot", "a link", format!("`{name}`"));
-    by_name.get(name).copied().ok_or_else(missing)
+    by_name
+        .get(name)
+        .copied()
+        .ok_or_else(|| Fault::new("reference", "robot", "a link", format!("`{name}`")))
 }
 
 /// Joints so that each comes after the one that leads to its parent.

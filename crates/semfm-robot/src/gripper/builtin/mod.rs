@@ -50,8 +50,10 @@ impl BuiltinGripper {
             .filter(|c| !matches!(c, '_' | '-'))
             .map(|c| c.to_ascii_lowercase())
             .collect();
-        let told = |gripper: &&Self| gripper.known_by.iter().any(|word| plain.contains(word));
-        BUILTIN_GRIPPERS.iter().rev().find(told)
+        BUILTIN_GRIPPERS
+            .iter()
+            .rev()
+            .find(|gripper| gripper.known_by.iter().any(|word| plain.contains(word)))
     }
 
     /// The gripper itself.
@@ -114,12 +116,14 @@ mod tests {
 
     #[test]
     fn a_description_tells_its_gripper_by_its_names() {
-        let name = |names: &[&str]| {
-            BuiltinGripper::named_in(names.iter().copied()).map(|gripper| gripper.name)
-        };
-        assert_eq!(name(&["panda_link8", "panda_hand"]), Some("franka"));
-        assert_eq!(name(&["panda_hand", "robotiq_2f_140_base"]), Some("robotiq-2f140"));
-        assert_eq!(name(&["gripper_2F-85"]), Some("robotiq-2f85"));
-        assert_eq!(name(&["palm", "finger"]), None);
+        for (names, told) in [
+            (["panda_link8", "panda_hand"], Some("franka")),
+            (["panda_hand", "robotiq_2f_140_base"], Some("robotiq-2f140")),
+            (["base", "gripper_2F-85"], Some("robotiq-2f85")),
+            (["palm", "finger"], None),
+        ] {
+            let found = BuiltinGripper::named_in(names.into_iter());
+            assert_eq!(found.map(|gripper| gripper.name), told);
+        }
     }
 }
