@@ -129,7 +129,7 @@ def test_layers_switch_with_their_legends(browser, demo):  # noqa: F811
     assert told["pressed"].count("true") == 1 and told["pressed"][-1] == "true"
 
 
-def test_keys_turn_both_objects_and_tell_what_is_in_the_middle(browser, demo):  # noqa: F811
+def test_keys_turn_both_objects_and_describe_the_middle(browser, demo):  # noqa: F811
     body = """
     const key = async name => {
       source.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: name }));
@@ -255,12 +255,12 @@ def test_meshes_with_regions_and_views_files_are_shown(browser, demo):  # noqa: 
     const told = {
       titles: [...document.querySelectorAll("h2")].map(h => h.textContent),
       pictures: document.querySelectorAll(".pictures img").length,
-      layers: first.paints.length, says: "",
+      layers: first.layers.length, says: "",
     };
     const box = first.canvas;
     for (let x = 0; x < box.clientWidth && !told.says; x += 5) {
       const vertex = first.pick(x, box.clientHeight / 2);
-      if (vertex >= 0) { first.hover(vertex); told.says = first.told.textContent; }
+      if (vertex >= 0) { first.hover(vertex); told.says = first.output.textContent; }
     }
     const before = [second.yaw, second.pitch];
     document.querySelectorAll(".pictures button")[2].click();
@@ -275,7 +275,7 @@ def test_meshes_with_regions_and_views_files_are_shown(browser, demo):  # noqa: 
     assert told["pictures"] == 4 and told["images"] == [64] * 4 and told["turned"] > 0.01
 
 
-def test_hands_stand_at_the_object(browser, demo):  # noqa: F811
+def test_grippers_stand_at_the_object(browser, demo):  # noqa: F811
     body = """
     const [, [alone, few]] = await window.semfmReady;
     const section = alone.figure.closest("section");
@@ -286,7 +286,7 @@ def test_hands_stand_at_the_object(browser, demo):  # noqa: F811
       const { clientWidth: width, clientHeight: height } = panel.canvas, words = new Set();
       for (let y = 0; y < height; y += 8) for (let x = 0; x < width; x += 8) {
         const vertex = panel.pick(x, y);
-        if (vertex >= 0) words.add(panel.tell(vertex).replace(/^vertex \\d+(, )?/, ""));
+        if (vertex >= 0) words.add(panel.describe(vertex).replace(/^vertex \\d+(, )?/, ""));
       }
       told.seen.push([...words]);
     }
@@ -301,7 +301,7 @@ def test_hands_stand_at_the_object(browser, demo):  # noqa: F811
     assert all(word in told["legend"] for word in few)
 
 
-def test_what_cannot_be_shown_is_told_with_what_can(demo):
+def test_what_cannot_be_shown_is_named_with_what_can(demo):
     for path, word in (
         (demo / "containers_0_s0.emb.mcap", "show their views file"),
         (demo / "transfer" / "transfer.mcap", "show the folder"),

@@ -31,7 +31,7 @@ pub struct SceneMesh<'a> {
 }
 
 impl SceneMesh<'_> {
-    /// What its message says.
+    /// The entity of its message.
     pub(super) fn entity(&self) -> MeshEntity<'_> {
         let Self { frame_id, name, vertices, faces, colors, .. } = *self;
         MeshEntity { frame_id, name, vertices, faces, colors }

@@ -36,7 +36,7 @@ pub struct LegendEntry {
 /// A way to colour all meshes of a group.
 #[derive(Clone, Debug)]
 pub struct Layer {
-    /// What its button says.
+    /// Label of its button.
     pub name: String,
     /// Colours and what they stand for, those of classes first.
     pub legend: Vec<LegendEntry>,
@@ -49,7 +49,7 @@ pub struct Layer {
 pub struct Panel {
     /// What it is: `source`, say.
     pub name: String,
-    /// A few words more.
+    /// A short remark beside the name.
     pub note: String,
     /// The mesh.
     pub mesh: Mesh,

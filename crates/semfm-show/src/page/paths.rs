@@ -78,7 +78,7 @@ fn unknown(path: &Path, place: &str, found: &str) -> Error {
     FormatError::new(path, place, expected(), found).into()
 }
 
-/// A JSON file that stands where it cannot be shown, with what it is if it says so.
+/// A JSON file without a mesh before it, with its format where it names one.
 fn json_alone(path: &Path) -> Error {
     match format_of(path) {
         Ok(Some(format)) if format == region_file::FORMAT => {
@@ -90,7 +90,7 @@ fn json_alone(path: &Path) -> Error {
     }
 }
 
-/// The `format` that a JSON file says it has.
+/// The `format` that a JSON file names.
 fn format_of(path: &Path) -> Result<Option<String>> {
     let value: Value = read_json(path)?;
     Ok(value["format"].as_str().map(str::to_owned))

@@ -1,5 +1,4 @@
-//! How a target is turned against its source, as far as their point map, their way up and their regions
-//! tell.
+//! How a target is turned against its source, from their point map, their way up and their regions.
 
 use faer::{Mat, Side};
 use semfm::geom::math::{DMat3, DQuat, DVec3};
@@ -57,8 +56,8 @@ impl Standing<'_> {
     }
 }
 
-/// `target_from_source` of directions. A good map says all of it. Where both objects stand, up goes to
-/// up, and a fair map says the heading; where it cannot, the side on which the region lies does. Where
+/// `target_from_source` of directions. A good map gives all of it. Where both objects stand, up goes to
+/// up, and a fair map gives the heading; where it cannot, the side on which the region lies does. Where
 /// one does not stand, a fair map must do.
 pub(super) fn pair_rotation(
     source: Standing<'_>,

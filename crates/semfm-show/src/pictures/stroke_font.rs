@@ -1,6 +1,6 @@
 //! Text in pictures, drawn as strokes: a font of our own, so that no font file is needed.
 //!
-//! A glyph is a few strokes on a grid where capitals are 14 units high, small stroke_font 10, and tails
+//! A glyph is a few strokes on a grid where capitals are 14 units high, small letters 10, and tails
 //! reach 4 below the line. A stroke that starts with `~` is smooth (a quadratic B-spline whose ends
 //! are its first and last point), one that starts with `o` is smooth and closed, any other is made of
 //! straight lines.
@@ -9,7 +9,7 @@ use super::canvas::Canvas;
 
 /// Height of a capital in grid units.
 const CAPITAL: f32 = 14.0;
-/// Width of a stroke and room between stroke_font, in grid units.
+/// Width of a stroke and of the gap between letters, in grid units.
 const STROKE: f32 = 2.0;
 const GAP: f32 = 4.4;
 /// Segments of each piece of a smooth stroke.

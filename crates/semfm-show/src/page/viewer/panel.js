@@ -59,7 +59,7 @@ class Panel {
     this.output.textContent = text || (this.painter.gl ? "Point at the object." : "");
   }
 
-  // A vertex in words: its number, and what each layer says of it.
+  // A vertex as text: its number, and its value in each layer.
   describe(vertex) {
     return [`vertex ${vertex}`, ...this.layers.map(layer => layer.describe(vertex))].filter(Boolean).join(", ");
   }

@@ -6,7 +6,7 @@
 const VERDICTS = ["accept", "check", "refuse"];
 const TOO_OLD = "This browser is too old for this page: it cannot decompress the meshes (DecompressionStream). Open it in one from 2023 or newer.";
 
-// A layer of one panel: `colors` (three bytes a vertex) and `describe`, what it says of a vertex.
+// A layer of one panel: `colors` (three bytes a vertex) and `describe`, a vertex's value as text.
 async function decodeLayer(layer, encoded, n, matchColors, { plain, marked }) {
   if (layer.kind === "positions") return { colors: matchColors, describe: () => "" };
   const data = await decodeBytes(encoded);
@@ -16,7 +16,7 @@ async function decodeLayer(layer, encoded, n, matchColors, { plain, marked }) {
     return { colors: colorsOf(n, mix), describe: v => `weight ${(data[v] / 255).toFixed(2)}` };
   }
   const palette = layer.legend.map(({ color }) => color && rgb(color));
-  // The first class is none of the others, and goes without saying.
+  // The first class is none of the others, and is not mentioned.
   const describe = v => data[v] ? layer.legend[data[v]].text : "";
   return { colors: colorsOf(n, v => palette[data[v]]), describe };
 }
