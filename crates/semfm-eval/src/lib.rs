@@ -1,36 +1,39 @@
 //! Evaluation of transfers: datasets, methods, statistics, tables.
 //!
 //! A [`Dataset`] holds objects with a true region and ordered pairs among them: procedural ones, or a
-//! folder of real meshes with labels. [`run()`](run::run) transfers the region of every pair by every
-//! [`Variant`] and gives [`Results`]: a [`Row`](row::Row) for each, sums and intervals
-//! ([`summary`]), methods against methods, and how well a method's confidence is calibrated
-//! ([`calibration`]). [`table`] writes them down, [`compare`] compares them with an older run,
-//! [`published`] quotes the paper. [`run_maps`] is the other evaluation: point maps against true
-//! correspondences.
+//! folder of real meshes with labels. [`run()`] transfers the region of every pair by every
+//! [`Variant`] and gives [`Results`]: a [`Row`] for each, sums and intervals ([`Summary`]), methods
+//! against methods ([`Difference`]), and how well a method's confidence is calibrated
+//! ([`Calibration`]); [`evaluate`] does the same in memory. [`table`] and [`report`] write them down,
+//! [`compare`] compares them with an older run, [`vlm`] adds the rows of a vision-language model.
+//!
+//! [`run_maps`] is the other evaluation: point maps against true correspondences.
 
-pub mod bootstrap;
-pub mod calibration;
+mod bootstrap;
+mod calibration;
 pub mod compare;
 mod correspondence;
 pub mod dataset;
 pub mod embeddings;
 mod error;
 mod evaluation;
-pub mod journal;
+mod journal;
 mod object;
 mod prediction;
-pub mod published;
+mod published;
 pub mod report;
-pub mod results;
-pub mod row;
-pub mod run;
+mod results;
+mod row;
+mod run;
 mod settings;
-pub mod summary;
+mod summary;
 pub mod table;
-pub mod variant;
+mod variant;
 pub mod vlm;
 pub mod workers;
 
+pub use bootstrap::{BootstrapSettings, PairDraws, PairKey};
+pub use calibration::{Calibration, RIGHT, ReliabilityBin, VerdictScore};
 pub use correspondence::{
     CorrespondenceDataset, CorrespondenceSet, MAP_FORMAT, MapMethod, MapResults, MapRow,
     MapSettings, MapSummary, run_maps,
@@ -38,8 +41,11 @@ pub use correspondence::{
 pub use dataset::Dataset;
 pub use embeddings::{EmbeddingSource, Encoder};
 pub use error::{Error, Result};
+pub use journal::{RunIdentity, RunSettings};
 pub use report::ReportSettings;
-pub use results::Results;
+pub use results::{About, Results};
+pub use row::{AnchorRow, Failure, ObjectRow, Row, VlmDetails};
 pub use run::{Finished, evaluate, run};
 pub use settings::EvalSettings;
-pub use variant::{Override, Variant};
+pub use summary::{Difference, POOR, Scope, ScoreTable, Summary};
+pub use variant::{Features, Override, Variant};

@@ -1,15 +1,12 @@
 //! Public types go between threads and are shared by them.
 
-use semfm_eval::bootstrap::{BootstrapSettings, PairDraws};
-use semfm_eval::calibration::Calibration;
 use semfm_eval::compare::Comparison;
-use semfm_eval::embeddings::{Embedded, EmbeddingSource};
-use semfm_eval::row::{ObjectRow, Row};
-use semfm_eval::summary::{Difference, Scope, ScoreTable, Summary};
+use semfm_eval::embeddings::Embedded;
 use semfm_eval::workers::Workers;
 use semfm_eval::{
-    CorrespondenceDataset, Dataset, Error, EvalSettings, Finished, MapMethod, MapResults,
-    MapSettings, Override, ReportSettings, Results, Variant,
+    BootstrapSettings, Calibration, CorrespondenceDataset, Dataset, Difference, EmbeddingSource,
+    Error, EvalSettings, Finished, MapMethod, MapResults, MapSettings, ObjectRow, Override,
+    PairDraws, ReportSettings, Results, Row, Scope, ScoreTable, Summary, Variant,
 };
 
 fn assert_send_sync<T: Send + Sync>() {}

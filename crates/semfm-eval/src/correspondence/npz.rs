@@ -1,4 +1,8 @@
 //! NumPy's archives: a ZIP of arrays, stored or deflated.
+//!
+//! `npyz` reads the arrays. Its feature `npz` would read the ZIP, too, by `zip` 0.6 with AES, bzip2,
+//! a second zstd and `time`: thirty crates and one more C library for what stands here, and no limit
+//! on what an entry unpacks to.
 
 use std::io::Read;
 use std::path::Path;
@@ -37,18 +41,18 @@ impl<'a> Archive<'a> {
     /// encryption).
     pub fn read(path: &'a Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(Error::io(path))?;
-        let broken = |found: &str| Error::format(path, "directory", "a ZIP archive", found);
         // The end record is 22 bytes and a comment of at most 65535.
         let from = bytes.len().saturating_sub(22 + 0xffff);
         let end = (from..bytes.len().saturating_sub(21))
             .rev()
             .find(|&i| bytes[i..].starts_with(b"PK\x05\x06"));
-        let end = end.ok_or_else(|| broken("no end record"))?;
-        let count = u16_at(&bytes, end + 10).ok_or_else(|| broken("a short end record"))?;
-        let mut at = u32_at(&bytes, end + 16).ok_or_else(|| broken("a short end record"))? as usize;
+        let end = end.ok_or_else(|| broken(path, "no end record"))?;
+        let count = u16_at(&bytes, end + 10).ok_or_else(|| broken(path, "a short end record"))?;
+        let mut at =
+            u32_at(&bytes, end + 16).ok_or_else(|| broken(path, "a short end record"))? as usize;
         let mut entries = Vec::new();
         for _ in 0..count {
-            let entry = entry(&bytes, at).ok_or_else(|| broken("a damaged entry"))?;
+            let entry = entry(&bytes, at).ok_or_else(|| broken(path, "a damaged entry"))?;
             entries.push(entry.0);
             at = entry.1;
         }
@@ -62,22 +66,21 @@ impl<'a> Archive<'a> {
             return Ok(None);
         };
         let bytes = self.unpack(entry)?;
-        let fault = |expected: &str, found: String| Error::format(self.path, name, expected, found);
-        let unread = |error: std::io::Error| fault("a NumPy array", error.to_string());
-        let open = || npyz::NpyFile::new(&bytes[..]).map_err(unread);
-        let header = open()?;
+        let unread = |error: std::io::Error| self.fault(name, "a NumPy array", error.to_string());
+        let header = npyz::NpyFile::new(&bytes[..]).map_err(unread)?;
         let shape = header.shape().to_vec();
         if header.order() == npyz::Order::Fortran && shape.len() > 1 {
-            return Err(fault("row-major order", "column-major order".into()));
+            return Err(self.fault(name, "row-major order", "column-major order".into()));
         }
         let kind = header.dtype().descr();
         let count = shape.iter().try_fold(1u64, |n, &d| n.checked_mul(d));
         if count.is_none_or(|n| n > bytes.len() as u64) {
-            return Err(fault("as many values as the file has bytes for", format!("{shape:?}")));
+            let expected = "as many values as the file has bytes for";
+            return Err(self.fault(name, expected, format!("shape {shape:?}")));
         }
         macro_rules! read_as {
             ($($kind:ty),*) => {
-                $(if let Ok(reader) = open()?.data::<$kind>() {
+                $(if let Ok(reader) = npyz::NpyFile::new(&bytes[..]).map_err(unread)?.data::<$kind>() {
                     let values = reader.map(|value| value.map(|x| x as f64));
                     let values = values.collect::<std::io::Result<Vec<f64>>>().map_err(unread)?;
                     return Ok(Some(Array { values, shape }));
@@ -85,12 +88,15 @@ impl<'a> Archive<'a> {
             };
         }
         read_as!(f64, f32, i64, i32, u64, u32, i16, u16, i8, u8);
-        Err(fault("numbers", kind))
+        Err(self.fault(name, "numbers", kind))
+    }
+
+    fn fault(&self, place: &str, expected: &str, found: String) -> Error {
+        Error::format(self.path, place, expected, found)
     }
 
     fn unpack(&self, entry: &Entry) -> Result<Vec<u8>> {
-        let fault =
-            |found: String| Error::format(self.path, &entry.name, "a sound ZIP entry", found);
+        let fault = |found: String| self.fault(&entry.name, "a sound ZIP entry", found);
         // The local header repeats the name and has an extra field of its own length.
         let lengths = (u16_at(&self.bytes, entry.at + 26), u16_at(&self.bytes, entry.at + 28));
         let (Some(name), Some(extra)) = lengths else { return Err(fault("no header".into())) };
@@ -117,6 +123,11 @@ impl<'a> Archive<'a> {
         crc.update(&out);
         if crc.sum() == entry.crc { Ok(out) } else { Err(fault("another checksum".into())) }
     }
+}
+
+/// The directory at the archive's end is none.
+fn broken(path: &Path, found: &str) -> Error {
+    Error::format(path, "directory", "a ZIP archive", found)
 }
 
 /// An entry of the central directory, and where the next begins.
