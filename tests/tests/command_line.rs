@@ -1,9 +1,10 @@
-//! Whole roads through the built binary: a region travels, and every way to it agrees.
+//! Commands of the built binary, one after another: a region is transferred, and every way to give
+//! the input agrees.
 
 use std::path::{Path, PathBuf};
 
 use semfm::views::mcap::ViewsFile;
-use semfm_tests::shell::run;
+use semfm_tests::shell::{Answer, json, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -28,11 +29,7 @@ fn demo(category: &str, seed: &str) -> (TempDir, [PathBuf; 6]) {
     (folder, files)
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
-fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> semfm_tests::shell::Answer {
+fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> Answer {
     let text = |path: &Path| path.to_str().unwrap().to_owned();
     let mut arguments = vec!["transfer".to_owned(), text(&files[0]), text(&files[1])];
     arguments.extend(["--region".into(), text(&files[2]), "-o".into(), text(out)]);
@@ -43,7 +40,7 @@ fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> semfm_tests::she
 }
 
 #[test]
-fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
+fn the_demo_gives_the_files_of_transfer_and_finds_the_handle() {
     let (folder, files) = demo("containers", "0");
     let out = folder.path().join("again");
     let answer = transfer(&files, &out, &["--json"]);
