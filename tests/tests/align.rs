@@ -26,7 +26,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// A procedural mug in units of nobody, 12 cm tall, before a wall and partly behind a pole.
+    /// A procedural mug in units of its own, 12 cm tall, before a wall and partly behind a pole.
     fn new() -> Self {
         let settings = ObjectSettings::default();
         let mesh = make_object(Category::Containers, 0, &settings).unwrap().mesh;

@@ -61,7 +61,7 @@ fn six_categories_are_measured_and_the_methods_stand_in_order() {
         }
     }
     let [fused, nearest, whole] = ["fused", "nearest", "whole"].map(|m| mean_iou(&results, m));
-    // Easy features: measured .83 and .77 on these pairs, the floor .32.
+    // Easy features: measured .83 and .77 on these pairs, the whole object .32.
     assert!(fused > 0.7 && nearest > 0.6 && whole < 0.45, "{fused} {nearest} {whole}");
     assert!(!out.join("journal.jsonl").exists());
     let table = std::fs::read_to_string(out.join("table.md")).unwrap();

@@ -19,14 +19,14 @@ pub fn message(line: impl Display) {
 
 /// Prints an error with the chain of its causes, each once.
 pub fn error(error: &anyhow::Error) {
-    let mut told = String::new();
+    let mut chain = String::new();
     for cause in error.chain() {
         let text = cause.to_string();
-        if !told.contains(&text) {
-            told = if told.is_empty() { text } else { format!("{told}: {text}") };
+        if !chain.contains(&text) {
+            chain = if chain.is_empty() { text } else { format!("{chain}: {text}") };
         }
     }
-    message(format_args!("error: {told}"));
+    message(format_args!("error: {chain}"));
 }
 
 /// A task whose progress shows as a bar, on a terminal only.

@@ -2,7 +2,7 @@
 //!
 //! Preparing an object (cleaning, Laplacian, eigenbasis, parts) depends on nothing but that object.
 //! A robot that was shown one tool keeps it prepared, prepares whatever lies before it, matches the
-//! two, and asks the match for as many regions as it likes.
+//! two, and transfers any number of regions with the match.
 //!
 //! `cargo run --release -p semfm --example reuse_prepared`
 #![allow(clippy::print_stdout, reason = "the answers are what this program is for")]
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let head: Vec<bool> = mesh.vertices().iter().map(|p| share(p) > 0.8).collect();
     let regions = [("grip", Region::from_mask(&grip)), ("head", Region::from_mask(&head))];
 
-    // For each object that turns up: prepare it, match it, carry every region.
+    // For each object that turns up: prepare it, match it, transfer every region.
     for (length, thickness) in [(1.2, 0.6), (2.5, 0.3), (3.0, 0.5)] {
         let target = tool(length, thickness, &settings, &task)?;
         let matching = Matching::new(&source, &target, &settings.transfer, &task)?;

@@ -86,17 +86,7 @@ pub fn region_of_paint(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Re
     let Some(colors) = colors else {
         return Err(Error::invalid("vertex colours", "a painted mesh", "a mesh without colours"));
     };
-    let is_painted = |color: &[u8; 4]| {
-        let [r, g, b, _] = color.map(i16::from);
-        match paint {
-            Some(paint) => [r, g, b]
-                .iter()
-                .zip(paint)
-                .all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE),
-            None => r - g.max(b) >= REDNESS,
-        }
-    };
-    let inside: Vec<bool> = colors.iter().map(is_painted).collect();
+    let inside: Vec<bool> = colors.iter().map(|&color| is_painted(color, paint)).collect();
     if !inside.contains(&true) {
         let wanted = paint.map_or("red".into(), |[r, g, b]| format!("({r}, {g}, {b})"));
         let expected = format!("at least one vertex painted {wanted}");
@@ -107,6 +97,16 @@ pub fn region_of_paint(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Re
         ));
     }
     Ok(Region::from_mask(&inside))
+}
+
+fn is_painted(color: [u8; 4], paint: Option<[u8; 3]>) -> bool {
+    let [r, g, b, _] = color.map(i16::from);
+    match paint {
+        Some(paint) => {
+            [r, g, b].iter().zip(paint).all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE)
+        }
+        None => r - g.max(b) >= REDNESS,
+    }
 }
 
 #[cfg(test)]

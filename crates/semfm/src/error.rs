@@ -1,11 +1,11 @@
-//! What can go wrong on the way from two meshes to a region.
+//! What can go wrong between two meshes and a region.
 
 use semfm_geom::io::FormatError;
 
 /// Result of a facade call.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// An error of any floor, or of a file that only the facade knows.
+/// An error of any crate below, of an argument or of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

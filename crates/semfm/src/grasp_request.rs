@@ -141,7 +141,7 @@ impl GraspProblem {
         Ok(find_grasps(object, weights, gripper, scene, settings, task)?)
     }
 
-    /// What was found, with all that gives it meaning.
+    /// What was found, with the object, the gripper and the camera that it refers to.
     pub fn result<'a>(&'a self, found: &'a Grasps) -> GraspResult<'a> {
         GraspResult {
             mesh: &self.mesh,

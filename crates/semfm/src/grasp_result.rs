@@ -1,4 +1,4 @@
-//! Grasps with all that gives them meaning, as their files want it.
+//! Grasps with the object, the gripper and the camera that they refer to.
 //!
 //! `docs/frames.md` draws the frames. In short: `object` is the mesh's own frame scaled to metres,
 //! `camera` is x right, y down, z forward, and the gripper's frame (TCP) has +z along the approach

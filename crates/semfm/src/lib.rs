@@ -1,15 +1,18 @@
-//! Carry a demonstrated region from one object to another: Semantic Anchored Functional Maps.
+//! Transfer a demonstrated region from one object to another: Semantic Anchored Functional Maps.
 //!
 //! A demonstration touches one object, the **source** (the handle of a mug). SemFM finds where to
 //! act on another object of the same kind, the **target** (a kettle). From two meshes, a region on
 //! the first and patch embeddings of rendered views, it lifts the embeddings to the surface, finds
-//! semantic anchors, computes and refines a functional map, carries the region over and says how
-//! sure it is (Dong & Zhi, *Affordance Transfer Across Object Instances via Semantically Anchored
+//! semantic anchors, computes and refines a functional map, transfers the region and says how sure
+//! it is (Dong & Zhi, *Affordance Transfer Across Object Instances via Semantically Anchored
 //! Functional Map*).
 //!
-//! [`pipeline`] is the tour: it is short and in the order of the paper. The floors below are
-//! re-exported whole: [`geom`] (meshes, Laplacians, eigenbases), [`views`] (cameras, rendering,
-//! lifting, MCAP files) and [`fmap`] (anchors, maps, transfer).
+//! Three calls do it: [`prepare`] each object, [`transfer`] the region, and, for a robot,
+//! [`find_grasps`] in it. [`Matching`] keeps a match for further regions. The crates below are
+//! re-exported whole: [`geom`] (meshes, Laplacians, eigenbases), [`views`] (rendering, lifting, MCAP
+//! files), [`fmap`] (anchors, maps, transfer), [`align`] (a model in what a depth camera sees),
+//! [`robot`] (robot descriptions, grippers) and [`grasp`]. [`files`] reads and writes what a
+//! transfer, an alignment and grasps leave behind.
 //!
 //! ```
 //! use semfm::geom::math::DVec3;

@@ -9,8 +9,12 @@ pub const MARKED: [f32; 3] = [0.86, 0.16, 0.16];
 ///
 /// [`region_of_paint`]: crate::demonstration::region_of_paint
 pub fn weight_colors(weights: &[f64]) -> Vec<[f32; 3]> {
-    let mix = |w: f32| std::array::from_fn(|c| PLAIN[c] + w * (MARKED[c] - PLAIN[c]));
-    weights.iter().map(|&w| mix(w.clamp(0.0, 1.0) as f32)).collect()
+    weights.iter().map(|&w| mixed(w.clamp(0.0, 1.0) as f32)).collect()
+}
+
+/// PLAIN + w (MARKED − PLAIN).
+fn mixed(w: f32) -> [f32; 3] {
+    std::array::from_fn(|c| PLAIN[c] + w * (MARKED[c] - PLAIN[c]))
 }
 
 /// sRGB in 0..1 as bytes.

@@ -83,10 +83,9 @@ struct FeatureOptions {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Matching")]
 struct MatchingOptions {
-    /// fused, semfm (the paper to the letter), anchored, sinkhorn, nearest or wks
-    #[arg(long, default_value_t = Method::Fused)]
+    #[arg(long, default_value_t = Method::Fused, help = method_help())]
     method: Method,
-    /// How a map carries the region: preimage, or image as in the paper's text
+    /// How a map transfers the region: preimage, or image as in the paper's text
     #[arg(long, default_value_t = Rule::Preimage)]
     rule: Rule,
     /// Seed of everything drawn by chance
@@ -124,6 +123,15 @@ impl MatchingOptions {
         settings.cache = if self.no_cache { ShapeCache::off() } else { ShapeCache::of_user() };
         settings.with_seed(self.seed)
     }
+}
+
+/// The methods with what each does.
+fn method_help() -> String {
+    let methods: Vec<String> = Method::ALL
+        .iter()
+        .map(|method| format!("{method}: {}", method.info().summary))
+        .collect();
+    methods.join("; ")
 }
 
 /// Both objects of a transfer.

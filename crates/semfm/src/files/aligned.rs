@@ -124,12 +124,12 @@ pub struct AlignedPose {
     /// From the mesh's frame and units to the camera's frame in metres. In a robot's chain,
     /// `camera_from_tcp = camera_from_object.rigid() * object_from_tcp`.
     pub camera_from_object: Sim3,
-    /// Standard deviation of the scale, metres per unit of the mesh; `None` where it is not told.
+    /// Standard deviation of the scale, metres per unit of the mesh; `None` where the file does not say.
     pub scale_std: Option<f64>,
-    /// Root mean square distance of the observed points to the surface, metres; `None` where it is
-    /// not told.
+    /// Root mean square distance of the observed points to the surface, metres; `None` where the
+    /// file does not say.
     pub residual_m: Option<f64>,
-    /// What to do with the pose; `None` where it is not told.
+    /// What to do with the pose; `None` where the file does not say.
     pub verdict: Option<Verdict>,
 }
 
@@ -154,9 +154,9 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<AlignedPose> {
     }
     let camera_from_object = similarity(path, "camera_from_object", file.camera_from_object)?;
     let scale = camera_from_object.scale;
-    if let Some(told) = file.scale.filter(|told| (told / scale - 1.0).abs() > SCALE_TOLERANCE) {
+    if let Some(found) = file.scale.filter(|found| (found / scale - 1.0).abs() > SCALE_TOLERANCE) {
         let expected = format!("{scale}, the matrix's");
-        return Err(FormatError::new(path, "scale", expected, told.to_string()).into());
+        return Err(FormatError::new(path, "scale", expected, found.to_string()).into());
     }
     for (place, number) in [("scale_std", file.scale_std), ("residual_m", file.residual_m)] {
         if let Some(number) = number.filter(|x| *x < 0.0) {

@@ -21,7 +21,7 @@ pub const FORMAT: &str = "semfm.grasps/1";
 
 /// Grasps as their file has them. Matrices are 4 × 4, rows first, points as columns; lengths are
 /// metres; quaternions are x, y, z, w. The poses of the gripper's parts at each grasp are listed, so
-/// that anybody can check a grasp with nothing but this file and the mesh.
+/// that a grasp can be checked with nothing but this file and the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspsFile {
     /// `semfm.grasps/1`.
@@ -44,7 +44,7 @@ pub struct GraspsFile {
     pub n_candidates: usize,
     /// Gripper poses that passed every check.
     pub n_survivors: usize,
-    /// The settings of the search, where the program that wrote the file told them.
+    /// The settings of the search, where the program that wrote the file gave them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settings: Option<GraspSettingsRecord>,
 }
@@ -233,7 +233,7 @@ impl GraspRecord {
 }
 
 /// Poses of the parts at `width`, in the TCP's frame of the gripper closed to `closed`: the robot
-/// holds the flange still while the fingers close, and a linkage carries the pads along z, so the
+/// holds the flange still while the fingers close, and a linkage moves the pads along z, so the
 /// open gripper has a TCP of its own, seen here from that of the closed one.
 fn parts_at(gripper: &Gripper, closed: f64, width: f64) -> Vec<MatrixRows> {
     let tcp_from_tcp =

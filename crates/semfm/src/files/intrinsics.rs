@@ -22,9 +22,9 @@ use crate::Result;
 pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
     let value: Value = read_json(path)?;
     for (field, has) in [("width", image.width()), ("height", image.height())] {
-        if let Some(told) = value.get(field).filter(|told| told.as_f64() != Some(has as f64)) {
+        if let Some(found) = value.get(field).filter(|found| found.as_f64() != Some(has as f64)) {
             let expected = format!("{has}, as the depth image");
-            return Err(FormatError::new(path, field, expected, told.to_string()).into());
+            return Err(FormatError::new(path, field, expected, found.to_string()).into());
         }
     }
     let [fx, fy, cx, cy] = match value.get("K").or_else(|| value.get("k")) {

@@ -29,7 +29,7 @@ pub struct TransferReportFile {
     pub source: ObjectRecord,
     /// The object to act on.
     pub target: ObjectRecord,
-    /// What the matching tells; its stages include the preparation of both objects.
+    /// How the matching went; its stages include the preparation of both objects.
     #[serde(flatten)]
     pub transfer: TransferReport,
     /// Where the transfer came from.
