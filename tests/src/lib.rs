@@ -1,4 +1,3 @@
-//! Roads through the built binary, and what they share.
+//! Tests of the built binary, and what they share.
 
-pub mod calibration;
 pub mod shell;

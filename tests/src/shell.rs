@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use serde_json::Value;
+
 /// The built `semfm-cli`, beside the tests that are running.
 ///
 /// # Panics
@@ -26,7 +28,7 @@ pub struct Answer {
     pub code: Option<i32>,
     /// Data.
     pub out: String,
-    /// Talk.
+    /// Messages.
     pub err: String,
 }
 
@@ -36,6 +38,25 @@ pub struct Answer {
 /// Where the program cannot be started.
 pub fn run<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Answer {
     answer(semfm_cli().args(arguments).output().expect("the built binary starts"))
+}
+
+/// The content of a JSON file.
+///
+/// # Panics
+/// Where it cannot be read.
+pub fn json(path: &Path) -> Value {
+    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Mean IoU of a method over all pairs, from the results of `eval`.
+///
+/// # Panics
+/// Where the results have none.
+pub fn mean_iou(results: &Value, method: &str) -> f64 {
+    let mut summaries = results["summaries"].as_array().expect("summaries").iter();
+    let summary = summaries.find(|s| s["scope"] == "all" && s["method"] == method);
+    summary.and_then(|s| s["mean"].as_f64()).unwrap_or_else(|| panic!("no mean of {method}"))
 }
 
 /// An output as text.

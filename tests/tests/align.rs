@@ -1,17 +1,17 @@
 //! A rendered scene with known truth, through the binary: depth image in, metres and pose out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use image::{GrayImage, ImageBuffer, Luma};
 use semfm::align::Sim3;
-use semfm::aligned::read_aligned;
+use semfm::files::read_aligned;
 use semfm::geom::io::{read_points, write_mesh};
 use semfm::geom::math::{DAffine3, DMat3, DQuat, DVec3};
 use semfm::geom::{Intrinsics, Pinhole};
 use semfm::views::{RenderSettings, SurfaceColor, render};
 use semfm::{Mesh, Task};
 use semfm_synth::{Category, ObjectSettings, make_object};
-use semfm_tests::shell::{Answer, run, shared};
+use semfm_tests::shell::{Answer, json as json_file, run, shared};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -26,7 +26,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// A procedural mug in units of nobody, 12 cm tall, before a wall and partly behind a pole.
+    /// A procedural mug in units of its own, 12 cm tall, before a wall and partly behind a pole.
     fn new() -> Self {
         let settings = ObjectSettings::default();
         let mesh = make_object(Category::Containers, 0, &settings).unwrap().mesh;
@@ -109,10 +109,6 @@ impl Scene {
     }
 }
 
-fn json_of(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
 const DEPTH: [&str; 8] = [
     "--depth",
     "@depth.png",
@@ -143,7 +139,7 @@ fn a_rendered_mug_is_found_in_metres_and_the_chain_to_the_gripper_is_one_multipl
     let camera_from_tcp = pose.rigid() * scaled.rigid();
     assert!(camera_from_tcp.translation.distance(scene.truth.apply(place)) < 5e-4);
 
-    let file = json_of(&scene.at("aligned.json"));
+    let file = json_file(&scene.at("aligned.json"));
     assert_eq!(file["format"], "semfm.aligned/1");
     let rows: [[f64; 4]; 4] = serde_json::from_value(file["camera_from_object"].clone()).unwrap();
     for (told, read) in rows.iter().flatten().zip(pose.to_rows().iter().flatten()) {
@@ -159,12 +155,12 @@ fn a_rendered_mug_is_found_in_metres_and_the_chain_to_the_gripper_is_one_multipl
         let mut arguments = DEPTH.to_vec();
         arguments.extend(["--init", "@init.json", "--threads", threads, "--quiet"]);
         assert_eq!(scene.align(&arguments).code, Some(0));
-        let again = json_of(&scene.at("aligned.json"));
+        let again = json_file(&scene.at("aligned.json"));
         let rows: [[f64; 4]; 4] =
             serde_json::from_value(again["camera_from_object"].clone()).unwrap();
         assert!(scene.error(&Sim3::from_rows(rows).unwrap()) < 5e-4);
         if threads == "2" {
-            let before = json_of(&scene.at("one.json"));
+            let before = json_file(&scene.at("one.json"));
             assert_eq!(again["camera_from_object"], before["camera_from_object"]);
         }
         scene.write("one.json", &again);
@@ -202,7 +198,7 @@ fn a_cloud_tells_as_much_and_a_wrong_scale_is_refused_but_written() {
     std::fs::remove_file(scene.at("aligned.json")).unwrap();
     let refused = scene.align(&["--cloud", "@seen.pcd", "--scale-range", &wrong]);
     assert_eq!(refused.code, Some(1), "{refused:?}");
-    assert_eq!(json_of(&scene.at("aligned.json"))["verdict"], "refuse");
+    assert_eq!(json_file(&scene.at("aligned.json"))["verdict"], "refuse");
 }
 
 #[test]

@@ -1,15 +1,15 @@
 //! Grasps through the binary: in a region, in metres, in files for others, and reasons for none.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use semfm::Region;
 use semfm::align::Sim3;
 use semfm::geom::io::write_mesh;
 use semfm::geom::math::{DQuat, DVec3};
-use semfm::region_file::write_region;
+use semfm::files::write_region;
 use semfm::views::mcap::{POSES_TOPIC, inspect};
 use semfm_synth::{Category, ObjectSettings, make_object};
-use semfm_tests::shell::{Answer, run};
+use semfm_tests::shell::{Answer, json as json_file, run};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -54,10 +54,6 @@ impl Mug {
     }
 }
 
-fn json_of(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
 /// The rotation and the position of a 4 × 4 matrix.
 fn pose(rows: &Value) -> ([DVec3; 3], DVec3) {
     let at = |i: usize, j: usize| rows[i][j].as_f64().unwrap();
@@ -70,7 +66,7 @@ fn a_handle_is_grasped_and_the_file_says_all() {
     let mug = Mug::new();
     let answer = mug.scaled("grasps.json", &["--picture", "@grasps.png"]);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    let file = json_of(&mug.at("grasps.json"));
+    let file = json_file(&mug.at("grasps.json"));
     assert_eq!(file["format"], "semfm.grasps/1");
     assert_eq!(file["gripper"]["name"], "franka");
     let grasps = file["grasps"].as_array().unwrap();
@@ -118,7 +114,7 @@ fn the_chain_to_the_camera_is_one_multiplication() {
     std::fs::write(mug.at("aligned.json"), aligned.to_string()).unwrap();
     let answer = mug.grasp("grasps.json", &["--aligned", "@aligned.json"]);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    let file = json_of(&mug.at("grasps.json"));
+    let file = json_file(&mug.at("grasps.json"));
     let rigid = camera_from_object.rigid();
     for grasp in file["grasps"].as_array().unwrap() {
         let ((_, in_object), (_, in_camera)) =
@@ -148,7 +144,7 @@ fn where_nothing_survives_the_reasons_are_told() {
     let answer = mug.scaled("none.json", &["--width-range", "0,0.001"]);
     assert_eq!(answer.code, Some(1), "{answer:?}");
     assert!(answer.err.contains("nearest miss"), "{}", answer.err);
-    let file = json_of(&mug.at("none.json"));
+    let file = json_file(&mug.at("none.json"));
     assert_eq!(file["grasps"], json!([]));
     assert!(file["rejected"]["width"].as_u64() > Some(0), "{}", file["rejected"]);
     assert_eq!(file["nearest_miss"]["unit"], "m");

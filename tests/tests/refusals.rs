@@ -117,7 +117,7 @@ fn a_transfer_of_the_wrong_things_is_refused_before_anything_is_written() {
     good.target = good.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
     good.refuses("another mesh altogether", &[], &["emb.mcap"]);
     good.target = target;
-    assert_eq!(good.transfer(&[]).code, Some(0), "the road itself is sound");
+    assert_eq!(good.transfer(&[]).code, Some(0), "the transfer itself works");
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! SemFM at the shell: arguments in, facade calls, files out.
 //!
-//! stdout is data, stderr is talk. Exit codes: 0 success, 1 a sound run without an answer (verdict
+//! stdout is data, stderr is messages. Exit codes: 0 success, 1 a sound run without an answer (verdict
 //! `refuse`), 2 bad input or failure.
 
 mod commands;
-mod load;
+mod console;
 mod options;
-mod talk;
 
 use std::ffi::OsString;
 
@@ -17,7 +16,7 @@ use commands::{
 };
 use options::Common;
 
-/// Carry a demonstrated region from one object to another.
+/// Transfer a demonstrated region from one object to another.
 ///
 /// A demonstration touches one object (the handle of a mug). SemFM finds where to act on a different
 /// object of the same kind (a kettle).
@@ -32,17 +31,17 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Demo(demo::Demo),
-    Views(views::Views),
-    Region(region::MakeRegion),
-    Transfer(Box<transfer::Carry>),
-    Grasp(Box<grasp::FindGrasps>),
-    Show(show::Show),
-    Align(Box<align::FindPose>),
-    Eval(Box<eval::Evaluate>),
-    EvalMaps(eval_maps::EvaluateMaps),
-    Info(info::Info),
-    Completions(completions::Completions),
+    Demo(demo::DemoCommand),
+    Views(views::ViewsCommand),
+    Region(region::RegionCommand),
+    Transfer(Box<transfer::TransferCommand>),
+    Grasp(Box<grasp::GraspCommand>),
+    Show(show::ShowCommand),
+    Align(Box<align::AlignCommand>),
+    Eval(Box<eval::EvalCommand>),
+    EvalMaps(eval_maps::EvalMapsCommand),
+    Info(info::InfoCommand),
+    Completions(completions::CompletionsCommand),
 }
 
 /// Runs one command line, the program's name first, and returns the exit code: 0 success, 1 a sound
@@ -75,7 +74,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Ok(Outcome::NoAnswer) => 1,
         Ok(Outcome::Refused) => 2,
         Err(error) => {
-            talk::complain(&error);
+            console::error(&error);
             2
         }
     }

@@ -1,6 +1,8 @@
 //! Options that every command takes.
 
-use anyhow::{Context, Result};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
 use clap::Args;
 
 /// Options of every command.
@@ -10,10 +12,10 @@ pub struct Common {
     /// Worker threads; 0 takes one for each core. Results do not depend on it
     #[arg(long, global = true, default_value_t = 0, value_name = "N")]
     pub threads: usize,
-    /// Say nothing but the answer
+    /// Print nothing but the answer
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say more
+    /// Print more
     #[arg(long, short, global = true)]
     pub verbose: bool,
     /// Answer in JSON on stdout
@@ -31,8 +33,19 @@ impl Common {
     }
 }
 
+/// A flag's NAME=FOLDER.
+pub fn parse_package(text: &str) -> Result<(String, PathBuf)> {
+    match text.split_once('=') {
+        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => {
+            Ok((name.to_owned(), folder.into()))
+        }
+        _ => bail!("expected NAME=FOLDER, found `{text}`"),
+    }
+}
+
+/// N numbers between commas.
 pub fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Result<[T; N]> {
-    let found = || anyhow::anyhow!("found `{text}`");
     let values: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
-    values.and_then(|values| values.try_into().ok()).ok_or_else(found)
+    let values = values.and_then(|values| values.try_into().ok());
+    values.ok_or_else(|| anyhow::anyhow!("found `{text}`"))
 }

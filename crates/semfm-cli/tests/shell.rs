@@ -1,4 +1,4 @@
-//! The shell's manners: help, versions and exit codes. The roads are tested in `tests/`.
+//! Help, versions and exit codes. What the commands do is tested in `tests/`.
 
 use std::process::Command;
 
@@ -9,7 +9,7 @@ fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn help_is_data_and_a_wrong_word_is_talk() {
+fn help_is_data_and_a_wrong_word_is_a_message() {
     for command in ["demo", "views", "region", "transfer", "info", "completions"] {
         let (code, out, err) = run(&[command, "--help"]);
         assert_eq!((code, err.as_str()), (Some(0), ""));

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use semfm::encoder_command::{EncodedObject, EncoderCommand, EncoderSettings};
 use semfm::geom::io::MeshFile;
+use semfm::rendered_views::Coloring;
 use semfm::views::EmbeddedView;
 use semfm::views::mcap::EmbeddingsFile;
 use semfm::{Method, Task};
@@ -37,6 +39,45 @@ pub trait Encoder: Sync {
 
     /// Names the encoder: another name, other features.
     fn identity(&self) -> String;
+}
+
+/// The command `semfm-embed` as an encoder.
+#[derive(Clone, Debug)]
+pub struct CommandEncoder {
+    /// As in [`EncoderSettings::model`].
+    pub model: String,
+    /// As in [`EncoderSettings::keep`].
+    pub keep: bool,
+    /// As in [`EncoderSettings::threads`].
+    pub threads: usize,
+}
+
+impl Encoder for CommandEncoder {
+    fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String> {
+        let encoded = self.encode(file, rolls).map_err(|error| error.to_string())?;
+        let EncodedObject { embeddings, times } = encoded;
+        Ok(Embedded {
+            views: embeddings.views,
+            encoder: embeddings.metadata.encoder,
+            rolls: embeddings.metadata.rolls,
+            views_ms: times.map(|times| times.views_ms),
+            embed_ms: times.map(|times| times.embed_ms),
+        })
+    }
+
+    fn identity(&self) -> String {
+        format!("encoder {}", self.model)
+    }
+}
+
+impl CommandEncoder {
+    fn encode(&self, file: &MeshFile, rolls: u32) -> semfm::Result<EncodedObject> {
+        let Self { ref model, keep, threads } = *self;
+        let settings =
+            EncoderSettings { model: model.clone(), rolls, keep, threads, quiet: true };
+        // All objects are shown in grey: colour on one side of a pair misleads.
+        EncoderCommand::new(settings)?.embed(file, Coloring::Grey, &Task::default())
+    }
 }
 
 /// Where an evaluation takes its features from.

@@ -7,8 +7,7 @@ use std::time::Instant;
 use semfm::fmap::PreparedObject;
 use semfm::fmap::clusters::ClusterSettings;
 use semfm::geom::{SemanticCloud, Shape, ShapeCache, ShapeSettings};
-use semfm::pipeline::semantic_cloud;
-use semfm::{Meaning, Region, Task};
+use semfm::{FeatureSource, LiftedCloud, Region, Task, semantic_cloud};
 
 use crate::dataset::{LabelledObject, ObjectEntry};
 use crate::embeddings::EmbeddingSource;
@@ -166,8 +165,8 @@ fn timed_cloud(
     let mesh = object.mesh();
     if features == Features::Parts {
         let labels = part_features(object, part_names);
-        let (cloud, _) = semantic_cloud(mesh, Meaning::PerVertex(&labels), &lift, task)?;
-        let (cloud, stages_ms) = (Arc::new(cloud), BTreeMap::new());
+        let cloud = semantic_cloud(mesh, FeatureSource::PerVertex(&labels), &lift, task)?.cloud;
+        let stages_ms = BTreeMap::new();
         return Ok(TimedCloud { cloud, encoder: None, rolls: None, seen: None, stages_ms });
     }
     let embedded = preparation.embeddings.views(entry, object, features.rolls(), task)?;
@@ -178,13 +177,14 @@ fn timed_cloud(
         }
     }
     let start = Instant::now();
-    let (cloud, report) = semantic_cloud(mesh, Meaning::Views(&embedded.views), &lift, task)?;
+    let features = FeatureSource::Views(&embedded.views);
+    let LiftedCloud { cloud, report } = semantic_cloud(mesh, features, &lift, task)?;
     stages_ms.insert("lift", milliseconds_since(start));
     Ok(TimedCloud {
         encoder: Some(embedded.encoder),
         rolls: Some(embedded.rolls),
         seen: report.map(|report| report.n_seen as f64 / cloud.n_points() as f64),
-        cloud: Arc::new(cloud),
+        cloud,
         stages_ms,
     })
 }

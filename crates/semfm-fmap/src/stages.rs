@@ -23,6 +23,11 @@ impl Stages {
         self.0.iter().map(|stage| stage.1).sum()
     }
 
+    /// Adds a stage after the others.
+    pub fn push(&mut self, stage: impl Into<Cow<'static, str>>, ms: f64) {
+        self.0.push((stage.into(), ms));
+    }
+
     /// Runs `work` and books its time under `stage`.
     pub(crate) fn time<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();

@@ -1,9 +1,11 @@
 //! Which mesh a file belongs to.
 
 use std::fmt;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::io::FormatError;
 use crate::{Mesh, MeshHash};
 
 /// Which mesh a file was made of: written into every file that is about a mesh, and compared with
@@ -54,14 +56,25 @@ impl fmt::Display for MeshIdentity {
 
 /// What a file written by hand or by another program says of its mesh: any of the fields of
 /// [`MeshIdentity`], each of which must agree where it is given.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartialMeshIdentity {
     /// Hash of positions and triangles, as text: a hash that cannot be parsed is a mismatch.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
     /// Number of triangles.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub n_triangles: Option<usize>,
     /// Number of vertices.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub n_vertices: Option<usize>,
+}
+
+impl From<MeshIdentity> for PartialMeshIdentity {
+    fn from(identity: MeshIdentity) -> Self {
+        let MeshIdentity { hash, n_triangles, n_vertices } = identity;
+        let hash = Some(hash.to_string());
+        Self { hash, n_triangles: Some(n_triangles), n_vertices: Some(n_vertices) }
+    }
 }
 
 impl PartialMeshIdentity {
@@ -96,6 +109,13 @@ pub struct MeshMismatch {
     pub expected: String,
     /// What the file says.
     pub found: String,
+}
+
+impl MeshMismatch {
+    /// The same as an error about the file that names the mesh.
+    pub fn in_file(self, path: &Path) -> FormatError {
+        FormatError::new(path, self.field, self.expected, self.found)
+    }
 }
 
 fn check_count(

@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use semfm::geom::math::{DMat4, DVec3};
 use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
-use semfm::grasps::{GraspAnswer, grasps_json, write_grasps, write_isaac, write_ros2};
+use semfm::GraspResult;
+use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
 
 use crate::arrays::{self, Axis};
 use crate::gripper::{Gripper, matrix};
@@ -105,14 +106,14 @@ impl Grasps {
     fn with_answer<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        write: impl FnOnce(&GraspAnswer<'_>) -> semfm::Result<T> + Send + 'static,
+        write: impl FnOnce(&GraspResult<'_>) -> semfm::Result<T> + Send + 'static,
     ) -> PyResult<T> {
         let (found, mesh) = (self.found.clone(), self.mesh.clone());
         let gripper = self.gripper.get().held.clone();
         let (object_scale, camera_from_object) = (self.scale, self.camera_from_object);
         run(py, None, move |_| {
             let (mesh, gripper, found) = (&*mesh, &*gripper, &*found);
-            write(&GraspAnswer { mesh, object_scale, camera_from_object, gripper, found })
+            write(&GraspResult { mesh, object_scale, camera_from_object, gripper, found })
         })
     }
 }
@@ -195,7 +196,7 @@ impl Grasps {
     /// -------
     /// dict
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let value = self.with_answer(py, |answer| Ok(grasps_json(answer)))?;
+        let value = self.with_answer(py, |answer| Ok(GraspsFile::new(answer).to_json()))?;
         json::to_python(py, &value)
     }
 
@@ -209,9 +210,9 @@ impl Grasps {
     #[pyo3(signature = (path, *, format="json"))]
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<()> {
         match format {
-            "json" => self.with_answer(py, move |a| write_grasps(&path, a, Default::default())),
-            "ros2" => self.with_answer(py, move |answer| write_ros2(&path, answer)),
-            "isaac" => self.with_answer(py, move |answer| write_isaac(&path, answer)),
+            "json" => self.with_answer(py, move |a| GraspsFile::new(a).write(&path)),
+            "ros2" => self.with_answer(py, move |answer| write_ros2_grasps(&path, answer)),
+            "isaac" => self.with_answer(py, move |answer| write_isaac_grasps(&path, answer)),
             other => Err(errors::invalid(py, "format", "json, ros2 or isaac", other)),
         }
     }

@@ -88,7 +88,7 @@ impl Matching {
     /// Transfer
     fn transfer(&self, region: &Bound<'_, PyAny>) -> PyResult<Transfer> {
         let py = region.py();
-        let region = region_of(region, &self.source.held.part(|o| o.shape.original()))?;
+        let region = region_of(region, &self.source.held.part(|o| o.object.shape().original()))?;
         let matching = self.clone();
         run(py, None, move |_| matching.carry(region))
     }
@@ -112,7 +112,7 @@ impl Matching {
     #[getter]
     fn working_point_map(&self) -> PointMap {
         let map = self.pair.working_point_map();
-        let n_source = self.source.held.shape.mesh().n_vertices();
+        let n_source = self.source.held.object.shape().mesh().n_vertices();
         PointMap { held: Held::new(map.clone()), n_source }
     }
 

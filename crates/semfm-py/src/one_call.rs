@@ -48,7 +48,7 @@ impl Side {
 
     fn mesh(&self) -> Held<semfm::Mesh> {
         match self {
-            Self::Ready(object) => object.held.part(|object| object.shape.original()),
+            Self::Ready(object) => object.held.part(|object| object.object.shape().original()),
             Self::Raw(mesh, _) => mesh.clone(),
         }
     }

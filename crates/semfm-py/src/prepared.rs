@@ -1,11 +1,10 @@
 //! `PreparedObject`: shape and meaning of one object, made once.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use semfm::geom::SemanticCloud as Cloud;
-use semfm::{Meaning, PipelineSettings, Task, fmap};
+use semfm::{FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
@@ -24,11 +23,11 @@ use crate::{errors, json};
 #[pyclass(frozen, module = "semfm")]
 #[derive(Clone)]
 pub struct PreparedObject {
-    pub held: Held<semfm::PreparedObject>,
+    pub held: Held<Prepared>,
 }
 
 impl PreparedObject {
-    pub fn new(object: semfm::PreparedObject) -> Self {
+    pub fn new(object: Prepared) -> Self {
         Self { held: Held::new(object) }
     }
 }
@@ -38,38 +37,39 @@ impl PreparedObject {
     /// Mesh: the mesh as given.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh { held: self.held.part(|object| object.shape.original()) }
+        Mesh { held: self.held.part(|prepared| prepared.object.shape().original()) }
     }
 
     /// Shape: working mesh and eigenbasis.
     #[getter]
     fn shape(&self) -> Shape {
-        Shape { held: self.held.part(|object| &*object.shape) }
+        Shape { held: self.held.part(|prepared| &**prepared.object.shape()) }
     }
 
     /// SemanticCloud: surface points with features.
     #[getter]
     fn cloud(&self) -> SemanticCloud {
-        SemanticCloud { held: self.held.part(|object| &*object.cloud) }
+        SemanticCloud { held: self.held.part(|prepared| &**prepared.object.cloud()) }
     }
 
     /// bool: whether the shape was read from the cache.
     #[getter(from_cache)]
     fn is_from_cache(&self) -> bool {
-        self.held.from_cache
+        self.held.report.from_cache
     }
 
     /// dict: milliseconds by stage.
     #[getter]
     fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let stages: std::collections::BTreeMap<_, _> =
-            self.held.stages_ms.iter().copied().collect();
+            self.held.report.stages_ms.iter().copied().collect();
         json::to_python(py, &stages)
     }
 
     fn __repr__(&self) -> String {
-        let (n, points) = (self.held.shape.original().n_vertices(), self.held.cloud.n_points());
-        format!("PreparedObject({n} vertices, {points} points, dim {})", self.held.cloud.dim())
+        let (shape, cloud) = (self.held.object.shape(), self.held.object.cloud());
+        let (n, points, dim) = (shape.original().n_vertices(), cloud.n_points(), cloud.dim());
+        format!("PreparedObject({n} vertices, {points} points, dim {dim})")
     }
 
     fn __reduce__<'py>(
@@ -80,10 +80,10 @@ impl PreparedObject {
         (Shape, SemanticCloud, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
-        let lifted = self.held.lifted.as_ref();
+        let lifted = self.held.report.lifted.as_ref();
         let lifted = lifted.map(|lifted| (lifted.n_seen, lifted.lifted_by_view.clone()));
-        let stages = self.held.stages_ms.clone();
-        Ok((restore, (self.shape(), self.cloud(), self.held.from_cache, lifted, stages)))
+        let stages = self.held.report.stages_ms.clone();
+        Ok((restore, (self.shape(), self.cloud(), self.held.report.from_cache, lifted, stages)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -116,16 +116,10 @@ pub fn _restore_prepared(
         .collect();
     let (shape, cloud) =
         (Arc::new((*shape.get().held).clone()), Arc::new((*cloud.get().held).clone()));
-    let (of, on) = (Arc::clone(&shape), Arc::clone(&cloud));
-    let object = run(py, None, move |task| Ok(fmap::PreparedObject::new(of, on, task)?))?;
-    Ok(PreparedObject::new(semfm::PreparedObject {
-        object,
-        shape,
-        from_cache,
-        cloud,
-        lifted: lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view }),
-        stages_ms,
-    }))
+    let object = run(py, None, move |task| Ok(fmap::PreparedObject::new(shape, cloud, task)?))?;
+    let lifted = lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view });
+    let report = PreparationReport { from_cache, lifted, stages_ms };
+    Ok(PreparedObject::new(Prepared { object, report }))
 }
 
 /// Where an object's features come from, owned.
@@ -179,13 +173,13 @@ impl OwnedMeaning {
         settings: &PipelineSettings,
         task: &Task,
     ) -> semfm::Result<PreparedObject> {
-        let meaning = match self {
-            Self::Views(file) => Meaning::Views(&file.views),
-            Self::PerVertex(features) => Meaning::PerVertex(features),
-            Self::Cloud(cloud) => Meaning::Cloud(Cow::Borrowed(cloud)),
+        let source = match self {
+            Self::Views(file) => FeatureSource::Views(&file.views),
+            Self::PerVertex(features) => FeatureSource::PerVertex(features),
+            Self::Cloud(cloud) => FeatureSource::Cloud(Arc::new((**cloud).clone())),
         };
-        let object = semfm::PreparedObject::new(mesh.clone(), meaning, settings, task)?;
-        Ok(PreparedObject::new(object))
+        let prepared = semfm::prepare(mesh.clone(), source, settings, task)?;
+        Ok(PreparedObject::new(prepared))
     }
 }
 

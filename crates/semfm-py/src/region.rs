@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use semfm::fmap::metrics;
-use semfm::{region_file, regions};
+use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
+use semfm::files::{RegionFile, read_region, write_region};
 
 use crate::arrays::{self, Axis};
 use crate::camera::Camera;
@@ -103,7 +104,7 @@ impl Region {
     fn near(mesh: &Bound<'_, PyAny>, contact: &Bound<'_, PyAny>, radius: f64) -> PyResult<Self> {
         let contact = arrays::point(contact, "contact")?;
         let held = from_any(mesh, "mesh")?;
-        let region = run(mesh.py(), None, move |_| regions::near(&held, contact, radius))?;
+        let region = run(mesh.py(), None, move |_| region_around_contact(&held, contact, radius))?;
         Ok(Self { held: Held::new(region) })
     }
 
@@ -129,7 +130,7 @@ impl Region {
         let size = [Axis::Is(camera.height() as usize), Axis::Is(camera.width() as usize)];
         let (mask, _) = arrays::mask(mask, "mask", &size)?;
         let held = from_any(mesh, "mesh")?;
-        let region = run(mesh.py(), None, move |_| regions::masked(&held, &camera, &mask))?;
+        let region = run(mesh.py(), None, move |_| region_under_mask(&held, &camera, &mask))?;
         Ok(Self { held: Held::new(region) })
     }
 
@@ -153,7 +154,7 @@ impl Region {
         paint: Option<(u8, u8, u8)>,
     ) -> PyResult<Self> {
         let colors = file.get().held.appearance.vertex_colors.as_deref();
-        guarded(py, || regions::painted(colors, paint.map(|(r, g, b)| [r, g, b])))
+        guarded(py, || region_of_paint(colors, paint.map(|(r, g, b)| [r, g, b])))
     }
 
     /// Reads a region file of a mesh.
@@ -171,7 +172,7 @@ impl Region {
     #[staticmethod]
     fn read(path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
         let held = from_any(mesh, "mesh")?;
-        guarded(mesh.py(), || region_file::read_region(&path, &held))
+        guarded(mesh.py(), || read_region(&path, &held))
     }
 
     /// Writes a region file, whole or not at all.
@@ -183,7 +184,7 @@ impl Region {
     ///     The mesh it belongs to.
     fn write(&self, path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<()> {
         let held = self.of(mesh)?;
-        guard(mesh.py(), || region_file::write_region(&path, &self.held, &held))
+        guard(mesh.py(), || write_region(&path, &self.held, &held))
     }
 
     /// The region file's content as text.
@@ -198,7 +199,7 @@ impl Region {
     /// str
     fn to_json(&self, mesh: &Bound<'_, PyAny>) -> PyResult<String> {
         let held = self.of(mesh)?;
-        guard(mesh.py(), || Ok(region_file::region_json(&self.held, &held).to_string()))
+        guard(mesh.py(), || Ok(RegionFile::new(&self.held, &held).to_json().to_string()))
     }
 
     /// (n,) float64 array: weight of each vertex, a read-only view.
@@ -313,6 +314,6 @@ pub fn region_of(
     }
     let wanted = "a Region or a path (for ids, masks and weights see Region's constructors)";
     let path: PathBuf = value.extract().map_err(|_| errors::wrong_type("region", wanted, value))?;
-    let region = guard(value.py(), || region_file::read_region(&path, mesh))?;
+    let region = guard(value.py(), || read_region(&path, mesh))?;
     Ok(Held::new(region))
 }

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use semfm::files::{Provenance, TransferResult};
 use semfm::fmap;
 use semfm_show::write_transfer;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::held::Held;
 use crate::point_map::PointMap;
@@ -66,7 +67,7 @@ impl Transfer {
     /// PointMap: one source vertex for each target vertex.
     #[getter]
     fn point_map(&self) -> PointMap {
-        let n_source = self.source.held.shape.original().n_vertices();
+        let n_source = self.source.held.object.shape().original().n_vertices();
         PointMap { held: self.held.part(|transfer| &transfer.point_map), n_source }
     }
 
@@ -131,15 +132,18 @@ impl Transfer {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<String>> {
         let about = about.map(|about| dicts::from_python(about, "about")).transpose()?;
-        let mut all = Map::new();
-        all.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
+        let version = Some(env!("CARGO_PKG_VERSION").to_owned());
+        let mut provenance = Provenance { version, ..Provenance::default() };
         if let Some(Value::Object(about)) = about {
-            all.extend(about);
+            provenance.more = about;
         }
         let (held, region) = (self.held.clone(), self.region.clone());
         let (source, target) = (self.source.held.clone(), self.target.held.clone());
         let files = run(py, progress, move |task| {
-            Ok(write_transfer(&folder, &source, &target, &region, &held, all, task)?)
+            let (source, target, transfer) = (&*source, &*target, &*held);
+            let (region, provenance) = (&*region, &provenance);
+            let result = TransferResult { source, target, region, transfer, provenance };
+            Ok(write_transfer(&folder, &result, task)?)
         })?;
         Ok(files.iter().map(|file| file.display().to_string()).collect())
     }

@@ -1,7 +1,7 @@
 //! Results to be looked at.
 //!
 //! - [`write_transfer`] writes everything that a transfer leaves behind: the files for programs (by
-//!   [`semfm::output`]), the pictures and the scene for Foxglove.
+//!   [`semfm::files`]), the pictures and the scene for Foxglove.
 //! - [`TransferFigure`], [`write_grasp_picture`] and [`write_sheet`] draw pictures (PNG).
 //! - [`groups_of_paths`] and [`write_page`] make one HTML page with an interactive viewer.
 //! - `foxglove` (feature `mcap`) holds scenes for Foxglove.

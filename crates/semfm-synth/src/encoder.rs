@@ -97,7 +97,7 @@ struct Strengths {
     background: f32,
 }
 
-// Calibrated at medium on six categories and two seeds (`tests/tests/calibration.rs`). Halfway to
+// Calibrated at medium on six categories and two seeds (`tests/tests/simulated_features.rs`). Halfway to
 // easy moves `nearest` by .01 only: what it loses there is grips that are a part of a part, not
 // noise. Hard adds so much that views of one part disagree.
 const EASY: Strengths = Strengths {

@@ -2,7 +2,7 @@
 //!
 //! Preparing an object (cleaning, Laplacian, eigenbasis, parts) depends on nothing but that object.
 //! A robot that was shown one tool keeps it prepared, prepares whatever lies before it, matches the
-//! two, and asks the match for as many regions as it likes.
+//! two, and transfers any number of regions with the match.
 //!
 //! `cargo run --release -p semfm --example reuse_prepared`
 #![allow(clippy::print_stdout, reason = "the answers are what this program is for")]
@@ -12,10 +12,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use semfm::fmap::Matching;
 use semfm::geom::math::DVec3;
 use semfm::geom::zoo::icosphere;
-use semfm::{Meaning, Mesh, PipelineSettings, PreparedObject, Region, Task};
+use semfm::{FeatureSource, Matching, Mesh, PipelineSettings, PreparedObject, Region, Task};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = PipelineSettings::default();
@@ -35,25 +34,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
 
     // Once: the demonstrated tool and its regions.
-    let source = prepare(2.0, 0.4, &settings, &task)?;
-    let mesh = source.shape.original();
+    let source = tool(2.0, 0.4, &settings, &task)?;
+    let mesh = source.shape().original();
     let (low, high) = mesh.bounds();
     let share = |p: &DVec3| (p.x - low.x) / (high.x - low.x);
     let grip: Vec<bool> = mesh.vertices().iter().map(|p| share(p) < 0.4).collect();
     let head: Vec<bool> = mesh.vertices().iter().map(|p| share(p) > 0.8).collect();
     let regions = [("grip", Region::from_mask(&grip)), ("head", Region::from_mask(&head))];
 
-    // For each object that turns up: prepare it, match it, carry every region.
+    // For each object that turns up: prepare it, match it, transfer every region.
     for (length, thickness) in [(1.2, 0.6), (2.5, 0.3), (3.0, 0.5)] {
-        let target = prepare(length, thickness, &settings, &task)?;
-        let matching = Matching::new(&source.object, &target.object, &settings.transfer, &task)?;
+        let target = tool(length, thickness, &settings, &task)?;
+        let matching = Matching::new(&source, &target, &settings.transfer, &task)?;
         for (name, region) in &regions {
-            let carried = matching.transfer(region)?;
+            let transferred = matching.transfer(region)?;
             println!(
-                "handle {length} × {thickness}: {name} on {} vertices, {:?} ({:.2})",
-                carried.region.vertices().len(),
-                carried.verdict,
-                carried.confidence
+                "handle {length} × {thickness}: {name} on {} vertices, {} ({:.2})",
+                transferred.region.vertices().len(),
+                transferred.verdict,
+                transferred.confidence
             );
         }
     }
@@ -61,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Stopped work comes back at once, with an error that says so.
     stop.store(true, Ordering::Relaxed);
-    match prepare(1.0, 0.5, &settings, &task) {
+    match tool(1.0, 0.5, &settings, &task) {
         Err(error) => println!("stopped: {error}"),
         Ok(_) => return Err("a stopped preparation went on to its end".into()),
     }
@@ -69,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// A tool along x whose features tell its handle from its head, as an encoder's would.
-fn prepare(
+fn tool(
     length: f64,
     thickness: f64,
     settings: &PipelineSettings,
@@ -87,5 +86,5 @@ fn prepare(
     let places = [-1.0, -0.5, 0.0, 0.5, 1.0];
     let features: Vec<f32> =
         sphere.vertices().iter().flat_map(|p| places.map(|centre| near(p.x, centre))).collect();
-    PreparedObject::new(mesh, Meaning::PerVertex(&features), settings, task)
+    Ok(semfm::prepare(mesh, FeatureSource::PerVertex(&features), settings, task)?.object)
 }

@@ -15,12 +15,15 @@ use std::path::Path;
 
 use semfm::geom::io::read_mesh;
 use semfm::geom::zoo::icosphere;
-use semfm::output::{report_json, write_transfer};
-use semfm::region_file::read_region;
-use semfm::{Meaning, Mesh, PipelineSettings, PreparedObject, Region, Task, Verdict, transfer};
+use semfm::files::{Provenance, TransferResult, read_region, write_transfer};
+use semfm::{FeatureSource, Mesh, PipelineSettings, Region, Task, Verdict, prepare, transfer};
 
-/// A mesh and its features (n × d, row-major).
-type Object = (Mesh, Vec<f32>);
+/// An object as it is given.
+struct Object {
+    mesh: Mesh,
+    /// A feature vector for each vertex (n × d, row-major).
+    features: Vec<f32>,
+}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,14 +31,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     match arguments.as_slice() {
         [] => {
             let (source, target) = (tool(1.5, 0.6)?, tool(3.0, 0.3)?);
-            let grip = Region::from_mask(&grip_of(&source.0));
-            carry(source, target, &grip, None)
+            let grip = Region::from_mask(&grip_of(&source.mesh));
+            run(source, target, &grip, None)
         }
         [source, source_features, target, target_features, region, folder] => {
-            let source = (read_mesh(source)?.mesh, read_features(source_features)?);
-            let target = (read_mesh(target)?.mesh, read_features(target_features)?);
-            let region = read_region(Path::new(region), &source.0)?;
-            carry(source, target, &region, Some(Path::new(folder)))
+            let source = read_object(source, source_features)?;
+            let target = read_object(target, target_features)?;
+            let region = read_region(Path::new(region), &source.mesh)?;
+            run(source, target, &region, Some(Path::new(folder)))
         }
         _ => {
             Err("usage: SOURCE SOURCE.txt TARGET TARGET.txt REGION.json FOLDER, or nothing".into())
@@ -44,30 +47,30 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The whole of SemFM in three calls: prepare, prepare, transfer.
-fn carry(
+fn run(
     source: Object,
     target: Object,
     region: &Region,
     folder: Option<&Path>,
 ) -> Result<(), Box<dyn Error>> {
     let (settings, task) = (PipelineSettings::default(), Task::default());
-    let prepare = |(mesh, features): Object| {
-        PreparedObject::new(mesh, Meaning::PerVertex(&features), &settings, &task)
-    };
-    let (source, target) = (prepare(source)?, prepare(target)?);
-    let carried = transfer(&source, &target, region, &settings.transfer, &task)?;
+    let features = FeatureSource::PerVertex(&source.features);
+    let source = prepare(source.mesh, features, &settings, &task)?;
+    let features = FeatureSource::PerVertex(&target.features);
+    let target = prepare(target.mesh, features, &settings, &task)?;
+    let found = transfer(&source.object, &target.object, region, &settings.transfer, &task)?;
 
-    let (found, of) = (carried.region.vertices().len(), carried.region.n_vertices());
-    println!("{found} of {of} vertices, confidence {:.2}", carried.confidence);
-    match carried.verdict {
+    let (inside, of) = (found.region.vertices().len(), found.region.n_vertices());
+    println!("{inside} of {of} vertices, confidence {:.2}", found.confidence);
+    match found.verdict {
         Verdict::Accept => println!("accept: plan a grasp there"),
         Verdict::Check => println!("check: let a person look first"),
         Verdict::Refuse => println!("refuse: demonstrate on an object that is more alike"),
     }
     if let Some(folder) = folder {
-        let about = serde_json::Map::new();
-        let report = report_json(&source, &target, &carried, about);
-        for path in write_transfer(folder, &source, &target, region, &carried, &report, &task)? {
+        let (source, target, provenance) = (&source, &target, &Provenance::default());
+        let result = TransferResult { source, target, region, transfer: &found, provenance };
+        for path in write_transfer(folder, &result, &task)? {
             println!("{}", path.display());
         }
     }
@@ -90,13 +93,17 @@ fn tool(length: f64, thickness: f64) -> Result<Object, Box<dyn Error>> {
     let near = |x: f64, centre: f64| (-8.0 * (x - centre).powi(2)).exp() as f32;
     let places = [-1.0, -0.5, 0.0, 0.5, 1.0];
     let features = sphere.vertices().iter().flat_map(|p| places.map(|centre| near(p.x, centre)));
-    Ok((mesh, features.collect()))
+    Ok(Object { mesh, features: features.collect() })
 }
 
 /// The outer half of the handle.
 fn grip_of(tool: &Mesh) -> Vec<bool> {
     let end = tool.vertices().iter().map(|p| p.x).fold(0.0, f64::min);
     tool.vertices().iter().map(|p| p.x < 0.5 * end).collect()
+}
+
+fn read_object(mesh: &str, features: &str) -> Result<Object, Box<dyn Error>> {
+    Ok(Object { mesh: read_mesh(mesh)?.mesh, features: read_features(features)? })
 }
 
 fn read_features(path: &str) -> Result<Vec<f32>, Box<dyn Error>> {

@@ -1,11 +1,11 @@
-//! What can go wrong on the way from two meshes to a region.
+//! What can go wrong between two meshes and a region.
 
 use semfm_geom::io::FormatError;
 
 /// Result of a facade call.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// An error of any floor, or of a file that only the facade knows.
+/// An error of any crate below, of an argument or of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -37,6 +37,23 @@ pub enum Error {
         /// What was given.
         found: String,
     },
+    /// The program that makes embeddings is not there.
+    #[error(
+        "the encoder needs the program `{program}`, which is not there: install it with \
+         `pip install '.[onnx]'` (or `'.[embed]'` for SigLIP and DINOv2), or name it in SEMFM_EMBED"
+    )]
+    EncoderMissing {
+        /// Name or path of the program.
+        program: String,
+    },
+    /// The program that makes embeddings failed.
+    #[error("{program} ended with {status} (its reason stands above)")]
+    EncoderFailed {
+        /// Name or path of the program.
+        program: String,
+        /// How it ended.
+        status: String,
+    },
     /// A file is not what its format demands.
     #[error(transparent)]
     Format(#[from] FormatError),
@@ -61,6 +78,7 @@ impl Error {
             Self::Grasp(cause) => cause.code(),
             Self::Align(cause) => cause.code(),
             Self::Fmap(_) | Self::Invalid { .. } => "invalid",
+            Self::EncoderMissing { .. } | Self::EncoderFailed { .. } => "encoder",
             Self::Format(_) => "format",
         }
     }
@@ -74,7 +92,7 @@ impl Error {
             Self::Robot(cause) => cause.place(),
             Self::Grasp(cause) => cause.place(),
             Self::Align(cause) => cause.place(),
-            Self::Fmap(_) => None,
+            Self::Fmap(_) | Self::EncoderMissing { .. } | Self::EncoderFailed { .. } => None,
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format(error) => Some(error.place.clone()),
         }

@@ -1,28 +1,46 @@
-//! Carry a demonstrated region from one object to another: Semantic Anchored Functional Maps.
+//! Transfer a demonstrated region from one object to another: Semantic Anchored Functional Maps.
 //!
 //! A demonstration touches one object, the **source** (the handle of a mug). SemFM finds where to
 //! act on another object of the same kind, the **target** (a kettle). From two meshes, a region on
 //! the first and patch embeddings of rendered views, it lifts the embeddings to the surface, finds
-//! semantic anchors, computes and refines a functional map, carries the region over and says how
-//! sure it is (Dong & Zhi, *Affordance Transfer Across Object Instances via Semantically Anchored
+//! semantic anchors, computes and refines a functional map, transfers the region and says how sure
+//! it is (Dong & Zhi, *Affordance Transfer Across Object Instances via Semantically Anchored
 //! Functional Map*).
 //!
-//! [`pipeline`] is the tour: it is short and in the order of the paper. The floors below are
-//! re-exported whole: [`geom`] (meshes, Laplacians, eigenbases), [`views`] (cameras, rendering,
-//! lifting, MCAP files) and [`fmap`] (anchors, maps, transfer).
+//! Three calls do it: [`prepare`] each object, [`transfer`] the region, and, for a robot,
+//! [`find_grasps`] in it. [`Matching`] keeps a match for further regions. The crates below are
+//! re-exported whole: [`geom`] (meshes, Laplacians, eigenbases), [`views`] (rendering, lifting, MCAP
+//! files), [`fmap`] (anchors, maps, transfer), [`align`] (a model in what a depth camera sees),
+//! [`robot`] (robot descriptions, grippers) and [`grasp`]. [`files`] reads and writes what a
+//! transfer, an alignment and grasps leave behind.
 //!
-//! ```no_run
-//! use semfm::{Meaning, PipelineSettings, PreparedObject, Region, Task, transfer};
+//! ```
+//! use semfm::geom::math::DVec3;
+//! use semfm::geom::zoo::icosphere;
+//! use semfm::{FeatureSource, Mesh, PipelineSettings, Region, Task, Verdict, prepare, transfer};
+//!
+//! /// A tool along x: a ball whose one half is drawn out to a handle.
+//! fn tool(handle: f64) -> semfm::Result<Mesh> {
+//!     let ball = icosphere(3);
+//!     let stretch = |p: &DVec3| DVec3::new(if p.x < 0.0 { handle * p.x } else { p.x }, p.y, p.z);
+//!     Ok(Mesh::new(ball.vertices().iter().map(stretch).collect(), ball.faces().to_vec())?)
+//! }
+//! # let ball = icosphere(3);
+//! # let places = [-1.0, -0.5, 0.0, 0.5, 1.0];
+//! # let near = |p: &DVec3, x: f64| (-8.0 * (p.x - x).powi(2)).exp() as f32;
+//! // A feature vector for each vertex, such as an image encoder gives: alike where the tools are.
+//! let features: Vec<f32> = // (n × 5)
+//!     ball.vertices().iter().flat_map(|p| places.map(|x| near(p, x))).collect();
 //!
 //! let (settings, task) = (PipelineSettings::default(), Task::default());
-//! let mug = semfm::geom::io::read_mesh("mug.obj")?.mesh;
-//! let kettle = semfm::geom::io::read_mesh("kettle.ply")?.mesh;
-//! # let (mug_features, kettle_features) = (vec![0.0f32; 3], vec![0.0f32; 3]);
-//! let grip = Region::from_vertices(mug.n_vertices(), &[12, 40])?;
-//! let mug = PreparedObject::new(mug, Meaning::PerVertex(&mug_features), &settings, &task)?;
-//! let kettle = PreparedObject::new(kettle, Meaning::PerVertex(&kettle_features), &settings, &task)?;
-//! let carried = transfer(&mug, &kettle, &grip, &settings.transfer, &task)?;
-//! println!("{:?} with confidence {:.2}", carried.verdict, carried.confidence);
+//! let (short, long) = (tool(1.5)?, tool(3.0)?);
+//! let grip: Vec<bool> = short.vertices().iter().map(|p| p.x < -0.6).collect();
+//! let source = prepare(short, FeatureSource::PerVertex(&features), &settings, &task)?;
+//! let target = prepare(long, FeatureSource::PerVertex(&features), &settings, &task)?;
+//!
+//! let region = Region::from_mask(&grip);
+//! let found = transfer(&source.object, &target.object, &region, &settings.transfer, &task)?;
+//! assert_eq!(found.verdict, Verdict::Accept);
 //! # Ok::<(), semfm::Error>(())
 //! ```
 
@@ -33,17 +51,27 @@ pub use semfm_grasp as grasp;
 pub use semfm_robot as robot;
 pub use semfm_views as views;
 
-pub mod aligned;
+pub mod demonstration;
+#[cfg(feature = "mcap")]
+pub mod encoder_command;
 mod error;
-pub mod grasps;
-pub mod observed;
-pub mod output;
-pub mod pipeline;
-pub mod region_file;
-pub mod regions;
+pub mod files;
+mod grasp_request;
+mod grasp_result;
+mod pipeline;
+#[cfg(feature = "mcap")]
+pub mod rendered_views;
 pub mod weight_colors;
 
 pub use error::{Error, Result};
-pub use fmap::{Method, Region, Rule, Transfer, TransferSettings, Verdict};
+pub use fmap::{
+    Matching, Method, PreparedObject, Region, Rule, Transfer, TransferSettings, Verdict, transfer,
+};
 pub use geom::{Mesh, Task};
-pub use pipeline::{Meaning, PipelineSettings, PreparedObject, transfer};
+pub use grasp::find_grasps;
+pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
+pub use grasp_result::{AnswerFrame, GraspResult};
+pub use pipeline::{
+    FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared, prepare,
+    semantic_cloud,
+};

@@ -1,32 +1,34 @@
-//! The road of the paper, from two meshes to a region: the tour that a user reads first.
+//! The tour, from two meshes to a region, in the order of the paper.
 //!
-//! 1. [`PreparedObject::new`] makes a mesh ready: cleaned and simplified, Laplacian and eigenbasis
-//!    (section III), and its meaning lifted to the surface (section IV-C).
-//! 2. [`transfer`] carries a region from one prepared object to another: anchors, functional map,
-//!    ZoomOut, point map, vote and confidence (sections IV-D and IV-E).
+//! 1. [`prepare`] makes a mesh ready: its features are lifted to the surface as a semantic cloud
+//!    (section IV-C), the mesh is cleaned and simplified and gets Laplacian and eigenbasis
+//!    (section III), and both become a [`PreparedObject`].
+//! 2. [`transfer`](crate::transfer) matches two prepared objects and transfers a region from one to
+//!    the other: anchors, functional map, ZoomOut, point map, vote and confidence (sections IV-D
+//!    and IV-E). [`Matching`](crate::Matching) keeps the match for further regions.
+//! 3. [`find_grasps`](crate::find_grasps) grasps the target in the region.
 //!
-//! The shell and the Python package call these same two functions.
+//! The shell and the Python package call these same functions.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use semfm_fmap::{Lifting, Method, Region, Transfer, TransferSettings};
+use semfm_fmap::{Lifting, Method, PreparedObject, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeCache, ShapeSettings, Task};
+use semfm_geom::{Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
 use semfm_views::{EmbeddedView, LiftReport, LiftSettings, lift};
 
 use crate::{Error, Result};
 
-/// All settings of the road, each with the default that we measured to be best.
+/// The settings of all steps, each with the default that we measured to be best.
 #[derive(Clone, Debug)]
 pub struct PipelineSettings {
     /// Working mesh, Laplacian and basis.
     pub shape: ShapeSettings,
-    /// How embeddings are lifted to the surface.
+    /// How features are lifted to the surface.
     pub lift: LiftSettings,
-    /// How the region is carried.
+    /// How the region is transferred.
     pub transfer: TransferSettings,
     /// Where prepared shapes are kept between runs; off by default.
     pub cache: ShapeCache,
@@ -60,101 +62,99 @@ impl PipelineSettings {
 
 /// Where an object's features come from.
 #[derive(Clone, Debug)]
-pub enum Meaning<'a> {
+#[non_exhaustive]
+pub enum FeatureSource<'a> {
     /// Patch embeddings of rendered views of this very mesh.
     Views(&'a [EmbeddedView]),
-    /// One feature vector per vertex of the mesh as read (n × d, row-major), from anybody's network.
+    /// One feature vector per vertex of the mesh as read (n × d, row-major), from any network.
     PerVertex(&'a [f32]),
     /// A cloud that the caller made.
-    Cloud(Cow<'a, SemanticCloud>),
+    Cloud(Arc<SemanticCloud>),
 }
 
-/// An object ready to be matched: its shape, its meaning, and how long each took.
+/// An object ready to be matched, and how it was prepared.
 #[derive(Clone, Debug)]
-pub struct PreparedObject {
-    /// What matching reads, made once.
-    pub object: semfm_fmap::PreparedObject,
-    /// Working mesh and eigenbasis.
-    pub shape: Arc<Shape>,
+pub struct Prepared {
+    /// The object.
+    pub object: PreparedObject,
+    /// How it came about.
+    pub report: PreparationReport,
+}
+
+/// How an object was prepared.
+#[derive(Clone, Debug)]
+pub struct PreparationReport {
     /// Whether the shape was read from the cache.
     pub from_cache: bool,
-    /// Surface points with features.
-    pub cloud: Arc<SemanticCloud>,
     /// How well the views covered the surface, where there were views.
     pub lifted: Option<LiftReport>,
     /// Milliseconds per stage: `lift`, `shape`, `prepare`.
     pub stages_ms: Vec<(&'static str, f64)>,
 }
 
-impl PreparedObject {
-    /// Makes a mesh ready: its shape (from the cache where it is known) and its semantic cloud.
-    ///
-    /// # Errors
-    /// Whatever the shape, the features or the lifting report; [`Error::Invalid`] where per-vertex
-    /// features do not fit the mesh.
-    pub fn new(
-        mesh: Mesh,
-        meaning: Meaning<'_>,
-        settings: &PipelineSettings,
-        task: &Task,
-    ) -> Result<Self> {
-        let start = Instant::now();
-        let (cloud, lifted) = semantic_cloud(&mesh, meaning, &settings.lift, task)?;
-        let lift_ms = start.elapsed().as_secs_f64() * 1e3;
-        let start = Instant::now();
-        let cached = settings.cache.shape(mesh, &settings.shape, task)?;
-        let shape_ms = start.elapsed().as_secs_f64() * 1e3;
-        let start = Instant::now();
-        let (shape, cloud) = (Arc::new(cached.shape), Arc::new(cloud));
-        let object = semfm_fmap::PreparedObject::new(Arc::clone(&shape), Arc::clone(&cloud), task)?;
-        let prepare_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(Self {
-            object,
-            shape,
-            from_cache: cached.hit,
-            cloud,
-            lifted,
-            stages_ms: vec![("lift", lift_ms), ("shape", shape_ms), ("prepare", prepare_ms)],
-        })
-    }
-}
-
-/// The meaning of a mesh as a cloud on its surface, and how well views covered it, where there were
-/// views. [`PreparedObject::new`] does this; alone it serves who gives one shape several meanings.
+/// Prepares a mesh with its features: cloud, shape (from the cache where it is known), and what
+/// matching derives from the two.
 ///
 /// # Errors
-/// Whatever the lifting reports; [`Error::Invalid`] where per-vertex features do not fit the mesh.
+/// [`Error::Invalid`] where per-vertex features do not fit the mesh; [`Error::Views`] for views that
+/// do not; [`Error::Geom`] for a mesh without area, impossible shape settings or an eigensolver that
+/// does not converge, and on cancellation; [`Error::Fmap`] for features without variance.
+pub fn prepare(
+    mesh: Mesh,
+    features: FeatureSource<'_>,
+    settings: &PipelineSettings,
+    task: &Task,
+) -> Result<Prepared> {
+    let start = Instant::now();
+    let LiftedCloud { cloud, report: lifted } =
+        semantic_cloud(&mesh, features, &settings.lift, task)?;
+    let lift_ms = milliseconds_since(start);
+
+    let start = Instant::now();
+    let shape = settings.cache.shape(mesh, &settings.shape, task)?;
+    let shape_ms = milliseconds_since(start);
+
+    let start = Instant::now();
+    let object = PreparedObject::new(Arc::new(shape.shape), cloud, task)?;
+    let prepare_ms = milliseconds_since(start);
+
+    let stages_ms = vec![("lift", lift_ms), ("shape", shape_ms), ("prepare", prepare_ms)];
+    let report = PreparationReport { from_cache: shape.hit, lifted, stages_ms };
+    Ok(Prepared { object, report })
+}
+
+/// The semantic cloud of a mesh, and how well views covered the surface.
+#[derive(Clone, Debug)]
+pub struct LiftedCloud {
+    /// Surface points with features.
+    pub cloud: Arc<SemanticCloud>,
+    /// What was seen, where there were views.
+    pub report: Option<LiftReport>,
+}
+
+/// The features of a mesh as a cloud on its surface. [`prepare`] does this; alone it is for callers
+/// who give one shape several kinds of features.
+///
+/// # Errors
+/// [`Error::Invalid`] where per-vertex features do not fit the mesh, [`Error::Views`] for views that
+/// do not, [`Error::Geom`] for a mesh without area and on cancellation.
 pub fn semantic_cloud(
     mesh: &Mesh,
-    meaning: Meaning<'_>,
+    features: FeatureSource<'_>,
     settings: &LiftSettings,
     task: &Task,
-) -> Result<(SemanticCloud, Option<LiftReport>)> {
-    match meaning {
-        Meaning::Views(views) => {
+) -> Result<LiftedCloud> {
+    match features {
+        FeatureSource::Views(views) => {
             let lifted = lift(mesh, views, settings, task)?;
-            Ok((lifted.cloud, Some(lifted.report)))
+            Ok(LiftedCloud { cloud: Arc::new(lifted.cloud), report: Some(lifted.report) })
         }
-        Meaning::PerVertex(features) => {
-            Ok((cloud_of_vertices(mesh, features, settings.n_samples)?, None))
+        FeatureSource::PerVertex(features) => {
+            let cloud = cloud_of_vertices(mesh, features, settings.n_samples)?;
+            Ok(LiftedCloud { cloud: Arc::new(cloud), report: None })
         }
-        Meaning::Cloud(cloud) => Ok((cloud.into_owned(), None)),
+        FeatureSource::Cloud(cloud) => Ok(LiftedCloud { cloud, report: None }),
     }
-}
-
-/// Carries `region`, a weight per vertex of the source mesh as read, to the target.
-///
-/// # Errors
-/// An empty region or one of another mesh, features of different dimensions, impossible settings,
-/// cancellation. A region that lands nowhere is not an error but a refusal.
-pub fn transfer(
-    source: &PreparedObject,
-    target: &PreparedObject,
-    region: &Region,
-    settings: &TransferSettings,
-    task: &Task,
-) -> Result<Transfer> {
-    Ok(semfm_fmap::transfer(&source.object, &target.object, region, settings, task)?)
 }
 
 /// A cloud at up to `n_points` farthest-point vertices of the surface, with their features.
@@ -162,11 +162,8 @@ fn cloud_of_vertices(mesh: &Mesh, features: &[f32], n_points: usize) -> Result<S
     let n = mesh.n_vertices();
     if features.is_empty() || !features.len().is_multiple_of(n) {
         let expected = format!("a whole number of values for each of {n} vertices");
-        return Err(Error::invalid(
-            "per-vertex features",
-            expected,
-            format!("{} values", features.len()),
-        ));
+        let found = format!("{} values", features.len());
+        return Err(Error::invalid("per-vertex features", expected, found));
     }
     let dim = features.len() / n;
     // Vertices that no triangle uses are no part of the surface.
@@ -174,10 +171,13 @@ fn cloud_of_vertices(mesh: &Mesh, features: &[f32], n_points: usize) -> Result<S
     used.sort_unstable();
     used.dedup();
     let positions: Vec<DVec3> = used.iter().map(|&v| mesh.vertices()[v as usize]).collect();
-    let chosen =
-        farthest_points(&positions, n_points).into_iter().map(|i| used[i as usize] as usize);
-    let chosen: Vec<usize> = chosen.collect();
+    let chosen: Vec<usize> =
+        farthest_points(&positions, n_points).iter().map(|&i| used[i as usize] as usize).collect();
     let points = chosen.iter().map(|&v| mesh.vertices()[v]).collect();
     let rows = chosen.iter().flat_map(|&v| &features[v * dim..(v + 1) * dim]).copied().collect();
     Ok(SemanticCloud::new(points, rows, dim, vec![1; chosen.len()])?)
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }

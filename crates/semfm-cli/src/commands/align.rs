@@ -6,14 +6,15 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
 use semfm::align::{AlignSettings, Alignment, Observation, Verdict, align};
-use semfm::aligned::{aligned_json, read_pose, write_aligned};
-use semfm::geom::io::read_points;
+use semfm::files::{
+    AlignedFile, MaskedPicture, read_depth_image, read_intrinsics, read_mask, read_pose,
+};
+use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
-use semfm::observed::{read_depth, read_intrinsics, read_mask};
 
 use super::Outcome;
+use crate::console;
 use crate::options::{Common, numbers};
-use crate::{load, talk};
 
 /// Find a mesh of unknown scale in a depth image or a point cloud
 #[derive(Debug, Args)]
@@ -23,7 +24,7 @@ use crate::{load, talk};
     semfm-cli align mug.obj --cloud seen.ply -o aligned.json\n\n\
     Without a mask the cloud should hold little but the object: what else it holds counts as clutter.\n\
     Exit code 0: a pose to use or to check. 1: verdict `refuse` (the file is written all the same). 2: bad input.")]
-pub struct FindPose {
+pub struct AlignCommand {
     /// The mesh, in any frame and any unit
     mesh: PathBuf,
     /// Where to write the pose (JSON)
@@ -71,9 +72,9 @@ struct ObservedOptions {
     mask: Option<PathBuf>,
 }
 
-impl FindPose {
+impl AlignCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let file = load::mesh(&self.mesh, None)?;
+        let file = read_mesh(&self.mesh)?;
         let start = Instant::now();
         let observed = self.observed.read()?;
         let read = start.elapsed().as_secs_f64() * 1e3;
@@ -84,19 +85,19 @@ impl FindPose {
             n_starts: self.starts,
             seed: self.seed,
         };
-        let task = talk::watched(common.quiet);
+        let task = console::progress(common.quiet);
         let mut found = align(&file.mesh, &observed, &settings, &task)
             .with_context(|| self.mesh.display().to_string())?;
         found.stages_ms.insert(0, ("observe", read));
-        let value = aligned_json(&found, &file.mesh, &settings);
-        write_aligned(&self.output, &value)?;
+        let aligned = AlignedFile::new(&found, &file.mesh, &settings);
+        aligned.write(&self.output)?;
         if !common.quiet {
-            remark(&found);
+            print_alignment(&found);
         }
         if common.json {
-            talk::say(value);
+            console::data(aligned.to_json());
         } else {
-            talk::say(self.output.display());
+            console::data(self.output.display());
         }
         let refused = found.verdict == Verdict::Refuse;
         Ok(if refused { Outcome::NoAnswer } else { Outcome::Done })
@@ -106,9 +107,14 @@ impl FindPose {
 impl ObservedOptions {
     fn read(&self) -> Result<Observation> {
         if let (Some(depth), Some(intrinsics)) = (&self.depth, &self.intrinsics) {
-            let image = read_depth(depth, self.depth_scale)?;
+            let image = read_depth_image(depth, self.depth_scale)?;
             let camera = read_intrinsics(intrinsics, &image)?;
-            let mask = self.mask.as_deref().map(|mask| read_mask(mask, &image)).transpose()?;
+            let of = MaskedPicture {
+                width: camera.width(),
+                height: camera.height(),
+                name: "the depth image",
+            };
+            let mask = self.mask.as_deref().map(|mask| read_mask(mask, of)).transpose()?;
             let named = || self.mask.as_ref().unwrap_or(depth).display().to_string();
             return Observation::from_depth(&image, &camera, mask.as_deref()).with_context(named);
         }
@@ -129,18 +135,18 @@ impl ObservedOptions {
     }
 }
 
-fn remark(found: &Alignment) {
+fn print_alignment(found: &Alignment) {
     let scale = found.camera_from_object.scale;
-    talk::remark(format_args!(
+    console::message(format_args!(
         "scale {scale:.5} ± {:.5} metres per unit, residual {:.2} mm",
         found.scale_std,
         1e3 * found.residual_m
     ));
-    talk::remark(format_args!(
+    console::message(format_args!(
         "{:.0} % of the points on the model, {:.0} % of its visible side seen: {}",
         100.0 * found.inlier_share,
         100.0 * found.visibility,
-        format!("{:?}", found.verdict).to_lowercase()
+        found.verdict
     ));
-    found.reasons.iter().for_each(|reason| talk::remark(format_args!("  {reason}")));
+    found.reasons.iter().for_each(|reason| console::message(format_args!("  {reason}")));
 }

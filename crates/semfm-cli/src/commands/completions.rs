@@ -11,16 +11,16 @@ use super::Outcome;
 #[command(
     after_help = "Example:\n  semfm-cli completions bash > ~/.local/share/bash-completion/completions/semfm-cli"
 )]
-pub struct Completions {
+pub struct CompletionsCommand {
     /// The shell
     shell: Shell,
 }
 
-impl Completions {
+impl CompletionsCommand {
     pub fn run(self) -> Result<Outcome> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut crate::command_line(), "semfm-cli", &mut script);
-        crate::talk::say(String::from_utf8_lossy(&script).trim_end());
+        crate::console::data(String::from_utf8_lossy(&script).trim_end());
         Ok(Outcome::Done)
     }
 }

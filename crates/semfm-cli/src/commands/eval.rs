@@ -1,27 +1,25 @@
-//! `semfm-cli eval`: how well regions are carried, measured.
+//! `semfm-cli eval`: how well regions are transferred, measured.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::geom::ShapeCache;
-use semfm::geom::io::MeshFile;
 use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
-use semfm_eval::embeddings::Embedded;
+use semfm_eval::embeddings::CommandEncoder;
 use semfm_eval::workers::Workers;
 use semfm_eval::{EmbeddingSource, EvalSettings, Override, Results, Variant, report, table, vlm};
 use semfm_synth::Level;
 use serde_json::json;
 
 use super::Outcome;
-use super::embed::Encoder;
-use super::page::PageOptions;
+use super::report_options::ReportOptions;
+use crate::console;
 use crate::options::Common;
-use crate::talk;
 
-/// Measure how well regions are carried: every method, every ordered pair
+/// Measure how well regions are transferred: every method, every ordered pair
 ///
 /// DATASET is a folder of `CATEGORY/NAME.obj` beside `NAME.json` with the true region, or none with
 /// `--synthetic`. An interrupted run goes on where it stopped when the same command is given again.
@@ -32,8 +30,8 @@ use crate::talk;
     semfm-cli eval --synthetic -o report\n  \
     semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
     semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
-    Exit code 0: measured (failed pairs are told in the results). 2: bad input, or nothing could be measured.")]
-pub struct Evaluate {
+    Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured.")]
+pub struct EvalCommand {
     /// Folder of labelled objects
     dataset: Option<PathBuf>,
     /// Folder for the results
@@ -48,7 +46,7 @@ pub struct Evaluate {
     #[command(flatten)]
     work: WorkOptions,
     #[command(flatten)]
-    page: PageOptions,
+    report: ReportOptions,
 }
 
 #[derive(Debug, Args)]
@@ -69,12 +67,13 @@ struct SyntheticOptions {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "What the surfaces mean")]
+#[command(next_help_heading = "Features")]
 struct FeatureOptions {
     /// Folder of `NAME.emb.mcap` [default: beside the meshes]
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["encoder", "synthetic"])]
     embeddings: Option<PathBuf>,
-    /// Make the embeddings: a Hugging Face name, a local checkpoint, or an ONNX encoder's JSON
+    /// Make the embeddings: a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or a
+    /// class of Python as package.module:Class
     #[arg(long, value_name = "MODEL", conflicts_with = "synthetic")]
     encoder: Option<String>,
     /// `fused`: give the published method our views and lifting instead of its own
@@ -123,33 +122,26 @@ struct WorkOptions {
     no_cache: bool,
 }
 
-impl Evaluate {
+impl EvalCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        if self.page.report_only {
-            return self.page.again(&self.output, common);
+        if self.report.report_only {
+            return self.report.write_again(&self.output, common);
         }
         // What cannot be compared with should be known before the work is done.
         let before = self.work.compare.as_deref().map(Results::read).transpose()?;
         let dataset = self.dataset()?;
-        let scratch = tempfile::tempdir().context("a folder for embeddings")?;
-        let encoder = self.features.encoder.as_deref().map(|model| Made {
-            model: model.to_owned(),
-            keep: !self.work.no_cache,
-            scratch: scratch.path(),
-            workers: Workers::new(common.threads, self.work.jobs),
-            common: *common,
-        });
+        let encoder = self.encoder(common);
         let embeddings = match &encoder {
             Some(encoder) => EmbeddingSource::Encoder(encoder),
             None => EmbeddingSource::Files(self.features.embeddings.clone()),
         };
         let settings = self.settings(common)?;
         self.announce(&dataset, &settings, common);
-        let task = talk::watched_with_time_left(common.quiet);
+        let task = console::progress_with_time_left(common.quiet);
         let vlm = self.methods.vlm.as_deref().map(|path| vlm::read(path, &dataset)).transpose()?;
         let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
         if finished.resumed > 0 && !common.quiet {
-            talk::remark(format_args!("went on after {} pairs done before", finished.resumed));
+            console::message(format_args!("went on after {} pairs done before", finished.resumed));
         }
         if let Some(mut rows) = vlm {
             if let Some(path) = self.methods.vlm.as_deref().filter(|_| !self.work.no_predictions) {
@@ -163,11 +155,19 @@ impl Evaluate {
         if let Some(comparison) = &comparison {
             files.extend(comparison.write(&self.output)?);
         }
-        let page = self.page.settings();
-        files.push(report::write(results, &dataset, &self.output, &page, &task)?);
+        let settings = self.report.settings();
+        files.push(report::write(results, &dataset, &self.output, &settings, &task)?);
         let results = finished.close()?;
-        tell(&results, comparison.as_ref(), &files, common);
-        judge(&results, common)
+        print_results(&results, comparison.as_ref(), &files, common);
+        outcome_of(&results, common)
+    }
+
+    fn encoder(&self, common: &Common) -> Option<CommandEncoder> {
+        let model = self.features.encoder.clone()?;
+        let keep = !self.work.no_cache;
+        // Several encoders at work at once share the cores, as the pairs do.
+        let threads = Workers::new(common.threads, self.work.jobs).threads;
+        Some(CommandEncoder { model, keep, threads })
     }
 
     fn dataset(&self) -> Result<Dataset> {
@@ -209,7 +209,7 @@ impl Evaluate {
 
     fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
         if !common.quiet {
-            talk::remark(format_args!(
+            console::message(format_args!(
                 "{} pairs of {} objects in {} groups, {} methods, {} at once",
                 dataset.n_pairs(),
                 dataset.objects.len(),
@@ -264,43 +264,9 @@ impl std::str::FromStr for Seeds {
     }
 }
 
-/// The sidecar as an encoder of the evaluation.
-struct Made<'a> {
-    model: String,
-    keep: bool,
-    scratch: &'a Path,
-    workers: Workers,
-    common: Common,
-}
-
-impl semfm_eval::Encoder for Made<'_> {
-    fn embed(&self, file: &MeshFile, rolls: u32) -> std::result::Result<Embedded, String> {
-        let make = || -> Result<Embedded> {
-            let encoder = Encoder::new(&self.model, rolls, self.keep, self.scratch)?;
-            // Several encoders at work at once share the cores, as the pairs do.
-            let threads = self.workers.threads;
-            let quiet = Common { quiet: true, threads, ..self.common };
-            // All objects are shown in grey: colour on one side of a pair misleads.
-            let (file, took) = encoder.embed_timed(file, false, &quiet)?;
-            Ok(Embedded {
-                views: file.views,
-                encoder: file.metadata.encoder,
-                rolls: file.metadata.rolls,
-                views_ms: took.map(|took| took.views_ms),
-                embed_ms: took.map(|took| took.embed_ms),
-            })
-        };
-        make().map_err(|error| format!("{error:#}"))
-    }
-
-    fn identity(&self) -> String {
-        format!("encoder {}", self.model)
-    }
-}
-
-fn tell(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], common: &Common) {
+fn print_results(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], common: &Common) {
     if common.json {
-        talk::say(json!({
+        console::data(json!({
             "n_rows": results.rows.len(),
             "n_failed": results.rows.iter().filter(|row| row.failure.is_some()).count(),
             "summaries": results.summaries,
@@ -309,27 +275,27 @@ fn tell(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], c
         }));
         return;
     }
-    talk::say(table::render(results));
+    console::data(table::render(results));
     if let Some(comparison) = comparison {
-        talk::say(comparison.render());
+        console::data(comparison.render());
     }
-    wrote(files);
+    print_files(files);
 }
 
-pub(super) fn wrote(files: &[PathBuf]) {
-    talk::say("wrote");
-    files.iter().for_each(|file| talk::say(format_args!("  {}", file.display())));
+pub(super) fn print_files(files: &[PathBuf]) {
+    console::data("wrote");
+    files.iter().for_each(|file| console::data(format_args!("  {}", file.display())));
 }
 
-/// Failed rows are told; a run without a single score has failed.
-fn judge(results: &Results, common: &Common) -> Result<Outcome> {
+/// Failed rows are counted on stderr; a run without a single score has failed.
+fn outcome_of(results: &Results, common: &Common) -> Result<Outcome> {
     let failed = results.rows.iter().filter(|row| row.failure.is_some()).count();
     if results.rows.iter().all(|row| row.iou.is_none()) {
         let first = results.rows.iter().find_map(|row| row.failure.as_ref());
         bail!("no pair could be measured; the first: {}", first.map_or("no pair", |f| &f.text));
     }
     if failed > 0 && !common.quiet {
-        talk::remark(format_args!(
+        console::message(format_args!(
             "{failed} of {} rows failed, see the results",
             results.rows.len()
         ));

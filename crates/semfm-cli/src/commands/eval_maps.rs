@@ -10,9 +10,9 @@ use semfm_eval::{CorrespondenceDataset, MapResults, MapSettings, report, run_map
 use serde_json::json;
 
 use super::Outcome;
-use super::eval::{parsed, wrote};
+use super::eval::{parsed, print_files};
+use crate::console;
 use crate::options::Common;
-use crate::talk;
 
 /// Measure point maps against true correspondences: functional maps beside another library
 ///
@@ -23,8 +23,8 @@ use crate::talk;
 #[command(after_help = "Examples:\n  \
     semfm-cli eval-maps matching -o report\n  \
     semfm-cli eval-maps matching --methods wks,landmarks+zoomout --samples 0 -o report\n\n\
-    Exit code 0: measured (failed pairs are told in the results). 2: bad input, or nothing could be measured.")]
-pub struct EvaluateMaps {
+    Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured.")]
+pub struct EvalMapsCommand {
     /// Folder of sets
     sets: Option<PathBuf>,
     /// Folder for the results
@@ -48,23 +48,23 @@ pub struct EvaluateMaps {
     report_only: bool,
 }
 
-impl EvaluateMaps {
+impl EvalMapsCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let Some(sets) = &self.sets else {
             let files = report::write_maps(&MapResults::read(&self.output)?, &self.output)?;
-            files.iter().for_each(|file| talk::say(file.display()));
+            files.iter().for_each(|file| console::data(file.display()));
             return Ok(Outcome::Done);
         };
         let dataset = CorrespondenceDataset::open(sets)?;
-        let task = talk::watched_with_time_left(common.quiet);
+        let task = console::progress_with_time_left(common.quiet);
         let results = run_maps(&dataset, &self.settings(common)?, &task)?;
         let files = report::write_maps(&results, &self.output)?;
         if common.json {
             let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
-            talk::say(json!({ "summaries": results.summaries, "files": files }));
+            console::data(json!({ "summaries": results.summaries, "files": files }));
         } else {
-            talk::say(results.to_markdown());
-            wrote(&files);
+            console::data(results.to_markdown());
+            print_files(&files);
         }
         if results.rows.iter().all(|row| row.error.is_none()) {
             let first = results.rows.iter().find_map(|row| row.failure.as_deref());

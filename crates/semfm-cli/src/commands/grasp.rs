@@ -1,26 +1,26 @@
 //! `semfm-cli grasp`: ranked, collision-free grasps inside a region.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use semfm::Mesh;
-use semfm::geom::io::{read_mesh, read_points};
+use semfm::files::{
+    GraspSettingsRecord, GraspsFile, read_aligned, read_obstacle, read_region, write_isaac_grasps,
+    write_ros2_grasps,
+};
+use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
-use semfm::grasp::{ApproachCone, GraspObject, GraspSettings, Grasps, Pose, Scene, find_grasps};
-use semfm::grasps::{GraspAnswer, write_grasps, write_isaac, write_ros2};
-use semfm::region_file::read_region;
+use semfm::grasp::{ApproachCone, GraspSettings, Grasps};
 use semfm::robot::{BuiltinGripper, Gripper, GripperSettings};
-use semfm::{Task, aligned::read_aligned};
+use semfm::{GraspProblem, GraspRequest, Mesh, POINT_MARGIN, Table, Task};
 use semfm_show::write_grasp_picture;
 use serde_json::{Map, Value, json};
 
 use super::Outcome;
-use crate::options::{Common, numbers};
-use crate::talk;
+use crate::console;
+use crate::options::{Common, numbers, parse_package};
 
-/// Metres: the noise of a depth camera at arm's length.
-const SCENE_MARGIN: f64 = 0.005;
 /// Degrees.
 const APPROACH_CONE: f64 = 45.0;
 
@@ -31,7 +31,7 @@ const APPROACH_CONE: f64 = 45.0;
     semfm-cli grasp mug.obj --region grip.json --gripper hand.urdf --aligned aligned.json \\\n    \
     --scene table.ply --format ros2 -o grasps.mcap\n\n\
     Exit code 0: grasps. 1: none survived; the file is written all the same and says why. 2: bad input.")]
-pub struct FindGrasps {
+pub struct GraspCommand {
     /// The object's mesh
     mesh: PathBuf,
     /// The region in which the pads shall close (JSON)
@@ -55,11 +55,6 @@ pub struct FindGrasps {
     options: GraspOptions,
 }
 
-/// What `--gripper` takes, after the words that lead the help.
-pub fn gripper_help(lead: &str) -> String {
-    format!("{lead}: {}, or a URDF", BuiltinGripper::names())
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Format {
     /// grasps.json (docs/formats.md)
@@ -70,7 +65,7 @@ enum Format {
     Isaac,
 }
 
-/// What is asked of grasps, wherever the region comes from.
+/// Settings of grasps, wherever the region comes from.
 #[derive(Debug, Args)]
 pub struct GraspOptions {
     #[command(flatten)]
@@ -81,12 +76,12 @@ pub struct GraspOptions {
     /// What stands around the object: meshes and point clouds, in the frame of the answer, metres
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     scene: Vec<PathBuf>,
-    /// Distance that the hand keeps from the points of a scene, metres
-    #[arg(long, default_value_t = SCENE_MARGIN, allow_negative_numbers = true, value_name = "METRES", help_heading = "Scene")]
+    /// Distance that the gripper keeps from the points of a scene, metres
+    #[arg(long, default_value_t = POINT_MARGIN, allow_negative_numbers = true, value_name = "METRES", help_heading = "Scene")]
     scene_margin: f64,
     /// A table: a point of it and its normal, away from the table
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse_table, allow_hyphen_values = true, help_heading = "Scene")]
-    table: Option<[DVec3; 2]>,
+    table: Option<Table>,
     /// Grasps to return
     #[arg(long, default_value_t = GraspSettings::default().top, value_name = "N", help_heading = "Grasps")]
     top: usize,
@@ -108,7 +103,7 @@ pub struct GraspOptions {
     /// The direction in which the demonstrator's hand came: agreement raises the score
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, help_heading = "Grasps")]
     demonstrated: Option<DVec3>,
-    /// Least distance of the open hand to everything, metres
+    /// Least distance of the open gripper to everything, metres
     #[arg(long, default_value_t = 0.0, value_name = "METRES", help_heading = "Grasps")]
     clearance: f64,
     /// Share of each pad's contact that must lie in the region
@@ -131,27 +126,33 @@ struct MetricOptions {
     metres: bool,
 }
 
-impl FindGrasps {
+/// Help of an argument that takes a gripper: the built-in ones by name.
+pub fn gripper_help(what: &str) -> String {
+    format!("{what}: {}, or a URDF", BuiltinGripper::names())
+}
+
+impl GraspCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let task = talk::watched(common.quiet);
+        let task = console::progress(common.quiet);
         let mesh = read_mesh(&self.mesh)?.mesh;
         let region = read_region(&self.region, &mesh)?;
-        let job = self.options.prepare(&self.gripper, mesh)?;
-        let found = job.find(region.weights(), self.seed, &task)?;
+        let problem = self.options.prepare(&self.gripper, self.seed, mesh)?;
+        let found = problem.find(region.weights(), &task)?;
+        let result = problem.result(&found);
         match self.format {
-            Format::Json => job.write(&self.output, &found, self.seed)?,
-            Format::Ros2 => write_ros2(&self.output, &job.answer(&found))?,
-            Format::Isaac => write_isaac(&self.output, &job.answer(&found))?,
+            Format::Json => write_grasps(&self.output, &problem, &found)?,
+            Format::Ros2 => write_ros2_grasps(&self.output, &result)?,
+            Format::Isaac => write_isaac_grasps(&self.output, &result)?,
         }
         if let Some(picture) = &self.picture {
-            job.draw(picture, region.weights(), &found, &task)?;
+            draw_grasps(picture, &problem, region.weights(), &found, &task)?;
         }
         if common.json {
-            talk::say(grasps_summary(&found));
+            console::data(summary(&found));
         } else {
-            tell(&found, common);
-            talk::say(self.output.display());
-            self.picture.iter().for_each(|picture| talk::say(picture.display()));
+            print_grasps(&found, common);
+            console::data(self.output.display());
+            self.picture.iter().for_each(|picture| console::data(picture.display()));
         }
         Ok(if found.grasps.is_empty() { Outcome::NoAnswer } else { Outcome::Done })
     }
@@ -165,7 +166,7 @@ impl GraspOptions {
             metric: MetricOptions { aligned: None, scale: Some(scale), metres: false },
             package: Vec::new(),
             scene: Vec::new(),
-            scene_margin: SCENE_MARGIN,
+            scene_margin: POINT_MARGIN,
             table: None,
             top,
             samples: n_samples,
@@ -180,76 +181,49 @@ impl GraspOptions {
     }
 
     /// Reads everything that grasps of `mesh` need.
-    pub fn prepare(&self, gripper: &str, mesh: Mesh) -> Result<GraspJob> {
-        let (scale, camera_from_object) = self.metric.read(&mesh)?;
+    pub fn prepare(&self, gripper: &str, seed: u64, mesh: Mesh) -> Result<GraspProblem> {
+        let mut request = self.metric.request(&mesh)?;
         let packages = self.package.iter().cloned().collect();
         let gripper = Gripper::open(gripper, &GripperSettings { packages, ..Default::default() })
             .context("--gripper")?;
-        let object_from_answer = camera_from_object.map_or(Pose::IDENTITY, |pose| pose.inverse());
-        let settings = self.settings(object_from_answer);
-        let scene = self.scene(object_from_answer)?;
-        let object = GraspObject::from_mesh(&mesh, scale)?;
-        Ok(GraspJob { mesh, scale, camera_from_object, gripper, object, scene, settings })
+        request.settings = self.settings(seed);
+        request.table = self.table;
+        request.point_margin = self.scene_margin;
+        for path in &self.scene {
+            request.obstacles.push(read_obstacle(path)?);
+        }
+        Ok(request.prepare(Arc::new(mesh), gripper)?)
     }
 
-    /// Directions turned into the object's frame.
-    fn settings(&self, object_from_answer: Pose) -> GraspSettings {
-        let turned = |direction: DVec3| object_from_answer.rotation * direction;
+    fn settings(&self, seed: u64) -> GraspSettings {
         let half_angle = self.approach_cone.to_radians();
         let mut settings = GraspSettings {
             top: self.top,
             n_samples: self.samples,
             friction: self.friction,
-            demonstrated_approach: self.demonstrated.map(turned),
+            demonstrated_approach: self.demonstrated,
+            seed,
             ..Default::default()
         };
         settings.limits.width = self.width_range.map(|[least, most]| least..=most);
-        settings.limits.approach =
-            self.approach.map(|axis| ApproachCone { axis: turned(axis), half_angle });
+        settings.limits.approach = self.approach.map(|axis| ApproachCone { axis, half_angle });
         settings.limits.clearance = self.clearance;
         settings.limits.pad_in_region = self.pad_in_region;
         settings
     }
-
-    /// The scene in the object's frame.
-    fn scene(&self, object_from_answer: Pose) -> Result<Scene> {
-        let mut scene = Scene::new();
-        if let Some([point, normal]) = self.table {
-            let normal = object_from_answer.rotation * normal;
-            scene = scene.with_table(object_from_answer * point, normal).context("--table")?;
-        }
-        for path in &self.scene {
-            scene = match read_mesh(path) {
-                Ok(file) => {
-                    let moved = file.mesh.vertices().iter().map(|&p| object_from_answer * p);
-                    scene.with_mesh(&Mesh::new(moved.collect(), file.mesh.faces().to_vec())?)
-                }
-                // No faces: points. Any other fault shows again here, and in the same words.
-                Err(_) => {
-                    let cloud = read_points(path)?;
-                    let moved: Vec<DVec3> =
-                        cloud.points.iter().map(|&p| object_from_answer * p).collect();
-                    scene
-                        .with_cloud(&moved, self.scene_margin)
-                        .with_context(|| path.display().to_string())?
-                }
-            };
-        }
-        Ok(scene)
-    }
 }
 
 impl MetricOptions {
-    /// Metres per unit, and the pose of the object in metres before the camera.
-    fn read(&self, mesh: &Mesh) -> Result<(f64, Option<Pose>)> {
+    /// A request with metres per unit, and the pose before the camera where one is given.
+    fn request(&self, mesh: &Mesh) -> Result<GraspRequest> {
         if let Some(path) = &self.aligned {
-            let aligned = read_aligned(path, Some(mesh))?;
-            let pose = aligned.camera_from_object;
-            return Ok((pose.scale, Some(pose.rigid())));
+            let pose = read_aligned(path, Some(mesh))?.camera_from_object;
+            let camera_from_object = Some(pose.rigid());
+            return Ok(GraspRequest { camera_from_object, ..GraspRequest::new(pose.scale) });
         }
         match (self.scale, self.metres) {
-            (Some(scale), _) => Ok((scale, None)),
-            (None, true) => Ok((1.0, None)),
+            (Some(scale), _) => Ok(GraspRequest::new(scale)),
+            (None, true) => Ok(GraspRequest::new(1.0)),
             (None, false) => bail!(
                 "the mesh has no unit: expected --metres, --scale S or --aligned FILE, found none"
             ),
@@ -257,57 +231,33 @@ impl MetricOptions {
     }
 }
 
-/// Grasps of one object, asked for.
-pub struct GraspJob {
-    mesh: Mesh,
-    scale: f64,
-    camera_from_object: Option<Pose>,
-    gripper: Gripper,
-    object: GraspObject,
-    scene: Scene,
-    settings: GraspSettings,
+/// Writes `grasps.json` with the settings of the search.
+pub fn write_grasps(path: &Path, problem: &GraspProblem, found: &Grasps) -> Result<()> {
+    let settings = problem.settings();
+    let settings = GraspSettingsRecord {
+        seed: settings.seed,
+        friction: settings.friction,
+        n_samples: settings.n_samples,
+        version: env!("CARGO_PKG_VERSION").into(),
+    };
+    let file = GraspsFile { settings: Some(settings), ..GraspsFile::new(&problem.result(found)) };
+    Ok(file.write(path)?)
 }
 
-impl GraspJob {
-    /// Grasps in a region, one weight per vertex.
-    pub fn find(&self, weights: &[f64], seed: u64, task: &Task) -> Result<Grasps> {
-        let settings = GraspSettings { seed, ..self.settings.clone() };
-        Ok(find_grasps(&self.object, weights, &self.gripper, &self.scene, &settings, task)?)
-    }
-
-    /// The grasps with all that gives them meaning.
-    pub fn answer<'a>(&'a self, found: &'a Grasps) -> GraspAnswer<'a> {
-        GraspAnswer {
-            mesh: &self.mesh,
-            object_scale: self.scale,
-            camera_from_object: self.camera_from_object,
-            gripper: &self.gripper,
-            found,
-        }
-    }
-
-    /// Writes `grasps.json`.
-    pub fn write(&self, path: &Path, found: &Grasps, seed: u64) -> Result<()> {
-        let settings = json!({
-            "seed": seed,
-            "friction": self.settings.friction,
-            "n_samples": self.settings.n_samples,
-            "version": env!("CARGO_PKG_VERSION"),
-        });
-        let about = Map::from_iter([("settings".to_owned(), settings)]);
-        Ok(write_grasps(path, &self.answer(found), about)?)
-    }
-
-    /// Draws the best grasps.
-    pub fn draw(&self, path: &Path, weights: &[f64], found: &Grasps, task: &Task) -> Result<()> {
-        let metric = self.mesh.vertices().iter().map(|&p| p * self.scale).collect();
-        let mesh = Mesh::new(metric, self.mesh.faces().to_vec())?;
-        Ok(write_grasp_picture(path, &mesh, weights, &self.gripper, &found.grasps, task)?)
-    }
+/// Draws the best grasps in a region, one weight per vertex.
+pub fn draw_grasps(
+    path: &Path,
+    problem: &GraspProblem,
+    weights: &[f64],
+    found: &Grasps,
+    task: &Task,
+) -> Result<()> {
+    let (mesh, gripper) = (problem.mesh_in_metres()?, problem.gripper());
+    Ok(write_grasp_picture(path, &mesh, weights, gripper, &found.grasps, task)?)
 }
 
-/// The answer in short, for `--json`.
-pub fn grasps_summary(found: &Grasps) -> Value {
+/// The grasps in short, for `--json`.
+pub fn summary(found: &Grasps) -> Value {
     let rejected: Map<String, Value> =
         found.rejected.iter().map(|(reason, n)| (reason.name().to_owned(), json!(n))).collect();
     json!({
@@ -319,12 +269,12 @@ pub fn grasps_summary(found: &Grasps) -> Value {
 }
 
 /// The best grasps as a table on stdout, the reasons of the others on stderr where none is left.
-pub fn tell(found: &Grasps, common: &Common) {
+pub fn print_grasps(found: &Grasps, common: &Common) {
     let (n, candidates) = (found.grasps.len(), found.n_candidates);
-    talk::say(format_args!("grasps      {n} of {candidates} candidates"));
+    console::data(format_args!("grasps      {n} of {candidates} candidates"));
     for (rank, grasp) in found.grasps.iter().take(5).enumerate() {
         let p = grasp.object_from_tcp.translation;
-        talk::say(format_args!(
+        console::data(format_args!(
             "  {rank}  score {:.2}  width {:5.1} mm  at ({:.3}, {:.3}, {:.3}) m",
             grasp.score,
             1e3 * grasp.width,
@@ -337,11 +287,11 @@ pub fn tell(found: &Grasps, common: &Common) {
         return;
     }
     for (reason, count) in found.rejected.iter() {
-        talk::remark(format_args!("{count:8}  {:14} {}", reason.name(), reason.explanation()));
+        console::message(format_args!("{count:8}  {:14} {}", reason.name(), reason.explanation()));
     }
     if let Some(miss) = &found.nearest_miss {
         let unit = miss.reason.unit();
-        talk::remark(format_args!(
+        console::message(format_args!(
             "the nearest miss failed by {:.4} {unit}: {}",
             miss.by,
             miss.reason.explanation()
@@ -349,22 +299,13 @@ pub fn tell(found: &Grasps, common: &Common) {
     }
 }
 
-fn parse_package(text: &str) -> Result<(String, PathBuf)> {
-    match text.split_once('=') {
-        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => {
-            Ok((name.to_owned(), folder.into()))
-        }
-        _ => bail!("expected NAME=FOLDER, found `{text}`"),
-    }
-}
-
 fn parse_vector(text: &str) -> Result<DVec3> {
     Ok(DVec3::from_array(numbers(text).context("expected X,Y,Z")?))
 }
 
-fn parse_table(text: &str) -> Result<[DVec3; 2]> {
+fn parse_table(text: &str) -> Result<Table> {
     let [x, y, z, nx, ny, nz] = numbers(text).context("expected X,Y,Z,NX,NY,NZ")?;
-    Ok([DVec3::new(x, y, z), DVec3::new(nx, ny, nz)])
+    Ok(Table { point: DVec3::new(x, y, z), normal: DVec3::new(nx, ny, nz) })
 }
 
 fn parse_range(text: &str) -> Result<[f64; 2]> {

@@ -13,25 +13,25 @@ use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
 
 use super::Outcome;
-use crate::options::Common;
-use crate::talk;
+use crate::console;
+use crate::options::{Common, parse_package};
 
 /// Say what is in a mesh, MCAP or URDF file, or why it is refused
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  semfm-cli info mug.obj mug.emb.mcap --json\n\n\
     With --json, one object a line: `kind` and counts, or `error` with code, message and place.")]
-pub struct Info {
+pub struct InfoCommand {
     #[arg(
         required = true,
         help = format!("Mesh files ({}), MCAP files and robots (URDF)", MeshFormat::readable_names())
     )]
     files: Vec<PathBuf>,
     /// Folder of a package that a URDF names as package://NAME/…; may be given again
-    #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = parse_package)]
     packages: Vec<(String, PathBuf)>,
 }
 
-impl Info {
+impl InfoCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let mut outcome = Outcome::Done;
         let packages = self.packages.into_iter().collect();
@@ -49,9 +49,9 @@ impl Info {
                 line.as_object_mut()
                     .into_iter()
                     .for_each(|line| line.extend(report.as_object().cloned().unwrap_or_default()));
-                talk::say(line);
+                console::data(line);
             } else if let Some(error) = report.get("error") {
-                talk::remark(format_args!(
+                console::message(format_args!(
                     "error: {}",
                     error["message"].as_str().unwrap_or_default()
                 ));
@@ -132,16 +132,6 @@ fn is_urdf(path: &Path) -> bool {
     }
 }
 
-/// A flag's NAME=DIR.
-fn package(text: &str) -> Result<(String, PathBuf), String> {
-    match text.split_once('=') {
-        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => {
-            Ok((name.to_owned(), folder.into()))
-        }
-        _ => Err("expected NAME=DIR".into()),
-    }
-}
-
 /// MCAP by its extension or by its first bytes; a mesh's extension wins over the bytes.
 fn is_mcap(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
@@ -164,17 +154,17 @@ fn with_kind(kind: &str, report: Value) -> Value {
 
 /// The report as a table for people.
 fn show(path: &Path, report: &Value) {
-    talk::say(path.display());
+    console::data(path.display());
     for (key, value) in report.as_object().into_iter().flatten() {
         match value {
             Value::Array(items) if items.is_empty() => {}
             Value::Null => {}
             Value::Array(items) if items.iter().any(Value::is_object) => {
-                talk::say(format_args!("  {key}"));
-                items.iter().for_each(|item| talk::say(format_args!("    {item}")));
+                console::data(format_args!("  {key}"));
+                items.iter().for_each(|item| console::data(format_args!("    {item}")));
             }
-            Value::String(text) => talk::say(format_args!("  {key:24} {text}")),
-            other => talk::say(format_args!("  {key:24} {other}")),
+            Value::String(text) => console::data(format_args!("  {key:24} {text}")),
+            other => console::data(format_args!("  {key:24} {other}")),
         }
     }
 }

@@ -1,17 +1,17 @@
-//! One file for each command.
+//! One file for each command: it reads arguments, calls the library and prints.
 
 pub mod align;
 pub mod completions;
 pub mod demo;
-pub mod embed;
 pub mod eval;
 pub mod eval_maps;
 pub mod grasp;
 pub mod info;
-pub mod page;
+mod report_options;
 pub mod region;
 pub mod show;
 pub mod transfer;
+mod transfer_output;
 pub mod views;
 
 /// How a sound run ended.
@@ -21,6 +21,6 @@ pub enum Outcome {
     Done,
     /// Without one: exit 1.
     NoAnswer,
-    /// With a verdict against the input, already told: exit 2.
+    /// With a verdict against the input, already printed: exit 2.
     Refused,
 }

@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
+use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
+use semfm::files::{MaskedPicture, read_mask, write_region};
+use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
-use semfm::region_file::write_region;
-use semfm::regions;
 use semfm::views::mcap::{SingleView, read_view};
 use semfm::{Mesh, Region};
 
 use super::Outcome;
+use crate::console;
 use crate::options::{Common, numbers};
-use crate::{load, talk};
 
 /// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids
 #[derive(Debug, Args)]
@@ -21,7 +22,7 @@ use crate::{load, talk};
     semfm-cli region mug.obj -o grip.json --near 0.05,0,0.04 --radius 0.03\n  \
     semfm-cli region mug.obj -o grip.json --mask grip.png --view mug.views.mcap#003\n  \
     semfm-cli region painted.ply -o grip.json --ply-color")]
-pub struct MakeRegion {
+pub struct RegionCommand {
     /// The mesh
     mesh: PathBuf,
     /// Where to write the region (JSON)
@@ -59,12 +60,12 @@ pub struct MakeRegion {
     vertices: Option<Vec<u32>>,
 }
 
-impl MakeRegion {
+impl RegionCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let file = load::mesh(&self.mesh, None)?;
+        let file = read_mesh(&self.mesh)?;
         let region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
             let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
-            regions::near(&file.mesh, DVec3::new(x, y, z), radius)
+            region_around_contact(&file.mesh, DVec3::new(x, y, z), radius)
                 .with_context(|| self.mesh.display().to_string())?
         } else if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
             from_mask(&file.mesh, mask, view)?
@@ -73,7 +74,7 @@ impl MakeRegion {
                 "red" => None,
                 text => Some(numbers(text).context("--ply-color: expected R,G,B, each 0 to 255")?),
             };
-            regions::painted(file.appearance.vertex_colors.as_deref(), paint)
+            region_of_paint(file.appearance.vertex_colors.as_deref(), paint)
                 .with_context(|| self.mesh.display().to_string())?
         } else {
             let ids = self.vertices.unwrap_or_default();
@@ -82,9 +83,9 @@ impl MakeRegion {
         write_region(&self.output, &region, &file.mesh)?;
         if !common.quiet {
             let (inside, of) = (region.vertices().len(), region.n_vertices());
-            talk::remark(format_args!("{inside} of {of} vertices"));
+            console::message(format_args!("{inside} of {of} vertices"));
         }
-        talk::say(self.output.display());
+        console::data(self.output.display());
         Ok(Outcome::Done)
     }
 }
@@ -99,15 +100,7 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     let path = Path::new(path);
     let SingleView { metadata, view } = read_view(path, number)?;
     metadata.check_mesh(mesh, path)?;
-    let picture = image::open(mask).with_context(|| mask.display().to_string())?.into_luma8();
     let (width, height) = (view.camera.width(), view.camera.height());
-    if picture.dimensions() != (width, height) {
-        let (w, h) = picture.dimensions();
-        bail!(
-            "{}: size: expected {width} × {height}, as the view, found {w} × {h}",
-            mask.display()
-        );
-    }
-    let marked: Vec<bool> = picture.pixels().map(|pixel| pixel.0[0] >= 128).collect();
-    regions::masked(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())
+    let marked = read_mask(mask, MaskedPicture { width, height, name: "the view" })?;
+    region_under_mask(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())
 }

@@ -8,8 +8,8 @@ use semfm_show::{groups_of_paths, write_page};
 use serde_json::json;
 
 use super::Outcome;
+use crate::console;
 use crate::options::Common;
-use crate::talk;
 
 /// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
 ///
@@ -18,7 +18,7 @@ use crate::talk;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  semfm-cli show semfm-demo/transfer -o demo.html\n  \
     semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html")]
-pub struct Show {
+pub struct ShowCommand {
     /// Folders that `transfer -o` wrote, meshes, regions and grasps (after their mesh), views files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
@@ -30,15 +30,15 @@ pub struct Show {
     title: String,
 }
 
-impl Show {
+impl ShowCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let groups = groups_of_paths(&self.paths, &talk::watched(common.quiet))?;
+        let groups = groups_of_paths(&self.paths, &console::progress(common.quiet))?;
         write_page(&self.output, &self.title, &groups)?;
         let output = self.output.display();
         if common.json {
-            talk::say(json!({ "page": output.to_string(), "n_groups": groups.len() }));
+            console::data(json!({ "page": output.to_string(), "n_groups": groups.len() }));
         } else {
-            talk::say(output);
+            console::data(output);
         }
         Ok(Outcome::Done)
     }

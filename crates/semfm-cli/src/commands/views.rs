@@ -1,26 +1,23 @@
 //! `semfm-cli views`: the pictures that an encoder is shown.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use semfm::geom::MeshIdentity;
-use semfm::geom::io::{MeshFile, MeshFormat};
-use semfm::views::mcap::{ViewsMetadata, write_views};
-use semfm::views::{
-    RenderSettings, Renderer, RendererChoice, RigSettings, SurfaceColor, View, rig,
-};
+use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::rendered_views::{Coloring, ViewSettings, write_rendered_views};
+use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings};
 use semfm_show::write_sheet;
 
 use super::Outcome;
+use crate::console;
 use crate::options::Common;
-use crate::{load, talk};
 
 /// Render the views of an object that an encoder is shown
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  semfm-cli views mug.obj -o mug.views.mcap\n  \
     semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224")]
-pub struct Views {
+pub struct ViewsCommand {
     #[arg(help = format!("The mesh: {}", MeshFormat::readable_names()))]
     mesh: PathBuf,
     /// Where to write (`NAME.views.mcap`)
@@ -30,7 +27,7 @@ pub struct Views {
     rig: RigOptions,
     #[command(flatten)]
     look: LookOptions,
-    /// Who draws: auto takes a graphics processor where one answers, gpu any graphics driver or
+    /// What draws: auto takes a graphics processor where one answers, gpu any graphics driver or
     /// nothing, cpu needs neither
     #[arg(long, default_value_t = RendererChoice::Auto, value_name = "auto|gpu|cpu", help_heading = "Rendering")]
     renderer: RendererChoice,
@@ -138,34 +135,15 @@ impl LookOptions {
     }
 }
 
-/// How an object is shown.
-#[derive(Clone, Debug, Default)]
-pub struct ViewSettings {
-    pub rig: RigSettings,
-    pub render: RenderSettings,
-    pub coloring: Coloring,
-}
-
-/// What gives the surface its colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coloring {
-    /// Everything in the same grey.
-    #[default]
-    Grey,
-    /// The object's own colours, where it has some.
-    Own,
-    /// The surface's directions.
-    Normals,
-}
-
-impl Views {
+impl ViewsCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let file = load::mesh(&self.mesh, self.texture.as_deref())?;
+        let mut file = read_mesh(&self.mesh)?;
+        if let Some(texture) = &self.texture {
+            file.appearance.attach_image(texture)?;
+        }
         if common.verbose {
-            file.appearance
-                .notes
-                .iter()
-                .for_each(|note| talk::remark(format_args!("note: {note}")));
+            let notes = file.appearance.notes.iter();
+            notes.for_each(|note| console::message(format_args!("note: {note}")));
         }
         let renderer = Renderer::open(self.renderer).context("--renderer")?;
         let settings = ViewSettings {
@@ -177,59 +155,18 @@ impl Views {
                 (false, false) => Coloring::Own,
             },
         };
-        let views = make_views(&file, &settings, &renderer, &self.output, common)
+        let task = console::progress(common.quiet);
+        let views = write_rendered_views(&self.output, &file, &settings, &renderer, &task)
             .with_context(|| self.mesh.display().to_string())?;
         if let Some(note) = renderer.note().filter(|_| !common.quiet) {
-            talk::remark(format_args!("note: {note}"));
+            console::message(format_args!("note: {note}"));
         }
-        talk::say(self.output.display());
+        console::data(self.output.display());
         if let Some(sheet) = &self.sheet {
             let columns = (views.len() as f64).sqrt().ceil() as usize;
             write_sheet(sheet, &views, columns)?;
-            talk::say(sheet.display());
+            console::data(sheet.display());
         }
         Ok(Outcome::Done)
     }
-}
-
-/// Renders an object, writes its views file and hands the views back.
-pub fn make_views(
-    file: &MeshFile,
-    settings: &ViewSettings,
-    renderer: &Renderer,
-    output: &Path,
-    common: &Common,
-) -> Result<Vec<View>> {
-    let ViewSettings { rig: cameras, render: look, coloring } = settings;
-    let task = talk::watched(common.quiet);
-    let shots = rig(&file.mesh, cameras)?;
-    let own = Some(&file.appearance).filter(|own| *coloring == Coloring::Own && !own.is_plain());
-    let views = load::with_paint(&file.mesh, own, |paint| {
-        let paint = if *coloring == Coloring::Normals { &SurfaceColor::Normals } else { paint };
-        renderer.render(&file.mesh, paint, &shots, look, &task)
-    })?;
-    let colors = match (coloring, own) {
-        (Coloring::Normals, _) => "normals",
-        (_, Some(_)) => "own",
-        (_, None) => "grey",
-    };
-    let metadata = ViewsMetadata {
-        mesh: MeshIdentity::of(&file.mesh),
-        width: cameras.size,
-        height: cameras.size,
-        rig: cameras.to_string(),
-        background: look.background.map(|c| c.to_string()).join(","),
-        seed: 0,
-        more: [
-            ("colors".to_owned(), colors.to_owned()),
-            ("look".to_owned(), look.to_string()),
-            ("renderer".to_owned(), renderer.name()),
-        ]
-        .into(),
-    };
-    let vertex_colors: Option<Vec<[u8; 3]>> = own
-        .and_then(|own| own.vertex_colors.as_ref())
-        .map(|colors| colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect());
-    write_views(output, &views, &file.mesh, vertex_colors.as_deref(), &metadata)?;
-    Ok(views)
 }

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::{MeshFormat, read_mesh};
-use semfm::region_file::read_region;
+use semfm::files::read_region;
 use serde::Deserialize;
 use serde_json::json;
 

@@ -76,6 +76,26 @@ impl Appearance {
         color.map(byte)
     }
 
+    /// BLAKE3, in hexadecimal, of everything that [`Appearance::color_at`] reads: equal hashes, equal
+    /// colours on the same mesh.
+    pub fn content_hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"semfm.appearance/1\n");
+        let colors = self.vertex_colors.as_deref().unwrap_or_default();
+        hash_array(&mut hasher, colors.as_flattened().iter().copied().collect());
+        let uvs = self.corner_uvs.as_deref().unwrap_or_default().as_flattened().as_flattened();
+        hash_array(&mut hasher, uvs.iter().flat_map(|x| x.to_le_bytes()).collect());
+        let material_of = self.material_of.as_deref().unwrap_or_default();
+        hash_array(&mut hasher, material_of.iter().flat_map(|id| id.to_le_bytes()).collect());
+        for Material { color, texture } in &self.materials {
+            hash_array(&mut hasher, color.iter().flat_map(|x| x.to_le_bytes()).collect());
+            if let Some(texture) = texture {
+                texture.hash_into(&mut hasher);
+            }
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+
     /// Puts the image of a file on a mesh that has texture coordinates (an OBJ or a PLY, say).
     ///
     /// # Errors
@@ -96,6 +116,12 @@ impl Appearance {
         self.material_of = None;
         Ok(())
     }
+}
+
+/// Hashes bytes after their number, so that neighbours cannot run into each other.
+fn hash_array(hasher: &mut blake3::Hasher, bytes: Vec<u8>) {
+    hasher.update(&(bytes.len() as u64).to_le_bytes());
+    hasher.update(&bytes);
 }
 
 /// RGBA bytes from numbers in 0..1: a missing alpha (NaN) is opaque, a missing colour white.
@@ -122,6 +148,18 @@ mod tests {
         let appearance = Appearance { vertex_colors: Some(colors), ..Default::default() };
         assert_eq!(appearance.color_at(0, [0, 1, 2], [0.0, 1.0, 0.0]), [0, 255, 0, 255]);
         assert_eq!(appearance.color_at(0, [0, 1, 2], [0.4, 0.2, 0.4]), [102, 51, 102, 255]);
+    }
+
+    #[test]
+    fn equal_hashes_mean_equal_colours() {
+        let texture = |red| Texture::new(1, 1, vec![red, 0, 0, 255], [Wrap::Clamp; 2]);
+        let with = |red| Appearance {
+            materials: vec![Material { color: [1.0; 4], texture: texture(red) }],
+            ..Default::default()
+        };
+        assert_eq!(with(7).content_hash(), with(7).content_hash());
+        assert_ne!(with(7).content_hash(), with(8).content_hash());
+        assert_ne!(with(7).content_hash(), Appearance::default().content_hash());
     }
 
     #[test]

@@ -109,6 +109,14 @@ impl Texture {
         &self.rgba8
     }
 
+    /// Adds everything that [`Texture::sample`] reads to a hash.
+    pub(crate) fn hash_into(&self, hasher: &mut blake3::Hasher) {
+        hasher.update(&self.width.to_le_bytes());
+        hasher.update(&self.height.to_le_bytes());
+        hasher.update(&self.wrap.map(|wrap| wrap as u8));
+        hasher.update(&self.rgba8);
+    }
+
     /// Bilinear colour in 0..1 at `uv`, counted from the top left corner; `None` at NaN.
     pub fn sample(&self, uv: [f32; 2]) -> Option<[f32; 4]> {
         let ([x0, x1], s) = self.wrap[0].neighbours(uv[0], self.width)?;

@@ -97,6 +97,39 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloud> {
     let path = path.as_ref();
     let bytes = read_file(path)?;
     let input = Input { path, bytes: &bytes };
+    points_of(input)
+}
+
+/// What a file of unknown contents holds.
+#[derive(Clone, Debug)]
+pub enum MeshOrPoints {
+    /// A surface.
+    Mesh(MeshFile),
+    /// Points without faces.
+    Points(PointCloud),
+}
+
+/// Reads a mesh as [`read_mesh`] does, or the points of a file that has no faces.
+///
+/// # Errors
+/// As [`read_mesh`] and [`read_points`].
+pub fn read_mesh_or_points(path: impl AsRef<Path>) -> Result<MeshOrPoints> {
+    let path = path.as_ref();
+    let bytes = read_file(path)?;
+    let input = Input { path, bytes: &bytes };
+    if pcd::is_pcd(input) {
+        return Ok(MeshOrPoints::Points(points_of(input)?));
+    }
+    let format = MeshFormat::of(input)?;
+    match mesh_of(input, format) {
+        Err(Error::InFile { cause, .. }) if matches!(*cause, Error::EmptyMesh { .. }) => {
+            Ok(MeshOrPoints::Points(points_of(input)?))
+        }
+        mesh => Ok(MeshOrPoints::Mesh(mesh?)),
+    }
+}
+
+fn points_of(input: Input<'_>) -> Result<PointCloud> {
     let cloud = if pcd::is_pcd(input) { pcd::read_points(input)? } else { vertices_of(input)? };
     if cloud.points.is_empty() {
         return Err(input.error("whole file", "at least one point", "none"));

@@ -140,7 +140,7 @@ impl<'a> SceneObject<'a> {
 
     fn cloud_numbers(&self) -> [NamedNumbers<'_>; 3] {
         let clusters = SceneNumbers::U32(&self.figure.anchors.cluster_of_point);
-        let n_views = SceneNumbers::U32(self.figure.object.cloud.n_views());
+        let n_views = SceneNumbers::U32(self.figure.object.cloud().n_views());
         [
             NamedNumbers { name: "cluster", numbers: clusters },
             NamedNumbers { name: "anchor", numbers: SceneNumbers::I32(&self.cloud_anchor) },
@@ -162,7 +162,7 @@ impl<'a> SceneObject<'a> {
         scene.clouds.push(ScenePoints {
             topic: cloud,
             frame_id: frame,
-            points: self.figure.object.cloud.points(),
+            points: self.figure.object.cloud().points(),
             colors: &self.features,
             numbers: cloud_numbers,
         });
@@ -267,7 +267,7 @@ fn anchor_labels<'s>(figure: &TransferFigure<'_>) -> Vec<SceneLabel<'s>> {
     let mut labels = Vec::new();
     for (rank, anchor) in figure.transfer.report.anchors.iter().enumerate() {
         for (names, object) in [(&SOURCE, &figure.source), (&TARGET, &figure.target)] {
-            let points = object.object.cloud.points().iter().zip(&object.anchors.of_point);
+            let points = object.object.cloud().points().iter().zip(&object.anchors.of_point);
             let own = points.filter(|(_, of_point)| **of_point == rank as i64).map(|(&p, _)| p);
             labels.push(SceneLabel {
                 topic: "/anchors",
@@ -300,8 +300,7 @@ fn matches<'s>(figure: &TransferFigure<'_>, colors: &[[u8; 3]]) -> Vec<SceneLink
 
 /// The verdict as a log message.
 fn log<'s>(figure: &TransferFigure<'_>) -> SceneLog<'s> {
-    let method = serde_json::json!(figure.transfer.report.settings.method);
-    let method = method.as_str().unwrap_or_default();
+    let method = figure.transfer.report.settings.method;
     SceneLog {
         topic: "/answer",
         severity: match figure.transfer.verdict {

@@ -3,20 +3,15 @@
 use std::path::Path;
 
 use parry3d_f64::transformation::try_convex_hull;
-use semfm::geom::io::{FormatError, read_json};
+use semfm::files::{GraspRecord, GraspsFile, MatrixRows};
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::{Mesh, Region, Task};
-use serde::Deserialize;
-use serde_json::Value;
 
 use super::group::{Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors};
 use super::mesh::file_name;
 use crate::Result;
 use crate::colors::{MARKED, PLAIN, color_bytes, grasp_color};
 use crate::pictures::{N_SHOWN, Viewpoints, WeightedMesh, viewpoints_with_grippers};
-
-/// The format of the file.
-pub(super) const FORMAT: &str = "semfm.grasps/1";
 
 /// The grasps of `path` on `mesh`, which must be the one they were found on; `weights` are those of
 /// the region, where it is known. Nothing where there is no grasp.
@@ -30,8 +25,7 @@ pub(super) fn grasps_group(
     weights: Option<&[f64]>,
     task: &Task,
 ) -> Result<Option<Group>> {
-    let file: GraspsFile = read_json(path)?;
-    file.check(path, mesh)?;
+    let file = GraspsFile::read(path, mesh)?;
     if file.grasps.is_empty() {
         return Ok(None);
     }
@@ -43,10 +37,10 @@ pub(super) fn grasps_group(
     let viewpoints = viewpoints_with_grippers(object, &alone.mesh, VIEWPOINT_SIDE, task)?;
     let mut layer =
         Layer { name: "hands".into(), legend: legend(shown), colors: vec![alone.colors] };
-    let mut panels = vec![file.panel("the best grasp", 1, alone.mesh, viewpoints)];
+    let mut panels = vec![panel(&file, "the best grasp", 1, alone.mesh, viewpoints)];
     if shown.len() > 1 {
         let all = Scene::new(&file, object, shown)?;
-        panels.push(file.panel("the best few", shown.len(), all.mesh, viewpoints));
+        panels.push(panel(&file, "the best few", shown.len(), all.mesh, viewpoints));
         layer.colors.push(all.colors);
     }
     Ok(Some(Group {
@@ -62,12 +56,12 @@ pub(super) fn grasps_group(
     }))
 }
 
-fn legend(grasps: &[Grasp]) -> Vec<LegendEntry> {
+fn legend(grasps: &[GraspRecord]) -> Vec<LegendEntry> {
     let mut legend = vec![
         LegendEntry::swatch(color_bytes(PLAIN), "the object"),
         LegendEntry::swatch(color_bytes(MARKED), "the region"),
     ];
-    legend.extend(grasps.iter().enumerate().map(|(rank, Grasp { width, score, .. })| {
+    legend.extend(grasps.iter().enumerate().map(|(rank, GraspRecord { width, score, .. })| {
         let text = format!("grasp {}: {:.0} mm, score {score:.2}", rank + 1, 1e3 * width);
         LegendEntry::swatch(color_bytes(grasp_color(rank, N_SHOWN)), text)
     }));
@@ -81,14 +75,14 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(file: &GraspsFile, object: WeightedMesh<'_>, grasps: &[Grasp]) -> Result<Self> {
+    fn new(file: &GraspsFile, object: WeightedMesh<'_>, grasps: &[GraspRecord]) -> Result<Self> {
         let mut vertices = object.mesh.vertices().to_vec();
         let mut faces = object.mesh.faces().to_vec();
         let weights = object.weights.iter();
         let mut classes: Vec<u8> =
             weights.map(|&weight| u8::from(weight >= Region::COUNTS)).collect();
         for (rank, grasp) in grasps.iter().enumerate() {
-            file.add_gripper(grasp, &mut vertices, &mut faces);
+            add_gripper(file, grasp, &mut vertices, &mut faces);
             classes.resize(vertices.len(), rank as u8 + 2);
         }
         let mesh = Mesh::new(vertices, faces)?;
@@ -96,89 +90,38 @@ impl Scene {
     }
 }
 
-/// `grasps.json`, what is of interest here.
-#[derive(Deserialize)]
-struct GraspsFile {
-    mesh: Value,
-    object_scale: f64,
-    gripper: Gripper,
-    grasps: Vec<Grasp>,
+fn panel(file: &GraspsFile, name: &str, n: usize, mesh: Mesh, viewpoints: Viewpoints) -> Panel {
+    let note = format!("{n} of {} grasps", file.grasps.len());
+    Panel { name: name.into(), note, mesh, viewpoints }
 }
 
-#[derive(Deserialize)]
-struct Gripper {
-    name: String,
-    parts: Vec<GripperPart>,
-}
-
-/// A rigid part: corners of its convex pieces.
-#[derive(Deserialize)]
-struct GripperPart {
-    hulls: Vec<Vec<[f64; 3]>>,
-}
-
-/// A rigid motion as a 4 × 4 matrix, rows first.
-type Rows = [[f64; 4]; 4];
-
-#[derive(Deserialize)]
-struct Grasp {
-    object_from_tcp: Rows,
-    width: f64,
-    score: f64,
-    #[serde(rename = "hand")]
-    part_poses: PartPoses,
-}
-
-/// Poses of the parts in the TCP's frame.
-#[derive(Deserialize)]
-struct PartPoses {
-    closed: Vec<Rows>,
-}
-
-impl GraspsFile {
-    /// Refuses grasps on another mesh, or of another scale than a positive one.
-    fn check(&self, path: &Path, mesh: &Mesh) -> Result<()> {
-        let hash = mesh.hash().to_string();
-        let other = self.mesh["hash"].as_str().filter(|found| *found != hash);
-        let has_scale = self.object_scale > 0.0 && self.object_scale.is_finite();
-        let (place, expected, found) = match other {
-            Some(found) => ("mesh", format!("the mesh before it, {hash}"), found.to_owned()),
-            None if !has_scale => {
-                ("object_scale", "a positive number".to_owned(), self.object_scale.to_string())
-            }
-            None => return Ok(()),
-        };
-        Err(FormatError::new(path, place, expected, found).into())
-    }
-
-    fn panel(&self, name: &str, n: usize, mesh: Mesh, viewpoints: Viewpoints) -> Panel {
-        let note = format!("{n} of {} grasps", self.grasps.len());
-        Panel { name: name.into(), note, mesh, viewpoints }
-    }
-
-    /// Adds the closed gripper, in the units of the mesh.
-    fn add_gripper(&self, grasp: &Grasp, vertices: &mut Vec<DVec3>, faces: &mut Vec<[u32; 3]>) {
-        for (part, tcp_from_part) in self.gripper.parts.iter().zip(&grasp.part_poses.closed) {
-            for hull in &part.hulls {
-                let corners: Vec<DVec3> = hull.iter().copied().map(DVec3::from_array).collect();
-                // A piece without a hull (fewer than three corners) is not drawn.
-                let Ok((points, triangles)) = try_convex_hull(&corners) else { continue };
-                // Every triangle has corners of its own, so that edges stay sharp.
-                for triangle in triangles {
-                    let first = vertices.len() as u32;
-                    vertices.extend(triangle.map(|v| {
-                        let at_tcp = moved(tcp_from_part, points[v as usize]);
-                        moved(&grasp.object_from_tcp, at_tcp) / self.object_scale
-                    }));
-                    faces.push([first, first + 1, first + 2]);
-                }
+/// Adds the closed gripper at a grasp, in the units of the mesh.
+fn add_gripper(
+    file: &GraspsFile,
+    grasp: &GraspRecord,
+    vertices: &mut Vec<DVec3>,
+    faces: &mut Vec<[u32; 3]>,
+) {
+    for (part, tcp_from_part) in file.gripper.parts.iter().zip(&grasp.hand.closed) {
+        for hull in &part.hulls {
+            let corners: Vec<DVec3> = hull.iter().copied().map(DVec3::from_array).collect();
+            // A piece without a hull (fewer than three corners) is not drawn.
+            let Ok((points, triangles)) = try_convex_hull(&corners) else { continue };
+            // Every triangle has corners of its own, so that edges stay sharp.
+            for triangle in triangles {
+                let first = vertices.len() as u32;
+                vertices.extend(triangle.map(|v| {
+                    let at_tcp = moved(tcp_from_part, points[v as usize]);
+                    moved(&grasp.object_from_tcp, at_tcp) / file.object_scale
+                }));
+                faces.push([first, first + 1, first + 2]);
             }
         }
     }
 }
 
 /// A point moved by a matrix whose rows come first.
-fn moved(rows: &Rows, p: DVec3) -> DVec3 {
+fn moved(rows: &MatrixRows, p: DVec3) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|k| DVec3::new(rows[k][0], rows[k][1], rows[k][2]));
     let rotation = DMat3::from_cols(x, y, z).transpose();
     rotation * p + DVec3::new(rows[0][3], rows[1][3], rows[2][3])

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use semfm::files::read_region;
 use semfm::geom::io::{FormatError, MeshFile, read_mesh};
-use semfm::region_file::read_region;
 use semfm::{Region, Task};
 
 use super::group::{Fact, Group, Layer, Panel, VertexColors};

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::{FormatError, MeshFormat, read_json};
-use semfm::{Region, Task, region_file};
+use semfm::files::{GRASPS_FORMAT, REGION_FORMAT};
+use semfm::{Region, Task};
 use serde_json::Value;
 
-use super::grasps::{self, grasps_group};
+use super::grasps::grasps_group;
 use super::group::Group;
 use super::mesh::{add_region, mesh_group};
 use super::transfer_folder::transfer_groups;
@@ -59,7 +60,7 @@ struct MeshBefore {
 impl MeshBefore {
     /// Adds a region to the mesh's group, or grasps in a group of their own.
     fn add_json(&mut self, path: &Path, groups: &mut Vec<Group>, task: &Task) -> Result<()> {
-        if format_of(path)?.as_deref() == Some(grasps::FORMAT) {
+        if format_of(path)?.as_deref() == Some(GRASPS_FORMAT) {
             let mesh = &groups[self.group].panels[0].mesh;
             let weights = self.region.as_ref().map(Region::weights);
             groups.extend(grasps_group(path, mesh, weights, task)?);
@@ -81,7 +82,7 @@ fn unknown(path: &Path, place: &str, found: &str) -> Error {
 /// A JSON file without a mesh before it, with its format where it names one.
 fn json_alone(path: &Path) -> Error {
     match format_of(path) {
-        Ok(Some(format)) if format == region_file::FORMAT => {
+        Ok(Some(format)) if format == REGION_FORMAT => {
             unknown(path, "file", "a region without a mesh before it")
         }
         Ok(Some(format)) => unknown(path, "format", &format!("`{format}`")),

@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
-use semfm::geom::io::{FormatError, read_json, read_mesh};
+use semfm::files::{
+    HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile,
+};
+use semfm::geom::MeshHash;
+use semfm::geom::io::{FormatError, read_mesh};
 use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use semfm::{Mesh, Region, Task};
-use serde::Deserialize;
-use serde_json::Value;
 
 use super::grasps::grasps_group;
 use super::group::{
     Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors, mesh_note,
 };
-use crate::Result;
+use crate::{Error, Result};
 use crate::colors::anchor_color;
 use crate::pictures::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
 
@@ -48,22 +50,23 @@ struct TransferFolder {
     source: Mesh,
     target: Mesh,
     map: PointMapFile,
-    places: Vec<Place>,
-    report: Value,
+    places: Vec<HypothesisRecord>,
+    report: TransferReportFile,
 }
 
 impl TransferFolder {
     fn read(folder: &Path) -> Result<Self> {
-        let report: Value = read_json(&folder.join("report.json"))?;
-        let map: PointMapFile = read_json(&folder.join("point_map.json"))?;
+        let report = TransferReportFile::read(&folder.join("report.json"))?;
+        let map = PointMapFile::read(&folder.join("point_map.json"))?;
         let source = read_mesh(folder.join("source.ply"))?.mesh;
         let target = read_mesh(folder.join("target.ply"))?.mesh;
-        check_hash(&folder.join("source.ply"), &source, &map.source)?;
-        check_hash(&folder.join("target.ply"), &target, &map.target)?;
+        check_hash(&folder.join("source.ply"), &source, map.source)?;
+        check_hash(&folder.join("target.ply"), &target, map.target)?;
         map.check(&folder.join("point_map.json"), &source, &target)?;
-        let RegionFile { mut hypotheses } = read_json(&folder.join("region.json"))?;
-        hypotheses.retain(|place| place.fits(target.n_vertices()));
-        Ok(Self { source, target, map, places: hypotheses, report })
+        let mut places = TransferredRegionFile::read(&folder.join("region.json"))?.hypotheses;
+        let n = target.n_vertices();
+        places.retain(|place| place.vertices.iter().all(|&v| (v as usize) < n));
+        Ok(Self { source, target, map, places, report })
     }
 
     fn layers(&self, folder: &Path) -> Result<Vec<Layer>> {
@@ -88,8 +91,9 @@ impl TransferFolder {
         let n_anchors = highest.saturating_add(1).clamp(0, MOST_CLASSES as i64);
         let mut legend = vec![LegendEntry::swatch(color_bytes(anchor_color(-1)), "no anchor")];
         legend.extend((0..n_anchors).map(|rank| {
-            let cosine = self.report["anchors"][rank as usize]["cosine"].as_f64();
-            let cosine = cosine.map_or(String::new(), |cosine| format!(": cosine {cosine:.2}"));
+            let anchor = self.report.transfer.anchors.get(rank as usize);
+            let cosine = anchor.map(|anchor| format!(": cosine {:.2}", anchor.anchor.cosine));
+            let cosine = cosine.unwrap_or_default();
             let text = format!("anchor {}{cosine}", rank + 1);
             LegendEntry::swatch(color_bytes(anchor_color(rank)), text)
         }));
@@ -119,14 +123,14 @@ impl TransferFolder {
     }
 
     fn facts(&self) -> Vec<Fact> {
-        let report = &self.report;
-        let facts = [
-            ("verdict", &report["verdict"]),
-            ("confidence", &report["confidence"]),
-            ("method", &report["settings"]["method"]),
-            ("IoU", &report["iou"]),
+        let TransferReportFile { verdict, confidence, transfer, provenance, .. } = &self.report;
+        let mut facts = vec![
+            Fact::new("verdict", verdict),
+            Fact::new("confidence", format!("{confidence:.2}")),
+            Fact::new("method", transfer.settings.method),
         ];
-        facts.into_iter().filter_map(|(name, value)| fact(name, value)).collect()
+        facts.extend(provenance.iou.map(|iou| Fact::new("IoU", format!("{iou:.2}"))));
+        facts
     }
 
     fn into_group(self, folder: &Path, layers: Vec<Layer>, viewpoints: PairedViewpoints) -> Group {
@@ -144,26 +148,16 @@ impl TransferFolder {
     }
 }
 
-fn check_hash(path: &Path, mesh: &Mesh, hash: &str) -> Result<()> {
-    let found = mesh.hash().to_string();
-    if found == hash {
+fn check_hash(path: &Path, mesh: &Mesh, hash: MeshHash) -> Result<()> {
+    if mesh.hash() == hash {
         return Ok(());
     }
     let expected = format!("the mesh {hash} of point_map.json");
-    Err(FormatError::new(path, "mesh", expected, found).into())
+    Err(FormatError::new(path, "mesh", expected, mesh.hash().to_string()).into())
 }
 
 fn panel(name: &str, mesh: Mesh, viewpoints: Viewpoints) -> Panel {
     Panel { name: name.into(), note: mesh_note(&mesh), mesh, viewpoints }
-}
-
-/// Text as it stands, numbers with two digits.
-fn fact(name: &str, value: &Value) -> Option<Fact> {
-    match value {
-        Value::String(text) => Some(Fact::new(name, text)),
-        Value::Number(number) => Some(Fact::new(name, format!("{:.2}", number.as_f64()?))),
-        _ => None,
-    }
 }
 
 /// The folder's name, after that of the folder it lies in.
@@ -215,59 +209,4 @@ fn features_layer(folder: &Path, meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
 #[cfg(not(feature = "mcap"))]
 fn features_layer(_folder: &Path, _meshes: [&Mesh; 2]) -> Result<Option<Layer>> {
     Ok(None)
-}
-
-/// `point_map.json`.
-#[derive(Deserialize)]
-struct PointMapFile {
-    source: String,
-    target: String,
-    source_of: Vec<u32>,
-    source_anchor: Vec<i64>,
-    target_anchor: Vec<i64>,
-    source_weight: Vec<f64>,
-    target_weight: Vec<f64>,
-}
-
-impl PointMapFile {
-    /// Refuses arrays of other lengths than the meshes and ids beyond the source.
-    fn check(&self, path: &Path, source: &Mesh, target: &Mesh) -> Result<()> {
-        let (n_source, n_target) = (source.n_vertices(), target.n_vertices());
-        let lengths = [
-            ("source_of", self.source_of.len(), n_target),
-            ("source_anchor", self.source_anchor.len(), n_source),
-            ("target_anchor", self.target_anchor.len(), n_target),
-            ("source_weight", self.source_weight.len(), n_source),
-            ("target_weight", self.target_weight.len(), n_target),
-        ];
-        let wrong_length = lengths.into_iter().find(|(_, found, n)| found != n);
-        let beyond = self.source_of.iter().find(|&&v| v as usize >= n_source);
-        let (place, expected, found) = match (wrong_length, beyond) {
-            (Some((name, found, n)), _) => {
-                (name, format!("{n} numbers, one per vertex"), found.to_string())
-            }
-            (None, Some(v)) => ("source_of", format!("ids below {n_source}"), v.to_string()),
-            (None, None) => return Ok(()),
-        };
-        Err(FormatError::new(path, place, expected, found).into())
-    }
-}
-
-/// `region.json`, what is of interest here.
-#[derive(Deserialize)]
-struct RegionFile {
-    hypotheses: Vec<Place>,
-}
-
-/// A place where the region may belong.
-#[derive(Deserialize)]
-struct Place {
-    vertices: Vec<u32>,
-    probability: f64,
-}
-
-impl Place {
-    fn fits(&self, n_vertices: usize) -> bool {
-        self.vertices.iter().all(|&v| (v as usize) < n_vertices)
-    }
 }

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use semfm::Task;
-use semfm::output::ObjectAnchors;
+use semfm::files::ObjectAnchors;
 use semfm::views::{RenderSettings, SurfaceColor, View, render};
 
 use super::sheet::{Entry, Row, Sheet};

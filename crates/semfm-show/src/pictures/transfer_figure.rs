@@ -1,7 +1,7 @@
 //! A finished transfer with everything that its pictures and scenes show of it.
 
-use semfm::output::{ObjectAnchors, anchor_ranks};
-use semfm::{Mesh, PreparedObject, Region, Task, Transfer};
+use semfm::files::{ObjectAnchors, TransferResult};
+use semfm::{Mesh, PreparedObject, Task, Transfer};
 
 use super::feature_colors::FeatureColors;
 use super::sheet::PICTURE_SIDE;
@@ -37,15 +37,10 @@ impl<'a> TransferFigure<'a> {
     /// # Errors
     /// [`Error::Semfm`](crate::Error::Semfm) where clustering or rendering fails, and where the task was
     /// cancelled.
-    pub fn new(
-        source: &'a PreparedObject,
-        target: &'a PreparedObject,
-        region: &'a Region,
-        transfer: &'a Transfer,
-        task: &Task,
-    ) -> Result<Self> {
+    pub fn new(result: &TransferResult<'a>, task: &Task) -> Result<Self> {
+        let TransferResult { source, target, region, transfer, .. } = *result;
         let source_of = &transfer.point_map.source_of;
-        let (source_mesh, target_mesh) = (source.shape.original(), target.shape.original());
+        let (source_mesh, target_mesh) = (result.source_mesh(), result.target_mesh());
         let viewpoints: PairedViewpoints = paired_viewpoints(
             WeightedMesh { mesh: source_mesh, weights: region.weights() },
             WeightedMesh { mesh: target_mesh, weights: transfer.weights() },
@@ -56,11 +51,11 @@ impl<'a> TransferFigure<'a> {
         let on_source = position_colors(source_mesh.vertices());
         let on_target = source_of.iter().map(|&v| on_source[v as usize]).collect();
         let features = FeatureColors::new(&source.object, &target.object)?;
-        let anchors = anchor_ranks(source, target, transfer, task)?;
+        let anchors = result.anchor_ranks(task)?;
         Ok(Self {
             transfer,
             source: ObjectFigure {
-                object: source,
+                object: &source.object,
                 weights: region.weights(),
                 viewpoints: viewpoints.source,
                 match_colors: on_source,
@@ -68,7 +63,7 @@ impl<'a> TransferFigure<'a> {
                 anchors: anchors.source,
             },
             target: ObjectFigure {
-                object: target,
+                object: &target.object,
                 weights: transfer.weights(),
                 viewpoints: viewpoints.target,
                 match_colors: on_target,
@@ -80,20 +75,18 @@ impl<'a> TransferFigure<'a> {
 
     /// The verdict in a line: "accept, confidence 0.93".
     pub(crate) fn verdict_line(&self) -> String {
-        let verdict = serde_json::json!(self.transfer.verdict);
-        let verdict = verdict.as_str().unwrap_or_default();
-        format!("{verdict}, confidence {:.2}", self.transfer.confidence)
+        format!("{}, confidence {:.2}", self.transfer.verdict, self.transfer.confidence)
     }
 }
 
 impl<'a> ObjectFigure<'a> {
     pub(crate) fn mesh(&self) -> &'a Mesh {
-        self.object.shape.original()
+        self.object.shape().original()
     }
 
     /// What belongs to the cloud point nearest to each vertex of the mesh as read.
     pub(crate) fn onto_vertices<T: Copy>(&self, of_point: &[T]) -> Vec<T> {
-        let points = self.object.object.point_of_original_vertex();
+        let points = self.object.point_of_original_vertex();
         points.iter().map(|&point| of_point[point as usize]).collect()
     }
 }

@@ -16,7 +16,7 @@ use semfm_geom::{Mesh, SemanticCloud, Task, surface_sphere, surface_vertices};
 use crate::{EmbeddedView, Error, Result};
 
 /// How image features reach the surface samples.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum LiftRule {
@@ -36,7 +36,7 @@ pub enum LiftRule {
 }
 
 /// How the cloud is made.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LiftSettings {
     /// Which way features travel.
     pub rule: LiftRule,

@@ -1,9 +1,10 @@
-//! Whole roads through the built binary: a region travels, and every way to it agrees.
+//! Commands of the built binary, one after another: a region is transferred, and every way to give
+//! the input agrees.
 
 use std::path::{Path, PathBuf};
 
 use semfm::views::mcap::ViewsFile;
-use semfm_tests::shell::run;
+use semfm_tests::shell::{Answer, json, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -28,11 +29,7 @@ fn demo(category: &str, seed: &str) -> (TempDir, [PathBuf; 6]) {
     (folder, files)
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
-}
-
-fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> semfm_tests::shell::Answer {
+fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> Answer {
     let text = |path: &Path| path.to_str().unwrap().to_owned();
     let mut arguments = vec!["transfer".to_owned(), text(&files[0]), text(&files[1])];
     arguments.extend(["--region".into(), text(&files[2]), "-o".into(), text(out)]);
@@ -43,7 +40,7 @@ fn transfer(files: &[PathBuf; 6], out: &Path, more: &[&str]) -> semfm_tests::she
 }
 
 #[test]
-fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
+fn the_demo_gives_the_files_of_transfer_and_finds_the_handle() {
     let (folder, files) = demo("containers", "0");
     let out = folder.path().join("again");
     let answer = transfer(&files, &out, &["--json"]);
@@ -51,12 +48,12 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     let told: Value = serde_json::from_str(&answer.out).unwrap();
     assert_eq!(told["verdict"], "accept");
 
-    let [carried, demonstrated] =
+    let [transferred, demonstrated] =
         [&out, &folder.path().join("transfer")].map(|out| json(&out.join("region.json")));
-    assert_eq!(carried, demonstrated, "the demo and the command by hand differ");
+    assert_eq!(transferred, demonstrated, "the demo and the command by hand differ");
     let truth: Vec<u64> =
         serde_json::from_value(json(&files[3])["region"]["vertices"].clone()).unwrap();
-    let found: Vec<u64> = serde_json::from_value(carried["vertices"].clone()).unwrap();
+    let found: Vec<u64> = serde_json::from_value(transferred["vertices"].clone()).unwrap();
     let both = found.iter().filter(|v| truth.binary_search(v).is_ok()).count();
     let iou = both as f64 / (found.len() + truth.len() - both) as f64;
     // This pair lands at .85; far below that something broke.
@@ -70,12 +67,12 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     }
     let map: Vec<u32> =
         serde_json::from_value(json(&out.join("point_map.json"))["source_of"].clone()).unwrap();
-    assert_eq!(map.len() as u64, carried["mesh"]["n_vertices"].as_u64().unwrap());
+    assert_eq!(map.len() as u64, transferred["mesh"]["n_vertices"].as_u64().unwrap());
     for name in ["target.ply", "target.glb"] {
         let told = run(&["info", "--json", out.join(name).to_str().unwrap()]);
         assert_eq!(told.code, Some(0), "{told:?}");
         let about: Value = serde_json::from_str(&told.out).unwrap();
-        assert_eq!(about["n_vertices"], carried["mesh"]["n_vertices"], "{name}");
+        assert_eq!(about["n_vertices"], transferred["mesh"]["n_vertices"], "{name}");
         assert_eq!(about["has_colors"], true, "{name}");
     }
     let scene = run(&["info", "--json", out.join("transfer.mcap").to_str().unwrap()]);
@@ -84,7 +81,7 @@ fn the_demo_takes_the_road_of_transfer_and_finds_the_handle() {
     let picture = std::fs::read(out.join("transfer.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000);
 
-    // A transfer without a hand leaves no older grasps beside it.
+    // A transfer without a gripper leaves no older grasps beside it.
     let demonstrated = folder.path().join("transfer");
     assert!(demonstrated.join("grasps.json").is_file());
     assert_eq!(transfer(&files, &demonstrated, &[]).code, Some(0));
@@ -101,11 +98,11 @@ fn every_method_answers_and_threads_do_not_matter() {
             let more = ["--method", method, "--threads", threads, "--no-cache", "--quiet"];
             let answer = transfer(&files, &out, &more);
             assert!(matches!(answer.code, Some(0 | 1)), "{method}: {answer:?}");
-            let carried = json(&out.join("region.json"));
-            let refused = carried["verdict"] == "refuse";
+            let transferred = json(&out.join("region.json"));
+            let refused = transferred["verdict"] == "refuse";
             assert_eq!(answer.code == Some(1), refused, "{method}: exit code and verdict differ");
             assert!(!json(&out.join("report.json"))["anchors"].is_null());
-            carried
+            transferred
         });
         assert_eq!(regions[0], regions[1], "{method} depends on the thread count");
     }
@@ -120,14 +117,14 @@ fn a_painted_mesh_gives_its_region_back() {
         ["region", painted.to_str().unwrap(), "--ply-color", "-o", region.to_str().unwrap()];
     let answer = run(&arguments);
     assert_eq!(answer.code, Some(0), "{answer:?}");
-    let carried = json(&folder.path().join("transfer/region.json"));
+    let transferred = json(&folder.path().join("transfer/region.json"));
     let painted = json(&region);
     let ids =
         |value: &Value| -> Vec<u64> { serde_json::from_value(value["vertices"].clone()).unwrap() };
-    let (carried, painted) = (ids(&carried), ids(&painted));
-    let shared = painted.iter().filter(|v| carried.binary_search(v).is_ok()).count();
+    let (transferred, painted) = (ids(&transferred), ids(&painted));
+    let shared = painted.iter().filter(|v| transferred.binary_search(v).is_ok()).count();
     // Colours have eight bits: a weight of exactly one half may fall on either side.
-    assert!(shared * 100 >= carried.len().max(painted.len()) * 98);
+    assert!(shared * 100 >= transferred.len().max(painted.len()) * 98);
     assert!(files[0].is_file());
 }
 

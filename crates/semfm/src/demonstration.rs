@@ -1,4 +1,5 @@
-//! Where a region comes from: a contact and a radius, a mask in a view, a painted mesh.
+//! Where a demonstration touched an object: a region from a contact and a radius, from a mask in a
+//! view, or from the colours of a painted mesh.
 
 use semfm_geom::geodesic::{HeatGeodesics, HeatSettings};
 use semfm_geom::math::DVec3;
@@ -15,7 +16,7 @@ use crate::{Error, Region, Result};
 /// # Errors
 /// [`Error::Invalid`] for a radius that is not positive or a contact that is not finite, or where
 /// no vertex is that near.
-pub fn near(mesh: &Mesh, contact: DVec3, radius: f64) -> Result<Region> {
+pub fn region_around_contact(mesh: &Mesh, contact: DVec3, radius: f64) -> Result<Region> {
     if !(radius > 0.0 && radius.is_finite()) {
         return Err(Error::invalid("radius", "a positive length", radius.to_string()));
     }
@@ -45,7 +46,7 @@ const SIGHT_TOLERANCE: f64 = 0.01;
 ///
 /// # Errors
 /// [`Error::Invalid`] where the mask is not of the camera's size or shows no vertex.
-pub fn masked(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result<Region> {
+pub fn region_under_mask(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result<Region> {
     let (width, height) = (camera.width() as usize, camera.height() as usize);
     if mask.len() != width * height {
         let expected = format!("{} pixels ({width} × {height}, as the view)", width * height);
@@ -81,21 +82,11 @@ const PAINT_TOLERANCE: i16 = 60;
 ///
 /// # Errors
 /// [`Error::Invalid`] where the mesh has no colours or none is of that paint.
-pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Region> {
+pub fn region_of_paint(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Region> {
     let Some(colors) = colors else {
         return Err(Error::invalid("vertex colours", "a painted mesh", "a mesh without colours"));
     };
-    let is_painted = |color: &[u8; 4]| {
-        let [r, g, b, _] = color.map(i16::from);
-        match paint {
-            Some(paint) => [r, g, b]
-                .iter()
-                .zip(paint)
-                .all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE),
-            None => r - g.max(b) >= REDNESS,
-        }
-    };
-    let inside: Vec<bool> = colors.iter().map(is_painted).collect();
+    let inside: Vec<bool> = colors.iter().map(|&color| is_painted(color, paint)).collect();
     if !inside.contains(&true) {
         let wanted = paint.map_or("red".into(), |[r, g, b]| format!("({r}, {g}, {b})"));
         let expected = format!("at least one vertex painted {wanted}");
@@ -108,6 +99,16 @@ pub fn painted(colors: Option<&[[u8; 4]]>, paint: Option<[u8; 3]>) -> Result<Reg
     Ok(Region::from_mask(&inside))
 }
 
+fn is_painted(color: [u8; 4], paint: Option<[u8; 3]>) -> bool {
+    let [r, g, b, _] = color.map(i16::from);
+    match paint {
+        Some(paint) => {
+            [r, g, b].iter().zip(paint).all(|(c, p)| (c - i16::from(p)).abs() <= PAINT_TOLERANCE)
+        }
+        None => r - g.max(b) >= REDNESS,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,7 +118,7 @@ mod tests {
     #[test]
     fn near_takes_a_geodesic_disc() {
         let sphere = zoo::icosphere(4);
-        let region = near(&sphere, DVec3::new(0.0, 0.0, 1.2), 0.5).unwrap();
+        let region = region_around_contact(&sphere, DVec3::new(0.0, 0.0, 1.2), 0.5).unwrap();
         for (v, inside) in region.mask().into_iter().enumerate() {
             let angle = sphere.vertices()[v].normalize().z.clamp(-1.0, 1.0).acos();
             // Within the heat method's error at this resolution.
@@ -126,8 +127,8 @@ mod tests {
                 "angle {angle}: {inside}"
             );
         }
-        assert!(near(&sphere, DVec3::Z, -1.0).is_err());
-        assert!(near(&sphere, DVec3::NAN, 0.5).is_err());
+        assert!(region_around_contact(&sphere, DVec3::Z, -1.0).is_err());
+        assert!(region_around_contact(&sphere, DVec3::NAN, 0.5).is_err());
     }
 
     #[test]
@@ -138,23 +139,23 @@ mod tests {
             DAffine3::from_translation(DVec3::new(0.0, 0.0, 4.0)),
         )
         .unwrap();
-        let region = masked(&sphere, &camera, &[true; 64 * 64]).unwrap();
+        let region = region_under_mask(&sphere, &camera, &[true; 64 * 64]).unwrap();
         let seen = region.vertices();
         assert!(
             seen.iter().all(|&v| sphere.vertices()[v as usize].z < 0.0),
             "the far side is hidden"
         );
         assert!(seen.len() > sphere.n_vertices() / 4);
-        assert!(masked(&sphere, &camera, &[true; 10]).is_err());
-        assert!(masked(&sphere, &camera, &[false; 64 * 64]).is_err());
+        assert!(region_under_mask(&sphere, &camera, &[true; 10]).is_err());
+        assert!(region_under_mask(&sphere, &camera, &[false; 64 * 64]).is_err());
     }
 
     #[test]
     fn paint_is_red_unless_said_otherwise() {
         let colors = [[220, 40, 40, 255], [200, 200, 200, 255], [30, 40, 200, 255]];
-        assert_eq!(painted(Some(&colors), None).unwrap().vertices(), [0]);
-        assert_eq!(painted(Some(&colors), Some([20, 20, 220])).unwrap().vertices(), [2]);
-        assert!(painted(Some(&colors[1..2]), None).is_err());
-        assert!(painted(None, None).is_err());
+        assert_eq!(region_of_paint(Some(&colors), None).unwrap().vertices(), [0]);
+        assert_eq!(region_of_paint(Some(&colors), Some([20, 20, 220])).unwrap().vertices(), [2]);
+        assert!(region_of_paint(Some(&colors[1..2]), None).is_err());
+        assert!(region_of_paint(None, None).is_err());
     }
 }

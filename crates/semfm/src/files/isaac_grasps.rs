@@ -2,7 +2,7 @@
 //! read: <https://nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html>.
 //!
 //! Poses are those of the gripper's flange in the object's frame, quaternions with w first. Joints
-//! of the hand are named as in its URDF.
+//! of the gripper are named as in its URDF.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,31 +10,31 @@ use std::path::Path;
 use semfm_geom::io::write_atomically;
 use semfm_robot::JointPosition;
 
-use super::{GraspAnswer, position_and_rotation};
 use crate::Result;
+use crate::grasp_result::{GraspResult, position_and_rotation};
 
 /// Writes the grasps, whole or not at all.
 ///
 /// # Errors
 /// [`semfm_geom::Error::Io`] where the file cannot be written.
-pub fn write_isaac(path: &Path, answer: &GraspAnswer<'_>) -> Result<()> {
-    let text = isaac_yaml(answer);
+pub fn write_isaac_grasps(path: &Path, result: &GraspResult<'_>) -> Result<()> {
+    let text = isaac_yaml(result);
     Ok(write_atomically(path, |out| out.write_all(text.as_bytes()))?)
 }
 
-fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
+fn isaac_yaml(result: &GraspResult<'_>) -> String {
     let mut text = String::new();
     // Writing into a String does not fail.
     let _ = writeln!(
         text,
         "format: isaac_grasp\nformat_version: 1.0\n\nobject_frame: object\ngripper_frame: {}\n",
-        quoted(&answer.gripper.name)
+        quoted(&result.gripper.name)
     );
-    let none = if answer.found.grasps.is_empty() { " {}" } else { "" };
+    let none = if result.found.grasps.is_empty() { " {}" } else { "" };
     let _ = writeln!(text, "grasps:{none}");
-    for (i, grasp) in answer.found.grasps.iter().enumerate() {
+    for (i, grasp) in result.found.grasps.iter().enumerate() {
         let (p, q) = position_and_rotation(
-            grasp.object_from_tcp * answer.gripper.flange_from_tcp_at(grasp.width).inverse(),
+            grasp.object_from_tcp * result.gripper.flange_from_tcp_at(grasp.width).inverse(),
         );
         let _ = writeln!(text, "  \"grasp_{i}\":\n    confidence: {}", number(grasp.score));
         let _ = writeln!(text, "    position: {}", list(p.to_array()));
@@ -43,7 +43,7 @@ fn isaac_yaml(answer: &GraspAnswer<'_>) -> String {
         for (name, width) in
             [("cspace_position", grasp.width), ("pregrasp_cspace_position", grasp.opening)]
         {
-            let joints = answer.gripper.joints_at(width);
+            let joints = result.gripper.joints_at(width);
             let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });
             for JointPosition { name: joint, position } in joints {
                 let _ = writeln!(text, "      {}: {}", quoted(joint), number(position));

@@ -1,4 +1,4 @@
-//! The page that `semfm-cli eval` writes beside its results.
+//! The HTML report that `semfm-cli eval` writes beside its results.
 
 use std::path::{Path, PathBuf};
 
@@ -7,13 +7,13 @@ use clap::Args;
 use semfm_eval::{ReportSettings, Results, report, table};
 
 use super::Outcome;
+use crate::console;
 use crate::options::Common;
-use crate::talk;
 
-/// What the page holds.
+/// What the report holds.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Page")]
-pub struct PageOptions {
+#[command(next_help_heading = "Report")]
+pub struct ReportOptions {
     /// Measure nothing: make index.html and table.md anew from the results in the output folder
     #[arg(long)]
     pub report_only: bool,
@@ -28,7 +28,7 @@ pub struct PageOptions {
     vlm_pictures: Option<PathBuf>,
 }
 
-impl PageOptions {
+impl ReportOptions {
     /// As settings.
     pub fn settings(&self) -> ReportSettings {
         ReportSettings {
@@ -39,12 +39,12 @@ impl PageOptions {
         }
     }
 
-    /// Makes the page and the table in a folder of results anew.
-    pub fn again(&self, folder: &Path, common: &Common) -> Result<Outcome> {
-        let task = talk::watched(common.quiet);
+    /// Makes the report and the table in a folder of results anew.
+    pub fn write_again(&self, folder: &Path, common: &Common) -> Result<Outcome> {
+        let task = console::progress(common.quiet);
         let table = table::write(&Results::read(folder)?, folder)?;
         let files = [table, report::again(folder, &self.settings(), &task)?];
-        files.iter().for_each(|file| talk::say(file.display()));
+        files.iter().for_each(|file| console::data(file.display()));
         Ok(Outcome::Done)
     }
 }

@@ -1,0 +1,115 @@
+//! What `transfer` and `demo` write and print of a finished transfer.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use semfm::files::{Provenance, TransferResult, stages_ms};
+use semfm::fmap::Stages;
+use semfm::grasp::Grasps;
+use semfm::{GraspProblem, Prepared, Region, Task, Transfer, Verdict};
+use semfm_show::write_transfer;
+use serde_json::{Value, json};
+
+use super::Outcome;
+use super::grasp::{draw_grasps, print_grasps, summary as grasps_summary, write_grasps};
+use crate::console;
+use crate::options::Common;
+
+/// A finished transfer and what it was made from.
+pub struct TransferOutput<'a> {
+    pub source: &'a Prepared,
+    pub target: &'a Prepared,
+    pub region: &'a Region,
+    pub transfer: &'a Transfer,
+    pub provenance: Provenance,
+    /// Grasps in the transferred region, where a gripper was given.
+    pub grasps: Option<GraspProblem>,
+}
+
+impl TransferOutput<'_> {
+    /// Writes every file, prints the answer, and says how the run ended. A refused region is not
+    /// grasped.
+    pub fn write(&self, folder: &Path, task: &Task, common: &Common) -> Result<Outcome> {
+        let mut files = write_transfer(folder, &self.result(), task)?;
+        let refused = self.transfer.verdict == Verdict::Refuse;
+        let mut grasps = None;
+        if let Some(problem) = self.grasps.as_ref().filter(|_| !refused) {
+            let weights = self.transfer.weights();
+            let found = problem.find(weights, task)?;
+            let (file, picture) = (folder.join("grasps.json"), folder.join("grasps.png"));
+            write_grasps(&file, problem, &found)?;
+            draw_grasps(&picture, problem, weights, &found, task)?;
+            files.extend([file, picture]);
+            grasps = Some(found);
+        } else {
+            remove_old_grasps(folder)?;
+        }
+        let stages = stages_ms(self.source, self.target, self.transfer);
+        if common.json {
+            console::data(self.summary(&stages, &files, grasps.as_ref()));
+        } else {
+            self.print(&stages, common);
+            grasps.iter().for_each(|found| print_grasps(found, common));
+            console::data("wrote");
+            files.iter().for_each(|file| console::data(format_args!("  {}", file.display())));
+        }
+        let without = grasps.is_some_and(|found| found.grasps.is_empty());
+        Ok(if refused || without { Outcome::NoAnswer } else { Outcome::Done })
+    }
+
+    fn result(&self) -> TransferResult<'_> {
+        let Self { source, target, region, transfer, .. } = *self;
+        TransferResult { source, target, region, transfer, provenance: &self.provenance }
+    }
+
+    /// The answer in short, for `--json`.
+    fn summary(&self, stages: &Stages, files: &[PathBuf], grasps: Option<&Grasps>) -> Value {
+        let mut summary = json!({
+            "verdict": self.transfer.verdict,
+            "confidence": self.transfer.confidence,
+            "method": self.transfer.report.settings.method,
+            "n_vertices": self.transfer.region.vertices().len(),
+            "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+            "stages_ms": stages,
+        });
+        if let Some(found) = grasps {
+            summary["grasps"] = grasps_summary(found);
+        }
+        summary
+    }
+
+    fn print(&self, stages: &Stages, common: &Common) {
+        let Transfer { region, verdict, confidence, hypotheses, .. } = self.transfer;
+        let (n, of) = (region.vertices().len(), region.n_vertices());
+        console::data(format_args!("verdict     {verdict} (confidence {confidence:.2})"));
+        console::data(format_args!("region      {n} of {of} vertices of the target"));
+        if hypotheses.len() > 1 {
+            let shares: Vec<String> =
+                hypotheses.iter().map(|h| format!("{:.0} %", 100.0 * h.probability)).collect();
+            console::data(format_args!("places      {}", shares.join(", ")));
+        }
+        console::data(format_args!("time        {:.0} ms", stages.total_ms()));
+        if common.verbose {
+            for (name, ms) in stages.iter() {
+                console::data(format_args!("  {name:20} {ms:8.1} ms"));
+            }
+            for (name, prepared) in [("source", self.source), ("target", self.target)] {
+                let cleaning = &prepared.object.shape().report().cleaning;
+                console::data(format_args!("{name:11} {cleaning}"));
+            }
+        }
+    }
+}
+
+/// Removes the grasps of an earlier run from the folder: they belong to a region that is gone.
+fn remove_old_grasps(folder: &Path) -> Result<()> {
+    for path in ["grasps.json", "grasps.png"].map(|name| folder.join(name)) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| path.display().to_string());
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,288 @@
+//! `grasps.json`: format `semfm.grasps/1`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use parry3d_f64::math::Pose;
+use parry3d_f64::shape::{Shape, TypedShape};
+use semfm_geom::io::{FormatError, read_json};
+use semfm_geom::{Mesh, MeshIdentity};
+use semfm_grasp::Grasp;
+use semfm_robot::{Gripper, GripperPart, Role};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{MatrixRows, write_json};
+use crate::Result;
+use crate::grasp_result::{AnswerFrame, GraspResult, position_and_rotation};
+
+/// The format that is written.
+pub const FORMAT: &str = "semfm.grasps/1";
+
+/// Grasps as their file has them. Matrices are 4 × 4, rows first, points as columns; lengths are
+/// metres; quaternions are x, y, z, w. The poses of the gripper's parts at each grasp are listed, so
+/// that a grasp can be checked with nothing but this file and the mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraspsFile {
+    /// `semfm.grasps/1`.
+    pub format: String,
+    /// The mesh that the grasps belong to.
+    pub mesh: MeshIdentity,
+    /// Metres per unit of the mesh.
+    pub object_scale: f64,
+    /// Where the object, scaled to metres, stands before the camera, if that is known.
+    pub camera_from_object: Option<MatrixRows>,
+    /// The gripper.
+    pub gripper: GripperRecord,
+    /// The grasps, best first.
+    pub grasps: Vec<GraspRecord>,
+    /// Candidates refused, by the first thing that each failed.
+    pub rejected: BTreeMap<String, usize>,
+    /// Of the refused candidates the one that came farthest.
+    pub nearest_miss: Option<MissRecord>,
+    /// Gripper poses examined.
+    pub n_candidates: usize,
+    /// Gripper poses that passed every check.
+    pub n_survivors: usize,
+    /// The settings of the search, where the program that wrote the file gave them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settings: Option<GraspSettingsRecord>,
+}
+
+/// The gripper of a [`GraspsFile`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GripperRecord {
+    /// Its name.
+    pub name: String,
+    /// Least and largest distance between the pads.
+    pub opening: [f64; 2],
+    /// Extent of a pad along x and along z of the TCP frame.
+    pub pad: [f64; 2],
+    /// The TCP in the flange's frame, closed.
+    pub flange_from_tcp: MatrixRows,
+    /// Its rigid parts.
+    pub parts: Vec<PartRecord>,
+}
+
+/// A rigid part of the gripper: convex hulls of point sets, in the part's own frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartRecord {
+    /// The link it belongs to.
+    pub link: String,
+    /// What it moves with: `palm`, `left` or `right`.
+    pub role: String,
+    /// Corners of each convex piece.
+    pub hulls: Vec<Vec<[f64; 3]>>,
+}
+
+/// One grasp of a [`GraspsFile`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraspRecord {
+    /// The TCP in the frame of the object in metres.
+    pub object_from_tcp: MatrixRows,
+    /// The TCP in the flange's frame at this grasp's width.
+    pub flange_from_tcp: MatrixRows,
+    /// The TCP in the camera's frame, where that is known.
+    pub camera_from_tcp: Option<MatrixRows>,
+    /// The frame of `position` and `quaternion_xyzw`.
+    pub frame: AnswerFrame,
+    /// Origin of the TCP.
+    pub position: [f64; 3],
+    /// Rotation of the TCP, w ≥ 0.
+    pub quaternion_xyzw: [f64; 4],
+    /// Distance between the closed pads.
+    pub width: f64,
+    /// Distance between the pads on the way in.
+    pub opening: f64,
+    /// One contact for each pad, in the object's frame.
+    pub contacts: [[f64; 3]; 2],
+    /// The object's unit normal at each contact.
+    pub normals: [[f64; 3]; 2],
+    /// Ferrari and Canny's ε.
+    pub epsilon: f64,
+    /// Weighted mean of the terms, 0 to 1.
+    pub score: f64,
+    /// The terms of the score, each 0 to 1.
+    pub terms: BTreeMap<String, f64>,
+    /// Poses of the gripper's parts.
+    pub hand: HandRecord,
+}
+
+/// Poses of the gripper's parts at a grasp, in the TCP's frame of the closed gripper, in the order
+/// of [`GripperRecord::parts`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandRecord {
+    /// At the grasp's width.
+    pub closed: Vec<MatrixRows>,
+    /// At the grasp's opening, the flange where it is when the fingers close.
+    pub open: Vec<MatrixRows>,
+}
+
+/// The candidate that failed by least.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MissRecord {
+    /// Name of what it failed.
+    pub reason: String,
+    /// The same in words.
+    pub explanation: String,
+    /// By how much.
+    pub by: f64,
+    /// Unit of `by`.
+    pub unit: String,
+    /// The TCP in the frame of the object in metres.
+    pub object_from_tcp: MatrixRows,
+}
+
+/// The settings of a search as `grasps.json` has them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraspSettingsRecord {
+    /// Seed of everything drawn by chance.
+    pub seed: u64,
+    /// Friction coefficient between pad and object.
+    pub friction: f64,
+    /// Points of the region from which candidates were grown.
+    pub n_samples: usize,
+    /// Version of the program.
+    pub version: String,
+}
+
+impl GraspsFile {
+    /// The file of a result, without settings.
+    pub fn new(result: &GraspResult<'_>) -> Self {
+        let found = result.found;
+        let rejected =
+            found.rejected.iter().map(|(reason, count)| (reason.name().to_owned(), count));
+        Self {
+            format: FORMAT.into(),
+            mesh: MeshIdentity::of(result.mesh),
+            object_scale: result.object_scale,
+            camera_from_object: result.camera_from_object.map(rows),
+            gripper: GripperRecord::new(result.gripper),
+            grasps: found.grasps.iter().map(|grasp| GraspRecord::new(result, grasp)).collect(),
+            rejected: rejected.collect(),
+            nearest_miss: found.nearest_miss.as_ref().map(|miss| MissRecord {
+                reason: miss.reason.name().into(),
+                explanation: miss.reason.explanation().into(),
+                by: miss.by,
+                unit: miss.reason.unit().into(),
+                object_from_tcp: rows(miss.grasp.object_from_tcp),
+            }),
+            n_candidates: found.n_candidates,
+            n_survivors: found.n_survivors,
+            settings: None,
+        }
+    }
+
+    /// Its JSON.
+    pub fn to_json(&self) -> Value {
+        super::to_json(self)
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::Io`].
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_json(path, self)
+    }
+
+    /// Reads the grasps of `mesh`.
+    ///
+    /// # Errors
+    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format,
+    /// [`Error::Format`](crate::Error::Format) for another mesh or a scale that is not positive.
+    pub fn read(path: &Path, mesh: &Mesh) -> Result<Self> {
+        let file: Self = read_json(path)?;
+        file.mesh
+            .check(mesh)
+            .map_err(|error| error.in_file(path))?;
+        if !(file.object_scale > 0.0 && file.object_scale.is_finite()) {
+            let found = file.object_scale.to_string();
+            return Err(FormatError::new(path, "object_scale", "a positive number", found).into());
+        }
+        Ok(file)
+    }
+}
+
+impl GraspRecord {
+    fn new(result: &GraspResult<'_>, grasp: &Grasp) -> Self {
+        let (frame, pose) = (result.frame(), result.in_frame(grasp.object_from_tcp));
+        let (position, rotation) = position_and_rotation(pose);
+        let terms = grasp.terms.iter().map(|&(name, value)| (name.to_owned(), value));
+        let gripper = result.gripper;
+        Self {
+            object_from_tcp: rows(grasp.object_from_tcp),
+            flange_from_tcp: rows(gripper.flange_from_tcp_at(grasp.width)),
+            camera_from_tcp: result.camera_from_object.map(|_| rows(pose)),
+            frame,
+            position: position.to_array(),
+            quaternion_xyzw: rotation.to_array(),
+            width: grasp.width,
+            opening: grasp.opening,
+            contacts: grasp.contacts.map(|point| point.to_array()),
+            normals: grasp.normals.map(|normal| normal.to_array()),
+            epsilon: grasp.epsilon,
+            score: grasp.score,
+            terms: terms.collect(),
+            hand: HandRecord {
+                closed: parts_at(gripper, grasp.width, grasp.width),
+                open: parts_at(gripper, grasp.width, grasp.opening),
+            },
+        }
+    }
+}
+
+/// Poses of the parts at `width`, in the TCP's frame of the gripper closed to `closed`: the robot
+/// holds the flange still while the fingers close, and a linkage moves the pads along z, so the
+/// open gripper has a TCP of its own, seen here from that of the closed one.
+fn parts_at(gripper: &Gripper, closed: f64, width: f64) -> Vec<MatrixRows> {
+    let tcp_from_tcp =
+        gripper.flange_from_tcp_at(closed).inverse() * gripper.flange_from_tcp_at(width);
+    let parts = gripper.parts_at(width).into_iter();
+    parts.map(|posed| rows(tcp_from_tcp * posed.tcp_from_part)).collect()
+}
+
+impl GripperRecord {
+    fn new(gripper: &Gripper) -> Self {
+        Self {
+            name: gripper.name.clone(),
+            opening: [*gripper.opening.start(), *gripper.opening.end()],
+            pad: gripper.pad,
+            flange_from_tcp: rows(gripper.flange_from_tcp),
+            parts: gripper.parts.iter().map(PartRecord::new).collect(),
+        }
+    }
+}
+
+impl PartRecord {
+    fn new(part: &GripperPart) -> Self {
+        let role = match part.role {
+            Role::Palm => "palm",
+            Role::Left => "left",
+            Role::Right => "right",
+        };
+        let mut hulls = Vec::new();
+        add_hulls(&*part.shape, Pose::IDENTITY, &mut hulls);
+        Self { link: part.link.clone(), role: role.into(), hulls }
+    }
+}
+
+/// The corners of each convex piece of a shape.
+fn add_hulls(shape: &dyn Shape, pose: Pose, hulls: &mut Vec<Vec<[f64; 3]>>) {
+    let corners = match shape.as_typed_shape() {
+        TypedShape::Cuboid(cuboid) => cuboid.to_trimesh().0,
+        TypedShape::ConvexPolyhedron(hull) => hull.points().to_vec(),
+        TypedShape::Compound(compound) => {
+            for (part_pose, part) in compound.shapes() {
+                add_hulls(&**part, pose * *part_pose, hulls);
+            }
+            return;
+        }
+        _ => return,
+    };
+    hulls.push(corners.into_iter().map(|p| (pose * p).to_array()).collect());
+}
+
+fn rows(pose: Pose) -> MatrixRows {
+    pose.to_mat4().transpose().to_cols_array_2d()
+}

@@ -1,0 +1,78 @@
+//! The files that are read and written here. Each format is defined once, by a struct that its
+//! writer and its readers share.
+//!
+//! | file | format | struct |
+//! | --- | --- | --- |
+//! | a region on a mesh | `semfm.region/1` | [`RegionFile`] |
+//! | `region.json` of a transfer | the same, with more fields | [`TransferredRegionFile`] |
+//! | `report.json` of a transfer | `semfm.report/1` | [`TransferReportFile`] |
+//! | `point_map.json` of a transfer | `semfm.point_map/1` | [`PointMapFile`] |
+//! | `aligned.json`, the pose of an object before a camera | `semfm.aligned/1` | [`AlignedFile`] |
+//! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
+//!
+//! [`write_transfer`] writes the folder of a transfer. Grasps are also written as Isaac's YAML
+//! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`). From other
+//! programs come depth images, masks and intrinsics ([`read_depth_image`], [`read_mask`],
+//! [`read_intrinsics`]), per-vertex features ([`read_vertex_features`]) and obstacles
+//! ([`read_obstacle`]).
+//!
+//! Keys of a JSON file stand in alphabetical order, whatever the order of a struct's fields.
+
+mod aligned;
+mod depth_image;
+#[cfg(feature = "mcap")]
+mod embeddings;
+mod grasps;
+mod intrinsics;
+mod isaac_grasps;
+mod mask;
+mod obstacle;
+mod picture;
+mod point_map;
+mod region;
+#[cfg(feature = "mcap")]
+mod ros2_grasps;
+mod transfer_folder;
+mod transfer_report;
+mod transferred_region;
+mod vertex_features;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+pub use aligned::{AlignSettingsRecord, AlignedFile, AlignedPose, read_aligned, read_pose};
+pub use depth_image::read_depth_image;
+#[cfg(feature = "mcap")]
+pub use embeddings::read_embeddings;
+pub use grasps::{
+    FORMAT as GRASPS_FORMAT, GraspRecord, GraspSettingsRecord, GraspsFile, GripperRecord,
+    HandRecord, MissRecord, PartRecord,
+};
+pub use intrinsics::read_intrinsics;
+pub use isaac_grasps::write_isaac_grasps;
+pub use mask::{MaskedPicture, read_mask};
+pub use obstacle::read_obstacle;
+pub use point_map::PointMapFile;
+pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
+#[cfg(feature = "mcap")]
+pub use ros2_grasps::write_ros2_grasps;
+pub use transfer_folder::{AnchorRanks, ObjectAnchors, TransferResult, write_transfer};
+pub use transfer_report::{
+    CloudRecord, ObjectRecord, Provenance, Seeds, TransferInputs, TransferReportFile, stages_ms,
+};
+pub use transferred_region::{HypothesisRecord, TransferredRegionFile};
+pub use vertex_features::read_vertex_features;
+
+/// A 4 × 4 matrix, rows first, points as columns.
+pub type MatrixRows = [[f64; 4]; 4];
+
+/// A value as JSON, keys in alphabetical order.
+pub(crate) fn to_json(value: &impl Serialize) -> serde_json::Value {
+    serde_json::to_value(value).expect("the keys of what is written here are text")
+}
+
+/// Writes [`to_json`], whole or not at all.
+fn write_json(path: &Path, file: &impl Serialize) -> crate::Result<()> {
+    Ok(semfm_geom::io::write_json(path, &to_json(file))?)
+}

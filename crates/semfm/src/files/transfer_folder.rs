@@ -1,0 +1,169 @@
+//! The folder of a transfer: what it leaves behind for programs. Pictures and scenes are added by
+//! `semfm-show`.
+
+use std::path::{Path, PathBuf};
+
+use semfm_fmap::{Anchor, PreparedObject};
+use semfm_geom::io::{VertexAttributes, write_mesh_with_attributes};
+use semfm_geom::{Mesh, Task};
+
+use super::point_map::{FORMAT as POINT_MAP_FORMAT, PointMapFile};
+use super::transfer_report::{Provenance, TransferReportFile};
+use super::transferred_region::TransferredRegionFile;
+use crate::weight_colors::{color_bytes, weight_colors};
+use crate::{Prepared, Region, Result, Transfer};
+
+/// A finished transfer with everything that its files tell.
+#[derive(Clone, Copy, Debug)]
+pub struct TransferResult<'a> {
+    /// The demonstrated object.
+    pub source: &'a Prepared,
+    /// The object to act on.
+    pub target: &'a Prepared,
+    /// The demonstrated region on the source.
+    pub region: &'a Region,
+    /// The transfer.
+    pub transfer: &'a Transfer,
+    /// Where it came from.
+    pub provenance: &'a Provenance,
+}
+
+impl<'a> TransferResult<'a> {
+    /// The mesh of the source as read.
+    pub fn source_mesh(&self) -> &'a Mesh {
+        self.source.object.shape().original()
+    }
+
+    /// The mesh of the target as read.
+    pub fn target_mesh(&self) -> &'a Mesh {
+        self.target.object.shape().original()
+    }
+
+    /// The content of `report.json`.
+    pub fn report(&self) -> TransferReportFile {
+        TransferReportFile::new(self)
+    }
+
+    /// Where the anchors lie on both objects.
+    ///
+    /// # Errors
+    /// [`Error::Fmap`](crate::Error::Fmap) where the clusters cannot be made: they are kept in the
+    /// objects, so only a method that did not read them makes them here.
+    pub fn anchor_ranks(&self, task: &Task) -> Result<AnchorRanks> {
+        let anchors: Vec<Anchor> =
+            self.transfer.report.anchors.iter().map(|report| report.anchor).collect();
+        let sources: Vec<u32> = anchors.iter().map(|anchor| anchor.source).collect();
+        let targets: Vec<u32> = anchors.iter().map(|anchor| anchor.target).collect();
+        Ok(AnchorRanks {
+            source: self.ranks_on(&self.source.object, &sources, task)?,
+            target: self.ranks_on(&self.target.object, &targets, task)?,
+        })
+    }
+
+    /// Ranks of the anchors whose cluster labels on `object` are `labels`, best first.
+    fn ranks_on(
+        &self,
+        object: &PreparedObject,
+        labels: &[u32],
+        task: &Task,
+    ) -> Result<ObjectAnchors> {
+        let clusters = object.clusters(&self.transfer.report.settings.clusters, task)?;
+        let cluster_of_point = clusters.labels().to_vec();
+        let of_point: Vec<i64> =
+            cluster_of_point.iter().map(|&label| rank_of(label, labels)).collect();
+        let of_vertex =
+            object.point_of_original_vertex().iter().map(|&p| of_point[p as usize]).collect();
+        Ok(ObjectAnchors { cluster_of_point, of_point, of_vertex })
+    }
+}
+
+/// The place of a label in a list, −1 where it is not there.
+fn rank_of(label: u32, labels: &[u32]) -> i64 {
+    labels.iter().position(|&other| other == label).map_or(-1, |rank| rank as i64)
+}
+
+/// Where the anchors of a transfer lie on both objects.
+#[derive(Clone, Debug)]
+pub struct AnchorRanks {
+    /// On the source.
+    pub source: ObjectAnchors,
+    /// On the target.
+    pub target: ObjectAnchors,
+}
+
+/// Where the anchors of a transfer lie on one object.
+#[derive(Clone, Debug)]
+pub struct ObjectAnchors {
+    /// Cluster of each cloud point.
+    pub cluster_of_point: Vec<u32>,
+    /// Rank of the anchor that each cloud point's cluster is, best first; −1 for none.
+    pub of_point: Vec<i64>,
+    /// The same for each vertex of the mesh as read.
+    pub of_vertex: Vec<i64>,
+}
+
+/// Writes a transfer into `folder`, which is made if it is not there: `region.json`, `report.json`,
+/// `point_map.json`, `source.ply`, `target.ply` and `target.glb`. Each file is written whole or not
+/// at all. Returns the paths.
+///
+/// # Errors
+/// [`semfm_geom::Error::Io`] for the first file that cannot be written; those of
+/// [`TransferResult::anchor_ranks`].
+pub fn write_transfer(
+    folder: &Path,
+    result: &TransferResult<'_>,
+    task: &Task,
+) -> Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|source| semfm_geom::Error::Io { path: folder.to_owned(), source })?;
+    let (source, target) = (result.source_mesh(), result.target_mesh());
+    let names =
+        ["region.json", "report.json", "point_map.json", "source.ply", "target.ply", "target.glb"];
+    let [region, report, point_map, source_ply, target_ply, target_glb] =
+        names.map(|name| folder.join(name));
+
+    TransferredRegionFile::new(result.transfer, target).write(&region)?;
+    result.report().write(&report)?;
+    point_map_file(result, &result.anchor_ranks(task)?).write(&point_map)?;
+    write_weighted(&source_ply, source, result.region.weights())?;
+    write_weighted(&target_ply, target, result.transfer.weights())?;
+    write_weighted(&target_glb, target, result.transfer.weights())?;
+    Ok(vec![region, report, point_map, source_ply, target_ply, target_glb])
+}
+
+fn point_map_file(result: &TransferResult<'_>, ranks: &AnchorRanks) -> PointMapFile {
+    PointMapFile {
+        format: POINT_MAP_FORMAT.into(),
+        source: result.source_mesh().hash(),
+        target: result.target_mesh().hash(),
+        source_of: result.transfer.point_map.source_of.clone(),
+        source_anchor: ranks.source.of_vertex.clone(),
+        target_anchor: ranks.target.of_vertex.clone(),
+        source_weight: result.region.weights().iter().map(|&w| rounded(w)).collect(),
+        target_weight: result.transfer.weights().iter().map(|&w| rounded(w)).collect(),
+    }
+}
+
+/// A weight to four digits: enough for eyes, and a third of the bytes. Never up to where a vertex
+/// begins to count.
+fn rounded(weight: f64) -> f64 {
+    let rounded = (weight * 1e4).round() / 1e4;
+    if (rounded >= Region::COUNTS) == (weight >= Region::COUNTS) {
+        rounded
+    } else {
+        Region::COUNTS - 1e-4
+    }
+}
+
+/// A mesh as read with a weight per vertex, as property and as colour.
+fn write_weighted(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
+    let colors: Vec<[u8; 4]> = weight_colors(weights)
+        .into_iter()
+        .map(|color| {
+            let [r, g, b] = color_bytes(color);
+            [r, g, b, u8::MAX]
+        })
+        .collect();
+    let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
+    Ok(write_mesh_with_attributes(path, mesh, &attributes)?)
+}

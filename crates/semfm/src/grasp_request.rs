@@ -1,0 +1,173 @@
+//! Grasps of a mesh, asked for in the frame that the caller works in.
+//!
+//! Everything is given in the answer's frame: the camera's, where the pose of the object before one
+//! is known, else the object's in metres. The search itself runs in the object's frame.
+
+use std::sync::Arc;
+
+use parry3d_f64::math::Pose;
+use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, Task};
+use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, find_grasps};
+use semfm_robot::Gripper;
+
+use crate::{GraspResult, Result};
+
+/// Metres that a gripper keeps from the points of a cloud, unless said otherwise: the noise of a
+/// depth camera at arm's length.
+pub const POINT_MARGIN: f64 = 0.005;
+
+/// What grasps are wanted, and what stands around the object.
+#[derive(Clone, Debug)]
+pub struct GraspRequest {
+    /// Metres per unit of the mesh.
+    pub object_scale: f64,
+    /// Where the object, scaled to metres, stands before a camera: the answer's frame is then the
+    /// camera's.
+    pub camera_from_object: Option<Pose>,
+    /// A table, in the answer's frame.
+    pub table: Option<Table>,
+    /// What else the gripper must not touch, in the answer's frame, metres.
+    pub obstacles: Vec<Obstacle>,
+    /// Distance that the gripper keeps from the points of obstacles, metres.
+    pub point_margin: f64,
+    /// The settings of the search; their directions are in the answer's frame.
+    pub settings: GraspSettings,
+}
+
+/// The top of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table {
+    /// A point of it, metres.
+    pub point: DVec3,
+    /// Away from the table, of any length above zero.
+    pub normal: DVec3,
+}
+
+/// Something that stands beside the object.
+#[derive(Clone, Debug)]
+pub enum Obstacle {
+    /// A surface.
+    Mesh(Mesh),
+    /// Observed points.
+    Points(Vec<DVec3>),
+}
+
+impl GraspRequest {
+    /// The default search, without obstacles.
+    pub fn new(object_scale: f64) -> Self {
+        Self {
+            object_scale,
+            camera_from_object: None,
+            table: None,
+            obstacles: Vec::new(),
+            point_margin: POINT_MARGIN,
+            settings: GraspSettings::default(),
+        }
+    }
+
+    /// Everything turned into the frame of `mesh` and made ready for the search.
+    ///
+    /// # Errors
+    /// [`semfm_grasp::Error::OutOfRange`] for a scale, a table or points that make no sense.
+    pub fn prepare(self, mesh: Arc<Mesh>, gripper: Gripper) -> Result<GraspProblem> {
+        let object_from_answer = self.camera_from_object.map_or(Pose::IDENTITY, |p| p.inverse());
+        Ok(GraspProblem {
+            object: GraspObject::from_mesh(&mesh, self.object_scale)?,
+            scene: self.scene(object_from_answer)?,
+            settings: turned(self.settings, object_from_answer),
+            mesh,
+            object_scale: self.object_scale,
+            camera_from_object: self.camera_from_object,
+            gripper,
+        })
+    }
+
+    /// Table and obstacles in the object's frame.
+    fn scene(&self, object_from_answer: Pose) -> Result<Scene> {
+        let mut scene = Scene::new();
+        if let Some(Table { point, normal }) = self.table {
+            let normal = object_from_answer.rotation * normal;
+            scene = scene.with_table(object_from_answer * point, normal)?;
+        }
+        for obstacle in &self.obstacles {
+            scene = match obstacle {
+                Obstacle::Mesh(mesh) => {
+                    let vertices = moved(object_from_answer, mesh.vertices());
+                    scene.with_mesh(&Mesh::new(vertices, mesh.faces().to_vec())?)
+                }
+                Obstacle::Points(points) => {
+                    scene.with_cloud(&moved(object_from_answer, points), self.point_margin)?
+                }
+            };
+        }
+        Ok(scene)
+    }
+}
+
+fn moved(object_from_answer: Pose, points: &[DVec3]) -> Vec<DVec3> {
+    points.iter().map(|&p| object_from_answer * p).collect()
+}
+
+/// Settings whose directions are in the object's frame.
+fn turned(mut settings: GraspSettings, object_from_answer: Pose) -> GraspSettings {
+    let rotation = object_from_answer.rotation;
+    settings.demonstrated_approach = settings.demonstrated_approach.map(|v| rotation * v);
+    if let Some(cone) = &mut settings.limits.approach {
+        cone.axis = rotation * cone.axis;
+    }
+    settings
+}
+
+/// A [`GraspRequest`] made ready: grasps of any region of the object can be asked of it.
+#[derive(Debug)]
+pub struct GraspProblem {
+    mesh: Arc<Mesh>,
+    object_scale: f64,
+    camera_from_object: Option<Pose>,
+    gripper: Gripper,
+    object: GraspObject,
+    scene: Scene,
+    settings: GraspSettings,
+}
+
+impl GraspProblem {
+    /// Grasps in a region, one weight per vertex.
+    ///
+    /// # Errors
+    /// [`semfm_grasp::Error::OutOfRange`], [`semfm_geom::Error::Cancelled`].
+    pub fn find(&self, weights: &[f64], task: &Task) -> Result<Grasps> {
+        let Self { object, gripper, scene, settings, .. } = self;
+        Ok(find_grasps(object, weights, gripper, scene, settings, task)?)
+    }
+
+    /// What was found, with the object, the gripper and the camera that it refers to.
+    pub fn result<'a>(&'a self, found: &'a Grasps) -> GraspResult<'a> {
+        GraspResult {
+            mesh: &self.mesh,
+            object_scale: self.object_scale,
+            camera_from_object: self.camera_from_object,
+            gripper: &self.gripper,
+            found,
+        }
+    }
+
+    /// The object in metres, for pictures.
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::NotFinite`] where a coordinate leaves the range of numbers.
+    pub fn mesh_in_metres(&self) -> Result<Mesh> {
+        let vertices = self.mesh.vertices().iter().map(|&p| p * self.object_scale).collect();
+        Ok(Mesh::new(vertices, self.mesh.faces().to_vec())?)
+    }
+
+    /// The gripper.
+    pub fn gripper(&self) -> &Gripper {
+        &self.gripper
+    }
+
+    /// The settings of the search, directions in the object's frame.
+    pub fn settings(&self) -> &GraspSettings {
+        &self.settings
+    }
+}
