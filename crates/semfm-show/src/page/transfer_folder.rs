@@ -14,7 +14,7 @@ use super::grasps::grasps_group;
 use super::group::{
     Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors, mesh_note,
 };
-use crate::{Error, Result};
+use crate::Result;
 use crate::colors::anchor_color;
 use crate::pictures::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
 
