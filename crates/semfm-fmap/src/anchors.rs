@@ -17,7 +17,7 @@ pub struct Anchor {
     /// Cosine of the two mean embeddings.
     pub cosine: f64,
     /// How much the cosine exceeds the best rival in its row or column: negative where the
-    /// assignment took a pair that is not its parts' favourite, infinite without a rival.
+    /// assignment took a pair whose parts are nearer to others, infinite without a rival.
     #[serde(serialize_with = "finite_or_null", deserialize_with = "null_as_infinity")]
     pub margin: f64,
 }

@@ -30,7 +30,7 @@ pub fn best_pairs(gain: MatRef<'_, f64>, count: usize) -> Vec<Assigned> {
         }
     }
     let n = rows + columns - count;
-    // Dearer than any number of real pairs can repay.
+    // More than any number of real pairs can gain.
     let forbidden = (high - low + 1.0) * (n + 1) as f64;
     let column_of = Padded { gain, high, forbidden }.assign(n);
     let assigned = (0..rows).map(|row| Assigned { row, column: column_of[row] });

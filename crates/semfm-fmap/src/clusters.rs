@@ -27,7 +27,7 @@ impl Default for ClusterSettings {
     }
 }
 
-/// A cloud cut into parts: one label in `0..n_clusters` per point, every label borne by somebody.
+/// A cloud cut into parts: one label in `0..n_clusters` per point, each label on some point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Clusters {
     labels: Vec<u32>,
@@ -40,8 +40,8 @@ impl Clusters {
         let mut names = labels.to_vec();
         names.sort_unstable();
         names.dedup();
-        let rank = |l: &u32| names.partition_point(|n| n < l) as u32;
-        Self { labels: labels.iter().map(rank).collect(), n_clusters: names.len() }
+        let ranks = labels.iter().map(|l| names.partition_point(|n| n < l) as u32);
+        Self { labels: ranks.collect(), n_clusters: names.len() }
     }
 
     /// Label of each point (M).
@@ -79,7 +79,8 @@ impl Clusters {
 /// spanning tree. A cloud of at most K points has one part per point.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for no clusters or no neighbours, whatever the eigensolver reports.
+/// [`Error::OutOfRange`] for no clusters or no neighbours, [`Error::Geom`] where the eigensolver
+/// fails or on cancellation.
 pub fn spectral_clusters(
     cloud: &SemanticCloud,
     settings: &ClusterSettings,
@@ -93,11 +94,10 @@ pub fn spectral_clusters(
     if n <= k {
         return Ok(Clusters { labels: (0..n as u32).collect(), n_clusters: n });
     }
-    let square = |i: usize, j: usize| -> f64 {
+    let graph = NeighbourGraph::new(cloud.points(), settings.neighbours, |i, j| {
         let pairs = cloud.feature(i).iter().zip(cloud.feature(j));
         pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
-    };
-    let graph = NeighbourGraph::new(cloud.points(), settings.neighbours, square)?;
+    })?;
     // D − W as stiffness and the degrees D as mass: their eigenproblem is that of the normalised cut.
     let (stiffness, mass) = graph.laplacian(1.0)?;
     let laplacian = Laplacian { stiffness, mass };
@@ -115,17 +115,15 @@ mod tests {
 
     /// A strip of points along x in three equal thirds with features of their own; `gap` tears it.
     fn strip(n: usize, gap: f64) -> SemanticCloud {
-        let third = |i: usize| 3 * i / n;
         let points = (0..n)
-            .map(|i| DVec3::new(i as f64 + gap * third(i) as f64, (i % 7) as f64, 0.0))
+            .map(|i| DVec3::new(i as f64 + gap * (3 * i / n) as f64, (i % 7) as f64, 0.0))
             .collect();
-        let wobble = |i: usize, c: usize| 0.02 * ((i * 7 + c * 13) as f32).sin();
-        let features = (0..n)
-            .flat_map(|i| {
-                (0..4).map(move |c| (if third(i) == c { 1.0 } else { 0.0 }) + wobble(i, c))
-            })
-            .collect();
-        SemanticCloud::new(points, features, 4, vec![1; n]).unwrap()
+        let features = (0..4 * n).map(|at| {
+            let (i, c) = (at / 4, at % 4);
+            let noise = 0.02 * ((i * 7 + c * 13) as f32).sin();
+            (if 3 * i / n == c { 1.0 } else { 0.0 }) + noise
+        });
+        SemanticCloud::new(points, features.collect(), 4, vec![1; n]).unwrap()
     }
 
     #[test]

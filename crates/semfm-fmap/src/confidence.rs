@@ -113,9 +113,10 @@ fn logistic(x: f64) -> f64 {
 
 /// Area of the ambiguous votes over that of the votes that count.
 fn ambiguity(votes: &[f64], areas: &[f64]) -> f64 {
-    let weighted = || votes.iter().zip(areas);
-    let found: f64 = weighted().filter(|(v, _)| **v >= Region::COUNTS).map(|(_, a)| a).sum();
-    let ambiguous: f64 = weighted().filter(|(v, _)| AMBIGUOUS.contains(*v)).map(|(_, a)| a).sum();
+    let weighted = votes.iter().zip(areas);
+    let counted = weighted.clone().filter(|(v, _)| **v >= Region::COUNTS);
+    let found: f64 = counted.map(|(_, a)| a).sum();
+    let ambiguous: f64 = weighted.filter(|(v, _)| AMBIGUOUS.contains(*v)).map(|(_, a)| a).sum();
     if found > 0.0 { (ambiguous / found).min(MOST_AMBIGUITY) } else { MOST_AMBIGUITY }
 }
 
@@ -157,6 +158,7 @@ fn square(a: RowRef<'_, f64>, b: RowRef<'_, f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::mat;
 
     #[test]
     fn verdicts_follow_the_bands() {
@@ -185,9 +187,10 @@ mod tests {
 
     #[test]
     fn the_margin_is_for_points_that_resemble_the_region_and_against_the_rest() {
-        let column = |values: &[f64]| faer::Mat::from_fn(values.len(), 1, |i, _| values[i]);
-        let joint =
-            JointFeatures { source: column(&[0.0, 0.1, 1.0, 1.1]), target: column(&[0.05, 1.05]) };
+        let joint = JointFeatures {
+            source: mat![[0.0], [0.1], [1.0], [1.1]],
+            target: mat![[0.05], [1.05]],
+        };
         let (region, masses) = ([true, true, false, false], [0.5; 2]);
         assert!(margin(&joint, &region, &[true, false], &masses) > 0.9);
         assert!(margin(&joint, &region, &[false, true], &masses) < -0.9);

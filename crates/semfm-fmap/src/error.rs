@@ -7,7 +7,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The ground floor refused: a mesh, an eigenbasis, a cancelled task.
+    /// An error of `semfm-geom`: a mesh, an eigenbasis, a cancelled task.
     #[error(transparent)]
     Geom(#[from] semfm_geom::Error),
     /// Two arrays that belong together differ in length.
@@ -30,20 +30,20 @@ pub enum Error {
         /// What was given.
         found: String,
     },
-    /// A region without a vertex cannot be carried anywhere.
+    /// A region without a vertex cannot be transferred.
     #[error("the region is empty: none of {n_vertices} vertices has a weight of at least 0.5")]
     EmptyRegion {
         /// Vertices of the mesh it belongs to.
         n_vertices: usize,
     },
     /// A map of this size needs more eigenpairs than the shape's basis holds.
-    #[error("{what} asks for {asked} eigenpairs, but the basis of the {side} holds {available}")]
+    #[error("{what} needs {asked} eigenpairs, but the basis of the {side} holds {available}")]
     BasisTooSmall {
         /// Which step.
         what: &'static str,
         /// `source` or `target`.
         side: &'static str,
-        /// Eigenpairs asked.
+        /// Eigenpairs needed.
         asked: usize,
         /// Eigenpairs there are.
         available: usize,

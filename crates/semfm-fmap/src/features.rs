@@ -91,19 +91,8 @@ impl JointFeatures {
         both.as_mut().subcols_mut(0, r_source).copy_from(&source.directions);
         both.as_mut().subcols_mut(r_source, r_target).copy_from(&target.directions);
         let directions = unit_directions(&both, dims)?;
-        let project = |columns: &Mat<f32>| {
-            let mut rows = Mat::<f32>::zeros(columns.ncols(), directions.ncols());
-            matmul(
-                rows.as_mut(),
-                Accum::Replace,
-                columns.transpose(),
-                directions.as_ref(),
-                1.0,
-                Par::Seq,
-            );
-            Mat::from_fn(rows.nrows(), rows.ncols(), |i, j| f64::from(rows[(i, j)]))
-        };
-        let (mut on_source, mut on_target) = (project(&source.columns), project(&target.columns));
+        let mut on_source = project(&source.columns, &directions);
+        let mut on_target = project(&target.columns, &directions);
         let rows = (on_source.nrows() + on_target.nrows()) as f64;
         let rms = ((on_source.squared_norm_l2() + on_target.squared_norm_l2()) / rows).sqrt();
         if rms > 0.0 {
@@ -112,6 +101,14 @@ impl JointFeatures {
         }
         Ok(Self { source: on_source, target: on_target })
     }
+}
+
+/// Xᵀ D (M × dims): the columns of X (d × M) in the directions of the columns of D (d × dims).
+fn project(columns: &Mat<f32>, directions: &Mat<f32>) -> Mat<f64> {
+    let mut rows = Mat::<f32>::zeros(columns.ncols(), directions.ncols());
+    let (points, directions) = (columns.transpose(), directions.as_ref());
+    matmul(rows.as_mut(), Accum::Replace, points, directions, 1.0, Par::Seq);
+    Mat::from_fn(rows.nrows(), rows.ncols(), |i, j| f64::from(rows[(i, j)]))
 }
 
 /// The strongest directions of the columns, scaled by their strength (d × at most [`KEPT`]).
@@ -192,7 +189,7 @@ mod tests {
     use super::*;
     use semfm_geom::math::DVec3;
 
-    /// M points whose features live on `rank` directions of falling strength in d dimensions.
+    /// M points whose features span `rank` directions of falling strength in d dimensions.
     fn cloud(m: usize, d: usize, rank: usize, seed: u64) -> SemanticCloud {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut shared = ChaCha8Rng::seed_from_u64(99);

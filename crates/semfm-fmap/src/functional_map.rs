@@ -65,19 +65,19 @@ impl FunctionalMap {
         self.matrix.nrows()
     }
 
-    /// Where the source's delta functions come to stand: Φ_source Cᵀ (n_source × k_target), to be
+    /// The images of the source's delta functions: Φ_source Cᵀ (n_source × k_target), to be
     /// compared with the rows of Φ_target.
-    pub(crate) fn carried_deltas(&self, source: MatRef<'_, f64>) -> Mat<f64> {
-        let mut carried = Mat::zeros(source.nrows(), self.k_target());
-        matmul(carried.as_mut(), Accum::Replace, source, self.matrix.transpose(), 1.0, Par::Seq);
-        carried
+    pub(crate) fn mapped_deltas(&self, source: MatRef<'_, f64>) -> Mat<f64> {
+        let mut mapped = Mat::zeros(source.nrows(), self.k_target());
+        matmul(mapped.as_mut(), Accum::Replace, source, self.matrix.transpose(), 1.0, Par::Seq);
+        mapped
     }
 
     /// source_of\[j\] = argminᵢ ‖Φ_target\[j\] − (Φ_source Cᵀ)\[i\]‖: the delta functions of the
     /// source are sent through C and each target vertex takes the nearest.
     pub fn point_map(&self, source: &Eigenbasis, target: &Eigenbasis) -> PointMap {
-        let carried = self.carried_deltas(source.first(self.k_source()));
-        PointMap { source_of: nearest_rows(target.first(self.k_target()), carried.as_ref()) }
+        let mapped = self.mapped_deltas(source.first(self.k_source()));
+        PointMap { source_of: nearest_rows(target.first(self.k_target()), mapped.as_ref()) }
     }
 
     /// The adjoint reading, argminᵢ ‖(Φ_target C)\[j\] − Φ_source\[i\]‖: the target's delta functions

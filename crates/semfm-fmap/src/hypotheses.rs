@@ -45,7 +45,7 @@ struct Component {
 
 /// The components of a vote, as up to `count` alternatives by falling probability.
 ///
-/// Which of two handles of a pair of scissors was meant cannot be told from semantics and intrinsic
+/// Which of two handles of a pair of scissors was meant does not follow from semantics and intrinsic
 /// geometry, so the vote spreads over both. `votes` (n, in [0, 1], [`Region::COUNTS`] the threshold)
 /// is cut where it falls below half the threshold; each connected component with at least a tenth
 /// of all votes (by area) is a hypothesis: its vertices that reach half of the component's own peak.
@@ -155,8 +155,9 @@ mod tests {
     fn components_are_counted_by_area() {
         let mesh = strip();
         let areas = mesh.vertex_areas();
-        let inside = |keep: fn(usize) -> bool| (0..22).map(|v| keep(v / 2)).collect::<Vec<bool>>();
-        assert!(is_connected(&mesh, &inside(|i| i < 4), &areas));
-        assert!(!is_connected(&mesh, &inside(|i| !(3..8).contains(&i)), &areas));
+        let one: Vec<bool> = (0..22).map(|v| v / 2 < 4).collect();
+        let two: Vec<bool> = (0..22).map(|v| !(3..8).contains(&(v / 2))).collect();
+        assert!(is_connected(&mesh, &one, &areas));
+        assert!(!is_connected(&mesh, &two, &areas));
     }
 }

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Lloyd iterations per start; clusters of a thousand points settle within twenty.
+/// Lloyd iterations per start; clusters of a thousand points are stationary within twenty.
 const ITERATIONS: usize = 300;
 
 /// Labels (n) of `points` (n rows of length `dim`, row-major) in at most `k` clusters: the best of
@@ -14,8 +14,8 @@ pub(crate) fn k_means(points: &[f64], dim: usize, k: usize, starts: usize, seed:
         let centres = plus_plus(points, dim, k, &mut rng);
         lloyd(points, dim, centres)
     });
-    let best = runs.min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, labels)| labels).unwrap_or_default()
+    let best = runs.min_by(|a, b| a.inertia.total_cmp(&b.inertia));
+    best.map(|best| best.labels).unwrap_or_default()
 }
 
 /// Seeds drawn in proportion to the squared distance from those before; of a few trials each, the
@@ -23,37 +23,60 @@ pub(crate) fn k_means(points: &[f64], dim: usize, k: usize, starts: usize, seed:
 fn plus_plus(points: &[f64], dim: usize, k: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = points.len() / dim;
     let trials = 2 + (k as f64).ln() as usize;
-    let row = |i: usize| &points[i * dim..][..dim];
-    let first = rng.random_range(0..n);
-    let mut centres = row(first).to_vec();
-    let mut left: Vec<f64> = (0..n).map(|i| squared(row(i), row(first))).collect();
+    let first = row(points, dim, rng.random_range(0..n));
+    let mut centres = first.to_vec();
+    let mut left: Vec<f64> = points.chunks(dim).map(|p| squared(p, first)).collect();
     for _ in 1..k {
         let total: f64 = left.iter().sum();
-        let draw = |rng: &mut ChaCha8Rng| {
-            let mut pick = rng.random::<f64>() * total;
-            left.iter()
-                .position(|&d| {
-                    pick -= d;
-                    pick < 0.0
-                })
-                .unwrap_or(n - 1)
-        };
-        let candidates: Vec<usize> = (0..trials).map(|_| draw(rng)).collect();
-        let remainders = candidates.iter().map(|&c| -> (usize, Vec<f64>) {
-            (c, left.iter().enumerate().map(|(i, &d)| d.min(squared(row(i), row(c)))).collect())
-        });
-        let sum = |r: &(usize, Vec<f64>)| r.1.iter().sum::<f64>();
-        let Some((chosen, remainder)) = remainders.min_by(|a, b| sum(a).total_cmp(&sum(b))) else {
-            break;
-        };
-        centres.extend_from_slice(row(chosen));
-        left = remainder;
+        let candidates: Vec<usize> = (0..trials).map(|_| draw(&left, total, rng)).collect();
+        let trials = candidates.iter().map(|&c| Trial::new(points, dim, &left, c));
+        let Some(best) = trials.min_by(|a, b| a.inertia.total_cmp(&b.inertia)) else { break };
+        centres.extend_from_slice(row(points, dim, best.centre));
+        left = best.left;
     }
     centres
 }
 
-/// Inertia and labels at the fixed point reached from `centres`.
-fn lloyd(points: &[f64], dim: usize, mut centres: Vec<f64>) -> (f64, Vec<u32>) {
+fn row(points: &[f64], dim: usize, i: usize) -> &[f64] {
+    &points[i * dim..][..dim]
+}
+
+/// An index in proportion to its weight; the weights sum to `total`.
+fn draw(weights: &[f64], total: f64, rng: &mut ChaCha8Rng) -> usize {
+    let mut pick = rng.random::<f64>() * total;
+    let drawn = weights.iter().position(|&weight| {
+        pick -= weight;
+        pick < 0.0
+    });
+    drawn.unwrap_or(weights.len() - 1)
+}
+
+/// One more centre and what it would leave.
+struct Trial {
+    centre: usize,
+    /// Squared distance of each point to its nearest centre.
+    left: Vec<f64>,
+    inertia: f64,
+}
+
+impl Trial {
+    fn new(points: &[f64], dim: usize, left: &[f64], centre: usize) -> Self {
+        let at = row(points, dim, centre);
+        let pairs = left.iter().zip(points.chunks(dim));
+        let left: Vec<f64> = pairs.map(|(&d, p)| d.min(squared(p, at))).collect();
+        Self { centre, inertia: left.iter().sum(), left }
+    }
+}
+
+/// A fixed point of Lloyd's iteration.
+struct Clustering {
+    /// Sum of squared distances to the nearest centres.
+    inertia: f64,
+    labels: Vec<u32>,
+}
+
+/// The fixed point reached from `centres`.
+fn lloyd(points: &[f64], dim: usize, mut centres: Vec<f64>) -> Clustering {
     let k = centres.len() / dim;
     let mut labels = Vec::new();
     for _ in 0..ITERATIONS {
@@ -75,7 +98,7 @@ fn lloyd(points: &[f64], dim: usize, mut centres: Vec<f64>) -> (f64, Vec<u32>) {
         }
     }
     let inertia = points.chunks(dim).map(|p| nearest(p, &centres, dim).1).sum();
-    (inertia, labels)
+    Clustering { inertia, labels }
 }
 
 fn nearest(point: &[f64], centres: &[f64], dim: usize) -> (u32, f64) {
@@ -98,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_heaps_are_told_apart_whatever_the_seed() {
+    fn three_groups_are_separated_whatever_the_seed() {
         let points: Vec<f64> =
             (0..90).flat_map(|i| [f64::from(i % 3) * 10.0, f64::from(i / 3) * 0.01]).collect();
         for seed in 0..5 {
@@ -110,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn points_on_one_spot_make_one_cluster_and_no_trouble() {
+    fn points_on_one_spot_make_one_cluster_and_no_error() {
         let labels = k_means(&[1.0; 20], 2, 4, 3, 0);
         assert!(labels.iter().all(|&l| l == labels[0]));
     }

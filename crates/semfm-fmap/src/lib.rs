@@ -10,7 +10,7 @@
 //!   vertex does.
 //!
 //! In the order of the data: [`clusters`] cuts a semantic cloud into parts, [`Anchors`] pair the parts
-//! of two objects by an exact [`assignment`], [`descriptors`] turn the pairs into smooth functions,
+//! of two objects by an exact assignment, [`descriptors`] turn the pairs into smooth functions,
 //! [`fit`] finds the C that agrees with them, [`zoomout`] refines it and reads a point map off it.
 //! Two more steps need no anchors: [`features`] puts both clouds into one small space, and
 //! [`transport`] couples them there; [`propagation`] spreads the vote that was transferred along the
@@ -48,7 +48,7 @@
 //! ```
 
 mod anchors;
-pub mod assignment;
+mod assignment;
 pub mod clusters;
 pub mod confidence;
 pub mod descriptors;

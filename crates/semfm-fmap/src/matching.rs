@@ -52,7 +52,7 @@ struct SecondMap {
     matched: Matched,
 }
 
-/// One region on the way: where it lies on the source and what the method says of the target.
+/// One region: where it lies on the source and what the method says of the target.
 struct Voted {
     /// Whether each working vertex of the source (n_source) is inside.
     inside: Vec<bool>,
@@ -250,7 +250,7 @@ impl Matching {
         Evidence::of(&answer, &self.pair.joint)
     }
 
-    /// The votes under the rule that was not asked for, where both maps are at hand (`semfm`).
+    /// The votes under the other rule, where both maps are at hand (`semfm`).
     fn other_rule(&self, inside: &[bool]) -> Result<Option<Vec<f64>>> {
         if self.settings.method != Method::Semfm {
             return Ok(None);

@@ -58,26 +58,26 @@ pub fn geodesic_error(
 /// How far the paper's f(k₁) ≈ k₂ holds for one anchor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnchorError {
-    /// Share (by area) of the carried source anchor that lies in its partner; 0 where nothing of it
-    /// was carried.
+    /// Share (by area) of the mapped source anchor that lies in its partner; 0 where nothing of it
+    /// arrives.
     pub landed: f64,
-    /// Mean distance of the carried anchor to its partner, 0 inside, in √area; `None` where nothing
-    /// was carried or there is no partner.
+    /// Mean distance of the mapped anchor to its partner, 0 inside, in √area; `None` where nothing
+    /// arrives or there is no partner.
     pub mean_distance: Option<f64>,
 }
 
-/// Anchor error of a point map. `carried` and `partner` say for each target vertex whether it is
+/// Anchor error of a point map. `mapped` and `partner` say for each target vertex whether it is
 /// matched to the source anchor and whether it is in the target's; `distance_to_partner(j)` is in
 /// the units of `unit`.
 pub fn anchor_error(
-    carried: &[bool],
+    mapped: &[bool],
     partner: &[bool],
     areas: &[f64],
     distance_to_partner: impl Fn(usize) -> f64,
     unit: f64,
 ) -> AnchorError {
     let (mut all, mut inside, mut distance) = (0.0, 0.0, 0.0);
-    for j in (0..carried.len()).filter(|&j| carried[j]) {
+    for j in (0..mapped.len()).filter(|&j| mapped[j]) {
         all += areas[j];
         if partner[j] {
             inside += areas[j];
@@ -96,20 +96,23 @@ pub fn anchor_error(
 /// (Pinkall & Polthier 1993): small where neighbours are sent to neighbours. Degenerate triangles
 /// are left out. Free of scale in the mesh; quadratic in the scale of `values`.
 pub fn dirichlet_energy(mesh: &Mesh, values: &[DVec3]) -> f64 {
-    let energy = |face: usize| {
-        let corners = mesh.corners(face);
-        let double_area = mesh.face_normal_scaled(face).length();
-        let ids = mesh.faces()[face];
-        let sum: f64 = (0..3)
-            .map(|k| {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                let cosine = (corners[i] - corners[k]).dot(corners[j] - corners[k]);
-                cosine * values[ids[i] as usize].distance_squared(values[ids[j] as usize])
-            })
-            .sum();
-        if double_area > 0.0 { 0.25 * sum / double_area } else { 0.0 }
-    };
-    (0..mesh.n_faces()).map(energy).sum()
+    (0..mesh.n_faces()).map(|face| energy_of_face(mesh, values, face)).sum()
+}
+
+/// ¼ Σ_k cot αₖ ‖fᵢ − fⱼ‖² with i, j the ends of the side opposite to corner k, and cot αₖ =
+/// (pᵢ − pₖ)·(pⱼ − pₖ) / (2 area)
+fn energy_of_face(mesh: &Mesh, values: &[DVec3], face: usize) -> f64 {
+    let corners = mesh.corners(face);
+    let double_area = mesh.face_normal_scaled(face).length();
+    let ids = mesh.faces()[face];
+    let sum: f64 = (0..3)
+        .map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let cosine = (corners[i] - corners[k]).dot(corners[j] - corners[k]);
+            cosine * values[ids[i] as usize].distance_squared(values[ids[j] as usize])
+        })
+        .sum();
+    if double_area > 0.0 { 0.25 * sum / double_area } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -118,28 +121,26 @@ mod tests {
 
     #[test]
     fn overlap_counts_vertices_or_areas() {
-        let region = |ids: &[u32]| Region::from_vertices(4, ids).unwrap();
-        assert_eq!(iou(&region(&[0, 1]), &region(&[1, 2])).unwrap(), 1.0 / 3.0);
-        assert_eq!(
-            area_iou(&region(&[0, 1]), &region(&[1, 2]), &[1.0, 2.0, 1.0, 9.0]).unwrap(),
-            0.5
-        );
-        assert_eq!(iou(&region(&[]), &region(&[])).unwrap(), 0.0);
-        assert!(iou(&region(&[]), &Region::from_vertices(5, &[]).unwrap()).is_err());
+        let [found, truth, none] =
+            [&[0, 1][..], &[1, 2], &[]].map(|ids| Region::from_vertices(4, ids).unwrap());
+        assert_eq!(iou(&found, &truth).unwrap(), 1.0 / 3.0);
+        assert_eq!(area_iou(&found, &truth, &[1.0, 2.0, 1.0, 9.0]).unwrap(), 0.5);
+        assert_eq!(iou(&none, &none).unwrap(), 0.0);
+        assert!(iou(&none, &Region::from_vertices(5, &[]).unwrap()).is_err());
     }
 
     #[test]
     fn geodesic_error_is_in_hundredths_of_the_side() {
         let (found, truth) =
             (PointMap { source_of: vec![0, 3] }, PointMap { source_of: vec![0, 1] });
-        let along = |a: u32, b: u32| f64::from(a.abs_diff(b)) * 0.1;
-        assert!((geodesic_error(&found, &truth, along, 4.0).unwrap() - 5.0).abs() < 1e-12);
+        let error = geodesic_error(&found, &truth, |a, b| f64::from(a.abs_diff(b)) * 0.1, 4.0);
+        assert!((error.unwrap() - 5.0).abs() < 1e-12);
     }
 
     #[test]
     fn an_anchor_that_half_lands_says_so() {
-        let (carried, partner) = ([true, true, false, false], [false, true, true, false]);
-        let error = anchor_error(&carried, &partner, &[1.0; 4], |_| 0.6, 2.0);
+        let (mapped, partner) = ([true, true, false, false], [false, true, true, false]);
+        let error = anchor_error(&mapped, &partner, &[1.0; 4], |_| 0.6, 2.0);
         assert!((error.landed - 0.5).abs() < 1e-12);
         assert!((error.mean_distance.unwrap() - 0.15).abs() < 1e-12);
         let nothing = anchor_error(&[false; 4], &partner, &[1.0; 4], |_| 0.6, 2.0);

@@ -56,11 +56,11 @@ fn nearer(a: &(f64, u32), b: &(f64, u32)) -> std::cmp::Ordering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::mat;
 
     #[test]
     fn neighbours_come_by_distance_and_their_votes_are_means() {
-        let column = |values: &[f64]| Mat::from_fn(values.len(), 1, |i, _| values[i]);
-        let (queries, points) = (column(&[0.1, 2.2]), column(&[2.0, 0.0, 1.0, 0.0]));
+        let (queries, points) = (mat![[0.1], [2.2]], mat![[2.0], [0.0], [1.0], [0.0]]);
         let found = NearestPoints::new(&queries, &points, 3);
         assert_eq!(found.ids, [[1, 3, 2], [0, 2, 1]]);
         assert_eq!(found.nearest(), [1, 0]);

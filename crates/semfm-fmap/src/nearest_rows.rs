@@ -79,12 +79,12 @@ impl<'a> Rows<'a> {
         let n_blocks = self.len().div_ceil(QUERY_BLOCK).next_multiple_of(2);
         let size = self.len().div_ceil(n_blocks).max(1);
         let starts: Vec<usize> = (0..self.len()).step_by(size).collect();
-        let room = || Mat::<f32>::zeros(POINT_BLOCK.min(points.len()), size);
         let found: Vec<Vec<u32>> = starts
             .par_iter()
-            .map_init(room, |scores, &start| {
-                search.block(start, size.min(self.len() - start), scores)
-            })
+            .map_init(
+                || Mat::<f32>::zeros(POINT_BLOCK.min(points.len()), size),
+                |scores, &start| search.block(start, size.min(self.len() - start), scores),
+            )
             .collect();
         found.concat()
     }
@@ -106,10 +106,10 @@ impl<'a> Search<'a> {
     fn new(queries: &'a Rows<'a>, points: &'a Rows<'a>) -> Self {
         let k = points.columns.len();
         // Any shift will do, so the mean is taken over all rows, chosen or not.
-        let mean = |(column, scale): &(Cow<'_, [f64]>, f64)| {
-            scale * column.iter().sum::<f64>() / column.len() as f64
-        };
-        let mean: Vec<f64> = points.columns.iter().map(mean).collect();
+        let columns = points.columns.iter();
+        let mean: Vec<f64> = columns
+            .map(|(column, scale)| scale * column.iter().sum::<f64>() / column.len() as f64)
+            .collect();
         let mut longest = 0.0f32;
         let mut points32 = centred(points, &mean);
         for i in 0..points.len() {
@@ -127,7 +127,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Answers for `n` queries from `start`; `scores` is room for a block of products.
+    /// Answers for `n` queries from `start`; `scores` takes a block of products.
     fn block(&self, start: usize, n: usize, scores: &mut Mat<f32>) -> Vec<u32> {
         let k = self.points32.nrows();
         let queries = self.queries32.as_ref().subcols(start, n);
@@ -270,9 +270,9 @@ mod tests {
         let (queries, points) = (random(300, 7, 1), random(2500, 7, 2));
         let found = nearest_rows(queries.as_ref(), points.as_ref());
         for (q, &answer) in found.iter().enumerate() {
-            let distance = |p: usize| (queries.row(q) - points.row(p)).squared_norm_l2();
-            let nearest = (0..2500).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap();
-            assert_eq!(answer as usize, nearest);
+            let distances = (0..2500).map(|p| (queries.row(q) - points.row(p)).squared_norm_l2());
+            let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+            assert_eq!(answer as usize, nearest.0);
         }
     }
 

@@ -1,6 +1,6 @@
 //! The surface as a graph: points of a cloud, joined to their nearest, weighted by likeness.
 //!
-//! Two steps walk on it: spectral clustering cuts it into parts (section IV-D of the paper), and
+//! Two steps use it: spectral clustering cuts it into parts (section IV-D of the paper), and
 //! [`propagation`](crate::propagation) spreads a vote along it.
 
 use faer::sparse::{SparseColMat, Triplet};
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 /// to). Beside the typical e⁻¹ a thousandth cuts as well.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// A connected graph of nearest neighbours in space that knows how much the ends of each edge differ.
+/// A connected graph of nearest neighbours in space with how much the ends of each edge differ.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourGraph {
     n: usize,
@@ -122,9 +122,10 @@ mod tests {
 
     #[test]
     fn neighbour_graphs_are_connected_even_when_the_cloud_is_not() {
-        let far = |i: u32| if i < 20 { 0.0 } else { 1000.0 };
-        let points: Vec<DVec3> =
-            (0..60).map(|i| DVec3::new(f64::from(i) + far(i), f64::from(i % 7), 0.0)).collect();
+        let points: Vec<DVec3> = (0..60)
+            .map(|i| DVec3::new(f64::from(i), f64::from(i % 7), 0.0))
+            .map(|p| if p.x < 20.0 { p } else { p + 1000.0 * DVec3::X })
+            .collect();
         let edges = neighbour_edges(&points, 4).unwrap();
         let mut pieces = UnionFind::new(60);
         edges.iter().for_each(|&(i, j)| {
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_laplacian_knows_constants_and_one_point_is_a_graph() {
+    fn the_laplacian_of_a_constant_is_zero_and_one_point_is_a_graph() {
         let points: Vec<DVec3> = (0..9).map(|i| DVec3::X * f64::from(i)).collect();
         let graph = NeighbourGraph::new(&points, 2, |i, j| (i as f64 - j as f64).powi(2)).unwrap();
         let (stiffness, degrees) = graph.laplacian(0.5).unwrap();

@@ -1,5 +1,7 @@
 //! One source vertex for each target vertex.
 
+use std::borrow::Cow;
+
 use faer::{Mat, MatRef};
 use semfm_geom::{Eigenbasis, Shape};
 
@@ -7,7 +9,7 @@ use crate::{Error, Result};
 
 /// A map target → source: `source_of[j]` is the source vertex matched to target vertex `j`.
 ///
-/// Functions and regions therefore travel source → target, by being looked up.
+/// Functions and regions therefore go source → target, by being looked up.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PointMap {
     /// Source vertex per target vertex (n_target).
@@ -47,8 +49,8 @@ impl PointMap {
     /// The same map between the original meshes, from one between the working meshes.
     pub fn onto_originals(&self, source: &Shape, target: &Shape) -> Self {
         let (source, target) = (source.working(), target.working());
-        let carry = |&j: &u32| source.to_original[self.source_of[j as usize] as usize];
-        Self { source_of: target.of_original.iter().map(carry).collect() }
+        let working = target.of_original.iter().map(|&j| self.source_of[j as usize]);
+        Self { source_of: working.map(|i| source.to_original[i as usize]).collect() }
     }
 }
 
@@ -57,12 +59,13 @@ pub(crate) fn rows_of(matrix: MatRef<'_, f64>, ids: &[u32]) -> Mat<f64> {
     let mut out = Mat::zeros(ids.len(), matrix.ncols());
     for c in 0..matrix.ncols() {
         let column = matrix.col(c);
-        let fill = |column: &[f64], out: &mut [f64]| {
-            out.iter_mut().zip(ids).for_each(|(x, &i)| *x = column[i as usize]);
+        // Whole columns are read: out of a strided one that would cost an address each.
+        let column = match column.try_as_col_major() {
+            Some(column) => Cow::Borrowed(column.as_slice()),
+            None => Cow::Owned(column.iter().copied().collect::<Vec<f64>>()),
         };
-        match column.try_as_col_major() {
-            Some(column) => fill(column.as_slice(), out.col_as_slice_mut(c)),
-            None => fill(&column.iter().copied().collect::<Vec<_>>(), out.col_as_slice_mut(c)),
+        for (x, &i) in out.col_as_slice_mut(c).iter_mut().zip(ids) {
+            *x = column[i as usize];
         }
     }
     out

@@ -193,14 +193,15 @@ impl PreparedObject {
         &self.derived.features
     }
 
-    /// The cloud as a graph whose edges know how much the features of their ends differ.
+    /// The cloud as a graph with how much the features of the ends of each edge differ.
     pub(crate) fn graph(&self) -> Result<&NeighbourGraph> {
         if let Some(graph) = self.derived.graph.get() {
             return Ok(graph);
         }
         let features = self.features();
-        let square = |i, j| features.squared_distance(i, j);
-        let graph = NeighbourGraph::new(self.cloud().points(), GRAPH_NEIGHBOURS, square)?;
+        let graph = NeighbourGraph::new(self.cloud().points(), GRAPH_NEIGHBOURS, |i, j| {
+            features.squared_distance(i, j)
+        })?;
         Ok(self.derived.graph.get_or_init(|| graph))
     }
 
@@ -288,10 +289,11 @@ impl VertexMix {
         let count = rows[0].len(); // a mesh has a vertex and a cloud a point
         let mut mix = Self { count, points: Vec::new(), weights: Vec::new() };
         for row in rows {
-            let weight = |d: f64| (d / unit + MIX_REACH).powi(-2);
-            let total: f64 = row.iter().map(|hit| weight(hit.1)).sum();
+            let weights: Vec<f64> =
+                row.iter().map(|hit| (hit.1 / unit + MIX_REACH).powi(-2)).collect();
+            let total: f64 = weights.iter().sum();
             mix.points.extend(row.iter().map(|hit| hit.0 as u32));
-            mix.weights.extend(row.iter().map(|hit| weight(hit.1) / total));
+            mix.weights.extend(weights.iter().map(|weight| weight / total));
         }
         mix
     }

@@ -1,7 +1,7 @@
 //! A vote, spread along the target's own surface up to where its features change.
 //!
-//! A map carries the share of a region well and its outline badly: a grip that is 65 % of one tool
-//! arrives as 65 % of the next, whatever that one's handle measures. The target's own features know
+//! A map transfers the share of a region well and its outline badly: a grip that is 65 % of one tool
+//! arrives as 65 % of the next, whatever that one's handle measures. The target's own features show
 //! where its parts end, and between two points of one object there is no gap between domains. So
 //! the vote s (one value per cloud point) is replaced by the x that stays close to it and changes
 //! only where the features do:
@@ -61,9 +61,12 @@ pub(crate) fn propagate(
     let mean_mass = masses.iter().sum::<f64>() / masses.len() as f64;
     let voted: f64 = masses.iter().zip(votes).map(|(m, s)| m * s).sum();
     let share = (voted / (mean_mass * masses.len() as f64)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
-    let balance = |s: f64| (s / share + (1.0 - s) / (1.0 - share)) / 2.0;
-    let ties: Vec<f64> =
-        masses.iter().zip(votes).map(|(m, &s)| m / mean_mass * balance(s)).collect();
+    // cᵢ = mᵢ (sᵢ/π + (1 − sᵢ)/(1 − π))/2
+    let ties: Vec<f64> = masses
+        .iter()
+        .zip(votes)
+        .map(|(m, &s)| m / mean_mass * ((s / share + (1.0 - s) / (1.0 - share)) / 2.0))
+        .collect();
     let (mut system, _) = graph.laplacian(settings.contrast)?;
     let (pattern, values) = system.parts_mut();
     let weight = settings.weight * masses.len() as f64;
@@ -87,8 +90,10 @@ mod tests {
     fn strip(edge: usize) -> NeighbourGraph {
         let points: Vec<DVec3> =
             (0..300).map(|i| DVec3::new(f64::from(i / 3), f64::from(i % 3), 0.0)).collect();
-        let feature = |i: usize| f64::from(u8::from(i / 3 >= edge)) + 0.1 * (i as f64 * 7.0).sin();
-        NeighbourGraph::new(&points, 8, |i, j| (feature(i) - feature(j)).powi(2)).unwrap()
+        let features: Vec<f64> = (0..300)
+            .map(|i| f64::from(u8::from(i / 3 >= edge)) + 0.1 * (i as f64 * 7.0).sin())
+            .collect();
+        NeighbourGraph::new(&points, 8, |i, j| (features[i] - features[j]).powi(2)).unwrap()
     }
 
     fn votes(until: usize) -> Vec<f64> {

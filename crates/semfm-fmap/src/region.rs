@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_two_doors_agree_and_refuse_what_is_no_region() {
+    fn constructors_agree_and_refuse_what_is_no_region() {
         let by_id = Region::from_vertices(4, &[2, 2, 0]).unwrap();
         assert_eq!(by_id, Region::from_weights(vec![1.0, 0.0, 1.0, 0.0]).unwrap());
         assert_eq!(by_id, Region::from_mask(&by_id.mask()));

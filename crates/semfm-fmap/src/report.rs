@@ -1,4 +1,4 @@
-//! How an answer came about, for people and for files.
+//! How an answer came about.
 
 use semfm_geom::math::DVec3;
 use semfm_geom::{PointIndex, Shape};
@@ -52,7 +52,7 @@ pub struct TransportReport {
     pub log_domain: bool,
 }
 
-/// The answer under the other rule, beside the one that was asked for.
+/// The answer under the other rule, beside the chosen one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OtherRule {
     /// Which rule that is.

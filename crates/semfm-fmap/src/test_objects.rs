@@ -1,5 +1,7 @@
 //! Small objects that the unit tests share.
 
+use std::collections::BTreeMap;
+
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings, Task};
 
@@ -18,15 +20,10 @@ pub(crate) fn blob(stretch: f64) -> Mesh {
         [0, 3, 5],
     ];
     for _ in 0..3 {
-        let mut middles = std::collections::BTreeMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                vertices.push((vertices[a as usize] + vertices[b as usize]).normalize());
-                vertices.len() as u32 - 1
-            })
-        };
+        let mut middles = BTreeMap::new();
         let cut = faces.iter().flat_map(|&[a, b, c]| {
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            let [ab, bc, ca] =
+                [[a, b], [b, c], [c, a]].map(|edge| middle(edge, &mut middles, &mut vertices));
             [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
         });
         faces = cut.collect();
@@ -39,6 +36,18 @@ pub(crate) fn blob(stretch: f64) -> Mesh {
     Mesh::new(vertices, faces).unwrap()
 }
 
+/// The vertex in the middle of an edge, put on the sphere when first asked for.
+fn middle(
+    [a, b]: [u32; 2],
+    middles: &mut BTreeMap<[u32; 2], u32>,
+    vertices: &mut Vec<DVec3>,
+) -> u32 {
+    *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+        vertices.push((vertices[a as usize] + vertices[b as usize]).normalize());
+        vertices.len() as u32 - 1
+    })
+}
+
 pub(crate) fn shape(mesh: &Mesh, k: usize) -> Shape {
     Shape::new(mesh.clone(), &ShapeSettings { k, ..ShapeSettings::default() }, &Task::default())
         .unwrap()
@@ -48,16 +57,11 @@ pub(crate) fn shape(mesh: &Mesh, k: usize) -> Shape {
 /// parts) plus an offset that the whole object shares and a little noise.
 pub(crate) fn cloud(mesh: &Mesh, stretch: f64, offset: f32) -> SemanticCloud {
     let points: Vec<DVec3> = mesh.vertices().iter().step_by(3).copied().collect();
-    let part = |x: f64, centre: f64| (-((x / stretch - centre) / 0.8).powi(2)).exp() as f32;
     let features = points.iter().enumerate().flat_map(|(i, p)| {
-        let noise = |c: usize| 0.03 * ((i * 31 + c * 17) as f32).sin();
-        [
-            part(p.x, -1.5) + noise(0),
-            part(p.x, 0.0) + noise(1),
-            part(p.x, 1.5) + noise(2),
-            offset,
-            noise(3),
-        ]
+        let [first, middle, last] =
+            [-1.5, 0.0, 1.5].map(|centre| (-((p.x / stretch - centre) / 0.8).powi(2)).exp() as f32);
+        let noise: [f32; 4] = std::array::from_fn(|c| 0.03 * ((i * 31 + c * 17) as f32).sin());
+        [first + noise[0], middle + noise[1], last + noise[2], offset, noise[3]]
     });
     let n = points.len();
     SemanticCloud::new(points.clone(), features.collect(), 5, vec![1; n]).unwrap()

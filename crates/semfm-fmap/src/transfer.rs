@@ -20,7 +20,7 @@ pub struct Transfer {
     /// One source vertex per target vertex. The methods without a map give the vertex at the
     /// nearest or most coupled cloud point.
     pub point_map: PointMap,
-    /// The region under the rule that was not asked for, where the method computes both (`semfm`).
+    /// The region under the other rule, where the method computes both (`semfm`).
     pub other_rule: Option<Region>,
     /// How the answer came about.
     pub report: TransferReport,

@@ -177,9 +177,9 @@ fn search(
     weight: f64,
     rows: &[u32],
 ) -> Vec<u32> {
-    let carried = map.carried_deltas(source.basis.first(map.k_source()));
+    let mapped = map.mapped_deltas(source.basis.first(map.k_source()));
     let scale = weight * (map.k_target() as f64).sqrt();
-    let points = with_features(carried.as_ref(), source.features, scale, &[]);
+    let points = with_features(mapped.as_ref(), source.features, scale, &[]);
     let queries = with_features(target.basis.first(map.k_target()), target.features, scale, rows);
     queries.nearest_of(&points)
 }
@@ -192,10 +192,10 @@ fn search_back(
     weight: f64,
     rows: &[u32],
 ) -> Vec<u32> {
-    let carried = map.carried_deltas(source.basis.first(map.k_source()));
+    let mapped = map.mapped_deltas(source.basis.first(map.k_source()));
     let scale = weight * (map.k_target() as f64).sqrt();
     let points = with_features(target.basis.first(map.k_target()), target.features, scale, &[]);
-    let queries = with_features(carried.as_ref(), source.features, scale, rows);
+    let queries = with_features(mapped.as_ref(), source.features, scale, rows);
     queries.nearest_of(&points)
 }
 

@@ -31,7 +31,7 @@ pub(super) struct Energy {
     on_target: Mat<f64>,
     /// B Aᵀ (k_target × k_source): the energy is least where [`apply`](Self::apply) gives this.
     pub right: Mat<f64>,
-    /// μ s mᵢⱼ (k_target × k_source), zero where not asked for.
+    /// μ s mᵢⱼ (k_target × k_source), zero without that term.
     pub mask: Mat<f64>,
     /// The target's multiplications T_d, scaled.
     pub multipliers: Operators,
@@ -78,7 +78,7 @@ impl Energy {
     }
 
     /// Adds `weight` Σ ‖C S_d − T_d C‖² for operators of both sides that are symmetric or
-    /// antisymmetric alike, scaled so that a map that ignores them pays about as much as for the
+    /// antisymmetric alike, scaled so that a map that ignores them costs about as much as the
     /// descriptors themselves. Returns the target's, scaled.
     pub fn commute_with(&mut self, weight: f64, mut s: Operators, mut t: Operators) -> Operators {
         let (k_target, k_source, r) = (t.k(), s.k(), s.len());

@@ -19,7 +19,7 @@ use crate::{Error, FunctionalMap, Result};
 /// Singular values below this share of the largest count as zero in the minimum-norm solution.
 const RANK_CUTOFF: f64 = 1e-12;
 
-/// What is asked of C besides the descriptors. All weights are relative to the descriptor term.
+/// Regularisers of C beside the descriptors. All weights are relative to the descriptor term.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FitSettings {
@@ -68,7 +68,7 @@ pub struct FitReport {
     pub k: usize,
     /// Number of descriptors.
     pub n_descriptors: usize,
-    /// Rank of the source descriptors: the rank of C where nothing else was asked for.
+    /// Rank of the source descriptors: the rank of C without regularisers.
     pub rank: usize,
     /// Whether C is the minimum-norm one among many that fit equally well.
     pub minimum_norm: bool,
@@ -264,7 +264,7 @@ mod tests {
         )
         .unwrap();
         assert!(fit.report.minimum_norm && fit.report.rank == 2 && fit.report.residual < 1e-12);
-        // Minimum norm: C lives on the span of A, so C (I − A A⁺) = 0.
+        // Minimum norm: the rows of C lie in the span of A, so C (I − A A⁺) = 0.
         let c = fit.map.matrix();
         let a_gram = a.transpose() * &a;
         let inverse = a_gram.llt(Side::Lower).unwrap().solve(a.transpose());
@@ -291,8 +291,70 @@ mod tests {
         }
     }
 
-    /// Operator d of a shape for descriptors given as coefficients.
-    type Family<'a> = &'a dyn Fn(&Shape, &Mat<f64>, usize) -> Mat<f64>;
+    /// Operator d of a shape for descriptors given as coefficients (k × p).
+    type Family = fn(&Shape, &Mat<f64>, usize) -> Mat<f64>;
+
+    /// Descriptor d on the vertices (n × 1).
+    fn function(shape: &Shape, coefficients: &Mat<f64>, d: usize) -> Mat<f64> {
+        shape.basis().reconstruct_all(coefficients.as_ref().subcols(d, 1))
+    }
+
+    /// Σ_v m_v f_v φᵢ(v) φⱼ(v)
+    fn multiplication(shape: &Shape, coefficients: &Mat<f64>, d: usize) -> Mat<f64> {
+        let (f, basis) = (function(shape, coefficients, d), shape.basis());
+        let (k, phi) = (coefficients.nrows(), &basis.functions);
+        Mat::from_fn(k, k, |i, j| {
+            let terms = (0..basis.n_vertices())
+                .map(|v| basis.mass[v] * f[(v, 0)] * (phi[(v, i)] * phi[(v, j)]));
+            terms.sum()
+        })
+    }
+
+    /// ∫ f dφⱼ ∧ dφᵢ
+    fn turn(shape: &Shape, coefficients: &Mat<f64>, d: usize) -> Mat<f64> {
+        let (f, phi) = (function(shape, coefficients, d), &shape.basis().functions);
+        let k = coefficients.nrows();
+        Mat::from_fn(k, k, |i, j| {
+            let terms = shape.mesh().faces().iter().map(|ids| {
+                let [a, b, c] = ids.map(|v| v as usize);
+                let mean = (f[(a, 0)] + f[(b, 0)] + f[(c, 0)]) / 3.0;
+                let [[i_b, i_c], [j_b, j_c]] =
+                    [i, j].map(|of| [phi[(b, of)] - phi[(a, of)], phi[(c, of)] - phi[(a, of)]]);
+                mean * 0.5 * (j_b * i_c - j_c * i_b)
+            });
+            terms.sum()
+        })
+    }
+
+    /// Normal equations for the entries of C, column by column (k² × k²).
+    struct System(Mat<f64>);
+
+    impl System {
+        /// Adds weight · (C ↦ L C Rᵀ), which is R ⊗ L.
+        fn add(&mut self, left: &Mat<f64>, right: &Mat<f64>, weight: f64) {
+            let k = left.nrows();
+            for at in 0..k * k {
+                for to in 0..k * k {
+                    let factor = right[(at / k, to / k)] * left[(at % k, to % k)];
+                    self.0[(at, to)] += weight * factor;
+                }
+            }
+        }
+
+        /// Adds weight · Σ ‖C S_d − T_d C‖²
+        fn commute(&mut self, s: &[Mat<f64>], t: &[Mat<f64>], weight: f64) {
+            let k = self.0.nrows().isqrt();
+            let identity = Mat::<f64>::identity(k, k);
+            let size: f64 = s.iter().chain(t).map(Mat::squared_norm_l2).sum();
+            let weight = weight / (size / (2 * k) as f64);
+            for (s, t) in s.iter().zip(t) {
+                self.add(&identity, &(s * s.transpose()), weight);
+                self.add(&(t.transpose() * t), &identity, weight);
+                self.add(t, s, -weight);
+                self.add(&t.transpose().to_owned(), &s.transpose().to_owned(), -weight);
+            }
+        }
+    }
 
     /// Entry by entry from the definitions, descriptor by descriptor, solved as one dense system.
     fn dense_reference(
@@ -303,60 +365,24 @@ mod tests {
         settings: &FitSettings,
     ) -> Mat<f64> {
         let (k, p) = (a.nrows(), a.ncols());
-        let function = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
-            shape.basis().reconstruct_all(coefficients.as_ref().subcols(d, 1))
-        };
-        let multiplication = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
-            let (f, basis) = (function(shape, coefficients, d), shape.basis());
-            Mat::from_fn(k, k, |i, j| {
-                let at = |v: usize| basis.functions[(v, i)] * basis.functions[(v, j)];
-                (0..basis.n_vertices()).map(|v| basis.mass[v] * f[(v, 0)] * at(v)).sum()
-            })
-        };
-        let turn = |shape: &Shape, coefficients: &Mat<f64>, d: usize| {
-            let (f, phi) = (function(shape, coefficients, d), &shape.basis().functions);
-            Mat::from_fn(k, k, |i, j| {
-                let of_face = |ids: &[u32; 3]| {
-                    let [a, b, c] = ids.map(|v| v as usize);
-                    let mean = (f[(a, 0)] + f[(b, 0)] + f[(c, 0)]) / 3.0;
-                    let along = |of: usize, v: usize| phi[(v, of)] - phi[(a, of)];
-                    mean * 0.5 * (along(j, b) * along(i, c) - along(j, c) * along(i, b))
-                };
-                shape.mesh().faces().iter().map(of_face).sum()
-            })
-        };
         let unit = a.squared_norm_l2() / k as f64;
-        // Column-major unknowns: C ↦ L C Rᵀ is R ⊗ L.
-        let mut system = Mat::<f64>::zeros(k * k, k * k);
-        let mut add = |left: &Mat<f64>, right: &Mat<f64>, weight: f64| {
-            for at in 0..k * k {
-                for to in 0..k * k {
-                    let factor = right[(at / k, to / k)] * left[(at % k, to % k)];
-                    system[(at, to)] += weight * factor;
-                }
-            }
-        };
-        let identity = Mat::<f64>::identity(k, k);
-        add(&identity, &(a * a.transpose()), 1.0);
-        let mut commute = |weight: f64, of: Family<'_>, sign| {
+        let mut system = System(Mat::zeros(k * k, k * k));
+        system.add(&Mat::identity(k, k), &(a * a.transpose()), 1.0);
+        let sign = if settings.reversing { -1.0 } else { 1.0 };
+        let families: [(f64, Family, f64); 2] =
+            [(settings.descriptors, multiplication, 1.0), (settings.orientation, turn, sign)];
+        for (weight, of, sign) in families {
             let s: Vec<_> = (0..p).map(|d| of(source, a, d)).collect();
             let t: Vec<_> = (0..p).map(|d| of(target, b, d) * faer::Scale(sign)).collect();
-            let size: f64 = s.iter().chain(&t).map(Mat::squared_norm_l2).sum();
-            let weight = weight * unit / (size / (2 * k) as f64);
-            for (s, t) in s.iter().zip(&t) {
-                add(&identity, &(s * s.transpose()), weight);
-                add(&(t.transpose() * t), &identity, weight);
-                add(t, s, -weight);
-                add(&t.transpose().to_owned(), &s.transpose().to_owned(), -weight);
-            }
-        };
-        commute(settings.descriptors, &multiplication, 1.0);
-        commute(settings.orientation, &turn, if settings.reversing { -1.0 } else { 1.0 });
-        let gap =
-            |at: usize| (target.basis().values[at % k] - source.basis().values[at / k]).powi(2);
-        let largest = (0..k * k).map(gap).fold(0.0, f64::max);
-        for at in 0..k * k {
-            system[(at, at)] += settings.laplacian * unit * gap(at) / largest + 1e-9;
+            system.commute(&s, &t, weight * unit);
+        }
+        let System(mut system) = system;
+        let gaps: Vec<f64> = (0..k * k)
+            .map(|at| (target.basis().values[at % k] - source.basis().values[at / k]).powi(2))
+            .collect();
+        let largest = gaps.iter().fold(0.0, |m: f64, &gap| m.max(gap));
+        for (at, gap) in gaps.iter().enumerate() {
+            system[(at, at)] += settings.laplacian * unit * gap / largest + 1e-9;
         }
         let right = b * a.transpose();
         let right = Mat::from_fn(k * k, 1, |at, _| right[(at % k, at / k)]);

@@ -35,7 +35,7 @@ impl Operators {
     /// Operator d has the entries Σₓ f_d(x) product(x, i, j) over `n` places x, with the functions
     /// f_d = Σₗ `coefficients`[l, d] gₗ.
     ///
-    /// `block` is given the first place and room for the products (places × pairs, columns in the
+    /// `block` is given the first place, a matrix for the products (places × pairs, columns in the
     /// order of [`Parity::pairs`]) and for functions g (places × k).
     pub fn new(
         parity: Parity,

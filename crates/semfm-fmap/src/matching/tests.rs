@@ -16,7 +16,7 @@ fn object(shape: Shape, cloud: SemanticCloud) -> PreparedObject {
     PreparedObject::new(Arc::new(shape), Arc::new(cloud), &Task::default()).unwrap()
 }
 
-/// A blob whose features tell where along x its points are.
+/// A blob whose features say where along x its points are.
 fn blob_object(stretch: f64, offset: f32) -> PreparedObject {
     let mesh = blob(stretch);
     object(shape(&mesh, 60), cloud(&mesh, stretch, offset))
@@ -142,8 +142,8 @@ fn bad_input_is_named() {
     let nothing = Region::from_vertices(258, &[]).unwrap();
     let error = transfer(&source, &target, &nothing, &settings, &task).unwrap_err();
     assert!(matches!(error, Error::EmptyRegion { n_vertices: 258 }));
-    let stranger = Region::from_vertices(7, &[1]).unwrap();
-    let error = transfer(&source, &target, &stranger, &settings, &task).unwrap_err();
+    let other_mesh = Region::from_vertices(7, &[1]).unwrap();
+    let error = transfer(&source, &target, &other_mesh, &settings, &task).unwrap_err();
     assert!(matches!(error, Error::Length { expected: 258, found: 7, .. }), "{error}");
     let region = tip(&source, 1.0);
     let other = object(

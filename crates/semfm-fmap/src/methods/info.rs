@@ -16,11 +16,11 @@ pub struct MethodInfo {
     pub name: &'static str,
     /// One line for help texts and tables.
     pub summary: &'static str,
-    /// Its colour in reports (sRGB), told apart by colour-blind readers, too (Okabe & Ito 2008).
+    /// Its colour in reports (sRGB), distinct for colour-blind readers, too (Okabe & Ito 2008).
     pub color: [u8; 3],
     /// How the features that it was made for come about.
     pub features: ViewFeatures,
-    /// Whether a functional map stands behind the answer: the others know no image rule.
+    /// Whether a functional map stands behind the answer: the others have no image rule.
     pub has_map: bool,
     /// What its confidence is made of.
     pub confidence: ConfidenceRule,

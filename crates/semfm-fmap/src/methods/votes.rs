@@ -68,13 +68,13 @@ pub(crate) fn on_points(source: &PreparedObject, inside: &[bool]) -> Vec<f64> {
     source.vertex_of_point().iter().map(|&v| f64::from(u8::from(inside[v as usize]))).collect()
 }
 
-/// Votes in [0, 1], bent so that `threshold` stands at [`Region::COUNTS`].
+/// Votes in [0, 1], mapped so that `threshold` comes to [`Region::COUNTS`].
 pub(crate) fn at_threshold(votes: &[f64], threshold: f64) -> Vec<f64> {
-    votes.iter().map(|&vote| bend(vote, threshold)).collect()
+    votes.iter().map(|&vote| rescale(vote, threshold)).collect()
 }
 
 /// c + (1 − c) (v − θ)/(1 − θ) from the threshold θ on, c v/θ below it, with c = [`Region::COUNTS`].
-fn bend(vote: f64, threshold: f64) -> f64 {
+fn rescale(vote: f64, threshold: f64) -> f64 {
     let vote = vote.clamp(0.0, 1.0);
     let c = Region::COUNTS;
     if vote >= threshold {
@@ -95,9 +95,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thresholds_are_bent_onto_one_half() {
-        let bent = at_threshold(&[0.0, 0.2, 0.4, 0.7, 1.0, 1.3, -0.1], 0.4);
-        for (x, expected) in bent.iter().zip([0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 0.0]) {
+    fn thresholds_are_mapped_to_one_half() {
+        let mapped = at_threshold(&[0.0, 0.2, 0.4, 0.7, 1.0, 1.3, -0.1], 0.4);
+        for (x, expected) in mapped.iter().zip([0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 0.0]) {
             assert!((x - expected).abs() < 1e-12, "{x} for {expected}");
         }
         assert!(at_threshold(&[0.4f64.next_down()], 0.4)[0] < Region::COUNTS);
