@@ -11,7 +11,7 @@ use crate::gripper_geometry::{BoxGripper, GripperGeometry};
 use crate::object::GraspObject;
 use crate::rejection::Reason;
 use crate::scene::Scene;
-use crate::select::GraspDistance;
+use crate::grasp_distance::GraspDistance;
 use crate::settings::{ApproachCone, GraspSettings};
 use crate::test_meshes::{cuboid, cylinder, joined, moved};
 

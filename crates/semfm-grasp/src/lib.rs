@@ -16,6 +16,7 @@ mod find_tests;
 mod force_closure;
 mod gpg;
 mod grasp;
+mod grasp_distance;
 mod gripper_geometry;
 mod neighbours;
 mod object;
@@ -35,11 +36,29 @@ mod wrench_hull;
 pub use error::{Error, Result};
 pub use find::{Grasps, PoseToExamine, examine_poses, find_grasps, find_grasps_with};
 pub use grasp::Grasp;
+pub use grasp_distance::GraspDistance;
 pub use gripper_geometry::{BoxGripper, GripperExtents, GripperGeometry};
 pub use object::GraspObject;
 pub use rejection::{Miss, Reason, Rejected};
 pub use scene::{Scene, Table};
-pub use select::GraspDistance;
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use semfm_robot::Pose;
 pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation, TERMS};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_send_sync<T: Send + Sync>() {}
+
+    #[test]
+    fn public_types_go_between_threads() {
+        assert_send_sync::<Error>();
+        assert_send_sync::<GraspObject>();
+        assert_send_sync::<GripperGeometry>();
+        assert_send_sync::<Scene>();
+        assert_send_sync::<GraspSettings>();
+        assert_send_sync::<Grasps>();
+        assert_send_sync::<Miss>();
+    }
+}

@@ -56,7 +56,7 @@ fn turned(angle: f64, axis: DVec3) -> Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::select::GraspDistance;
+    use crate::grasp_distance::GraspDistance;
 
     fn grasp(x: f64) -> Grasp {
         Grasp {

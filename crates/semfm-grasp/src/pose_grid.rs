@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
 
-use crate::select::GraspDistance;
+use crate::grasp_distance::GraspDistance;
 use crate::settings::Separation;
 
 /// A set of gripper poses under a grid of cells as wide as the separation.

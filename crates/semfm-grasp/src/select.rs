@@ -1,45 +1,9 @@
 //! From many grasps to a few: the best of each neighbourhood, then a set that differs.
 
-use parry3d_f64::math::Pose;
-use semfm_geom::math::DQuat;
-
 use crate::grasp::Grasp;
+use crate::grasp_distance::GraspDistance;
 use crate::pose_grid::PoseGrid;
 use crate::settings::Separation;
-
-/// Half a turn about the approach: a gripper with two equal fingers is the same gripper.
-const HALF_TURN: DQuat = DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0);
-
-/// How far two grasps are from each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GraspDistance {
-    /// Between the TCPs, metres.
-    pub translation: f64,
-    /// Between the grippers, radians in [0, π].
-    pub rotation: f64,
-}
-
-impl GraspDistance {
-    /// The distance of two poses of the TCP. A gripper and the same gripper with its fingers exchanged
-    /// are one.
-    pub fn between(a: &Pose, b: &Pose) -> Self {
-        let turn = a.rotation.inverse() * b.rotation;
-        Self {
-            translation: a.translation.distance(b.translation),
-            rotation: angle(turn).min(angle(HALF_TURN * turn)),
-        }
-    }
-
-    /// In [0, 1]: the mean of the translation against `far` (metres) and of the rotation against π.
-    fn relative(self, far: f64) -> f64 {
-        ((self.translation / far).min(1.0) + self.rotation / std::f64::consts::PI) / 2.0
-    }
-}
-
-/// The angle of a rotation, radians in [0, π].
-fn angle(q: DQuat) -> f64 {
-    2.0 * q.xyz().length().atan2(q.w.abs())
-}
 
 /// Keeps a grasp where no better one is within the separation in both translation and rotation;
 /// best first, ties in the given order.
@@ -84,6 +48,7 @@ pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use parry3d_f64::math::Pose;
     use semfm_geom::math::DVec3;
 
     fn grasp(x: f64, about_z: f64, score: f64) -> Grasp {
@@ -97,19 +62,6 @@ mod tests {
             score,
             terms: Vec::new(),
         }
-    }
-
-    #[test]
-    fn exchanged_fingers_are_the_same_hand() {
-        let (a, b) = (grasp(0.0, 0.1, 1.0), grasp(0.003, 0.1 + std::f64::consts::PI, 1.0));
-        let near = GraspDistance::between(&a.object_from_tcp, &b.object_from_tcp);
-        assert!((near.translation - 0.003).abs() < 1e-12 && near.rotation < 1e-7, "{near:?}");
-        let c = grasp(0.0, 0.6, 1.0);
-        let turned = GraspDistance::between(&a.object_from_tcp, &c.object_from_tcp).rotation;
-        assert!((turned - 0.5).abs() < 1e-12);
-        let upside_down = Pose::new(DVec3::ZERO, DVec3::X * std::f64::consts::PI);
-        let turned = GraspDistance::between(&Pose::IDENTITY, &upside_down).rotation;
-        assert!((turned - std::f64::consts::PI).abs() < 1e-9);
     }
 
     #[test]
