@@ -120,86 +120,6 @@ class Anchors:
         """
         ...
 
-class Camera:
-    """A pinhole camera without distortion, posed in the object's frame: x right, y down, z forward.
-
-    A point projects to ``u = fx x / z + cx``, ``v = fy y / z + cy`` in pixels; the centre of the
-    pixel in column c and row r is at (c + ½, r + ½).
-
-    Parameters
-    ----------
-    width : int
-        Pixels.
-    height : int
-        Pixels.
-    fx : float
-        Focal length along x, in pixels.
-    fy : float
-        Focal length along y, in pixels.
-    cx : float
-        Principal point, x, in pixels.
-    cy : float
-        Principal point, y, in pixels.
-    camera_from_object : (4, 4) array_like
-        Rigid motion from the object's frame to the camera's, as a homogeneous matrix.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import semfm
-    >>> camera = semfm.Camera(64, 48, 70, 70, 32, 24, np.eye(4))
-    >>> camera.project([[0, 0, 2]]).tolist()
-    [[32.0, 24.0, 2.0]]
-    """
-    def __init__(self, width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_object: ArrayLike) -> None: ...
-    def __eq__(self, other: object) -> bool: ...
-    @property
-    def camera_from_object(self) -> NDArray[numpy.float64]:
-        """(4, 4) float64 array: rigid motion from the object's frame to the camera's."""
-        ...
-    @property
-    def cx(self) -> float:
-        """float: principal point, x, in pixels."""
-        ...
-    @property
-    def cy(self) -> float:
-        """float: principal point, y, in pixels."""
-        ...
-    @property
-    def eye(self) -> NDArray[numpy.float64]:
-        """(3,) float64 array: where the camera stands, in the object's frame."""
-        ...
-    @property
-    def fx(self) -> float:
-        """float: focal length along x, in pixels."""
-        ...
-    @property
-    def fy(self) -> float:
-        """float: focal length along y, in pixels."""
-        ...
-    @property
-    def height(self) -> int:
-        """int: pixels."""
-        ...
-    def project(self, points: ArrayLike) -> NDArray[numpy.float64]:
-        """Pixel position and depth of points.
-
-        Parameters
-        ----------
-        points : (n, 3) array_like
-            In the object's frame.
-
-        Returns
-        -------
-        (n, 3) float64 array
-            u, v, and depth z; u and v mean nothing where z ≤ 0.
-        """
-        ...
-    @property
-    def width(self) -> int:
-        """int: pixels."""
-        ...
-
 class Clusters:
     """A cloud cut into parts: one label per point, every label from 0 borne by somebody.
 
@@ -431,18 +351,18 @@ class Embeddings:
     ----------
     mesh : mesh_like
         The mesh that the views show.
-    cameras : list of Camera
+    cameras : list of Pinhole
         One per view, all of one size.
     patches : list of PatchEmbeddings
         One per view, all of one dimension.
     encoder : str, default "unnamed"
         Name of the encoder, for the file.
     """
-    def __init__(self, mesh: _MeshLike, cameras: Iterable[Camera], patches: Iterable[PatchEmbeddings], *, encoder: str = 'unnamed') -> None: ...
+    def __init__(self, mesh: _MeshLike, cameras: Iterable[Pinhole], patches: Iterable[PatchEmbeddings], *, encoder: str = 'unnamed') -> None: ...
     def __len__(self) -> int: ...
     @property
-    def cameras(self) -> list[Camera]:
-        """list of Camera: one per view."""
+    def cameras(self) -> list[Pinhole]:
+        """list of Pinhole: one per view."""
         ...
     @property
     def dim(self) -> int:
@@ -457,8 +377,40 @@ class Embeddings:
         """str: hash of the mesh that the views show."""
         ...
     @property
+    def metadata(self) -> dict[str, Any]:
+        """dict: the file's metadata record ``semfm``, all entries as text."""
+        ...
+    @property
     def n_views(self) -> int:
         """int: number of views."""
+        ...
+    @staticmethod
+    def of_views(views: ViewsFile, patches: Iterable[PatchEmbeddings], *, encoder: str, revision: str = 'unknown', preprocessing: str = 'unknown', rolls: int = 1, outliers: str = 'unknown', more: Optional[Mapping[str, Any]] = None) -> Embeddings:
+        """What an encoder made of the views of a file; `semfm-embed` calls this.
+
+        Parameters
+        ----------
+        views : ViewsFile
+            The views that were encoded; their metadata are kept.
+        patches : list of PatchEmbeddings
+            One per view, all of one dimension.
+        encoder : str
+            Name of the encoder.
+        revision : str, default "unknown"
+            Its revision, or the hash of its file.
+        preprocessing : str, default "unknown"
+            How a picture was made into the encoder's input.
+        rolls : int, default 1
+            Number of turned pictures of each view that were averaged.
+        outliers : str, default "unknown"
+            What was done with outlier tokens.
+        more : dict, optional
+            Further entries of the metadata, text by name.
+
+        Returns
+        -------
+        Embeddings
+        """
         ...
     @property
     def patches(self) -> list[PatchEmbeddings]:
@@ -945,7 +897,7 @@ class Laplacian:
         ...
 
 class Matching:
-    """A matched pair: computed once, it carries any number of regions.
+    """A matched pair: computed once, it transfers any number of regions.
 
     Parameters
     ----------
@@ -957,7 +909,7 @@ class Matching:
         ``fused`` (where neither this nor `settings` is given), ``semfm``, ``anchored``,
         ``sinkhorn``, ``nearest`` or ``wks``.
     rule : str, optional
-        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+        How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
     settings : TransferSettings, optional
@@ -992,7 +944,7 @@ class Matching:
         """PreparedObject: the one to act on."""
         ...
     def transfer(self, region: Union[Region, _Path]) -> Transfer:
-        """Carries one region.
+        """Transfers one region.
 
         Parameters
         ----------
@@ -1217,6 +1169,126 @@ class PatchEmbeddings:
         """(rows, cols) bool array: False where the patch is to be ignored, a read-only view."""
         ...
 
+class Pinhole:
+    """A pinhole camera without distortion: x right, y down, z forward, in the units of the world.
+
+    A point (x, y, z) of the camera's frame projects to ``u = fx x / z + cx``, ``v = fy y / z + cy``
+    in pixels, where the centre of pixel (0, 0) is at (½, ½). The world is the frame that the camera
+    stands in: an object's in rendered views. The two constructors differ in how the numbers that
+    they are given count pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm
+    >>> camera = semfm.Pinhole.with_pixel_centres_at_half(64, 48, 70, 70, 32, 24, np.eye(4))
+    >>> camera.project([[0, 0, 2]]).tolist()
+    [[32.0, 24.0, 2.0]]
+    >>> camera == semfm.Pinhole.with_pixel_centres_at_integers(
+    ...     64, 48, 70, 70, 31.5, 23.5, np.eye(4))
+    True
+    """
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def camera_from_world(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: rigid motion from the world's frame to the camera's."""
+        ...
+    @property
+    def cx(self) -> float:
+        """float: principal point, x, in pixels."""
+        ...
+    @property
+    def cy(self) -> float:
+        """float: principal point, y, in pixels."""
+        ...
+    @property
+    def eye(self) -> NDArray[numpy.float64]:
+        """(3,) float64 array: where the camera stands, in the world's frame."""
+        ...
+    @property
+    def fx(self) -> float:
+        """float: focal length along x, in pixels."""
+        ...
+    @property
+    def fy(self) -> float:
+        """float: focal length along y, in pixels."""
+        ...
+    @property
+    def height(self) -> int:
+        """int: pixels."""
+        ...
+    def project(self, points: ArrayLike) -> NDArray[numpy.float64]:
+        """Pixel position and depth of points.
+
+        Parameters
+        ----------
+        points : (n, 3) array_like
+            In the world's frame.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            u, v, and depth z; u and v mean nothing where z ≤ 0.
+        """
+        ...
+    @property
+    def width(self) -> int:
+        """int: pixels."""
+        ...
+    @staticmethod
+    def with_pixel_centres_at_half(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
+        """A camera whose numbers count as ours do: the centre of pixel (0, 0) is at (½, ½).
+
+        Parameters
+        ----------
+        width : int
+            Pixels.
+        height : int
+            Pixels.
+        fx : float
+            Focal length along x, in pixels.
+        fy : float
+            Focal length along y, in pixels.
+        cx : float
+            Principal point, x, in pixels.
+        cy : float
+            Principal point, y, in pixels.
+        camera_from_world : (4, 4) array_like
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+
+        Returns
+        -------
+        Pinhole
+        """
+        ...
+    @staticmethod
+    def with_pixel_centres_at_integers(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
+        """A camera whose numbers come from a calibration (OpenCV, ROS `CameraInfo`), in which the centre
+        of pixel (0, 0) is at (0, 0): half a pixel is added to its principal point.
+
+        Parameters
+        ----------
+        width : int
+            Pixels.
+        height : int
+            Pixels.
+        fx : float
+            Focal length along x, in pixels.
+        fy : float
+            Focal length along y, in pixels.
+        cx : float
+            Principal point, x, in pixels.
+        cy : float
+            Principal point, y, in pixels.
+        camera_from_world : (4, 4) array_like
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+
+        Returns
+        -------
+        Pinhole
+        """
+        ...
+
 class PointMap:
     """A map target → source: ``source_of[j]`` is the source vertex matched to target vertex ``j``.
 
@@ -1389,13 +1461,13 @@ class Region:
         """(n,) bool array: whether each vertex counts."""
         ...
     @staticmethod
-    def masked(mesh: _MeshLike, camera: Camera, mask: ArrayLike) -> Region:
+    def masked(mesh: _MeshLike, camera: Pinhole, mask: ArrayLike) -> Region:
         """All vertices that a camera sees inside a mask.
 
         Parameters
         ----------
         mesh : mesh_like
-        camera : Camera
+        camera : Pinhole
         mask : (height, width) array_like
             Of dtype bool, of the camera's size.
 
@@ -1584,7 +1656,7 @@ class Shape:
         """Laplacian: that of the working mesh at area 1, bridges included."""
         ...
     def onto_original(self, values: ArrayLike) -> NDArray[numpy.float64]:
-        """Values on the working vertices, carried onto the original's.
+        """Values on the working vertices, extended to the original's.
 
         Parameters
         ----------
@@ -1703,7 +1775,7 @@ class SurfaceIndex:
         ...
 
 class Transfer:
-    """A carried region and everything known about it.
+    """A transferred region and everything known about it.
 
     Vertices are those of the meshes as given. Made by `transfer` and `Matching.transfer`.
     """
@@ -1808,11 +1880,11 @@ class View:
 
     See Also
     --------
-    render, read_views
+    render, ViewsFile
     """
     @property
-    def camera(self) -> Camera:
-        """Camera: the one the picture was taken with."""
+    def camera(self) -> Pinhole:
+        """Pinhole: the one the picture was taken with."""
         ...
     @property
     def depth(self) -> NDArray[numpy.float32]:
@@ -1825,6 +1897,83 @@ class View:
     @property
     def triangles(self) -> NDArray[numpy.int32]:
         """(height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view."""
+        ...
+
+class ViewsFile:
+    """The rendered views of an object, as a ``NAME.views.mcap`` holds them: for `semfm-embed`, and for
+    Foxglove.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        The mesh that was rendered.
+    views : list of View
+        At least one, all of one size.
+    rig : str, default "given as cameras"
+        How the cameras were placed, in words, for the file.
+    background : str, default "as rendered"
+        What stands behind the object, in words, for the file.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import semfm, semfm.zoo
+    >>> mesh = semfm.zoo.torus(40, 20)
+    >>> views = semfm.render(mesh, semfm.rig(mesh, count=3, size=64))
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "torus.views.mcap")
+    >>> semfm.ViewsFile(mesh, views).write(path)
+    >>> file = semfm.ViewsFile.read(path)
+    >>> file, file.mesh == mesh, file.metadata["n_views"]
+    (ViewsFile(3 views, 64 × 64), True, '3')
+    >>> folder.cleanup()
+    """
+    def __init__(self, mesh: _MeshLike, views: Iterable[View], *, rig: str = 'given as cameras', background: str = 'as rendered') -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def cameras(self) -> list[Pinhole]:
+        """list of Pinhole: one per view."""
+        ...
+    @property
+    def mesh(self) -> Optional[Mesh]:
+        """Mesh, optional: the mesh that the views show, vertex by vertex as it was rendered; None where the file has none."""
+        ...
+    @property
+    def mesh_hash(self) -> str:
+        """str: hash of the mesh that the views show."""
+        ...
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """dict: the file's metadata record ``semfm``, all entries as text."""
+        ...
+    @property
+    def n_views(self) -> int:
+        """int: number of views."""
+        ...
+    @staticmethod
+    def read(path: _Path) -> ViewsFile:
+        """Reads a ``NAME.views.mcap`` and checks everything in it.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        ViewsFile
+        """
+        ...
+    @property
+    def views(self) -> list[View]:
+        """list of View: the views, as numbered."""
+        ...
+    def write(self, path: _Path) -> None:
+        """Writes a ``NAME.views.mcap`` with its mesh, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        """
         ...
 
 def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = Ellipsis, init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
@@ -1855,7 +2004,7 @@ def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float
     """
     ...
 
-def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Camera:
+def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Pinhole:
     """One camera that looks along ``-direction`` at the whole object: for pictures of results.
 
     Parameters
@@ -1872,7 +2021,7 @@ def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size
 
     Returns
     -------
-    Camera
+    Pinhole
     """
     ...
 
@@ -2131,7 +2280,7 @@ def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
     ...
 
 def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = 'pull', n_samples: int = 1200, depth_tolerance: float = 0.01, radius: float = 0.06, seed: int = 0, progress: Optional[_Progress] = None) -> SemanticCloud:
-    """Carries the embeddings of views onto samples of the surface.
+    """Lifts the embeddings of views onto samples of the surface.
 
     Parameters
     ----------
@@ -2254,27 +2403,14 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     """
     ...
 
-def read_views(path: _Path) -> list[View]:
-    """Reads the views of a ``NAME.views.mcap``.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    list of View
-    """
-    ...
-
-def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, occlusion: float = 0.0, edges: float = 0.0, normals: bool = False, progress: Optional[_Progress] = None) -> list[View]:
+def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Pinhole]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, occlusion: float = 0.0, edges: float = 0.0, normals: bool = False, progress: Optional[_Progress] = None) -> list[View]:
     """One picture per camera, with depth and triangle of every pixel.
 
     Parameters
     ----------
     mesh : mesh_like or MeshFile
         A `MeshFile` is drawn in its own colours.
-    cameras : list of Camera, optional
+    cameras : list of Pinhole, optional
         As `rig` makes them where none are given.
     colors : (n, 3) array_like, optional
         sRGB of each vertex, 0 to 1.
@@ -2304,7 +2440,7 @@ def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]]
     """
     ...
 
-def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True, close_ups: int = 0) -> list[Camera]:
+def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True, close_ups: int = 0) -> list[Pinhole]:
     """Cameras all around an object, each zoomed and centred on its silhouette.
 
     Parameters
@@ -2327,7 +2463,7 @@ def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: flo
 
     Returns
     -------
-    list of Camera
+    list of Pinhole
     """
     ...
 
@@ -2447,7 +2583,7 @@ def torus(n_around: int, n_across: int) -> Mesh:
     ...
 
 def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
-    """Carries a demonstrated region from one object to another.
+    """Transfers a demonstrated region from one object to another.
 
     Parameters
     ----------
@@ -2470,7 +2606,7 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
         ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
         ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
     rule : str, optional
-        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+        How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
     settings : TransferSettings, optional
@@ -2492,10 +2628,10 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     --------
     >>> import semfm
     >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
-    >>> carried = semfm.transfer(
+    >>> result = semfm.transfer(
     ...     mug.mesh, kettle.mesh, mug.region,
     ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
-    >>> carried.region.n_vertices == kettle.mesh.n_vertices
+    >>> result.region.n_vertices == kettle.mesh.n_vertices
     True
     """
     ...
@@ -2537,15 +2673,12 @@ def wks(basis: Eigenbasis, *, n_energies: int = 100) -> NDArray[numpy.float64]:
     """
     ...
 
-def write_views(path: _Path, views: Iterable[View], mesh: _MeshLike) -> None:
-    """Writes views of a mesh as ``NAME.views.mcap``, whole or not at all: for `semfm-embed`.
+def write_file(path: _Path, content: bytes) -> None:
+    """Writes bytes to a file, whole or not at all.
 
     Parameters
     ----------
     path : path
-    views : list of View
-        All of one size.
-    mesh : mesh_like
-        The mesh that was rendered.
+    content : bytes
     """
     ...
