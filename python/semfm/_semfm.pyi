@@ -128,7 +128,7 @@ class Anchors:
         ...
 
 class Clusters:
-    """A cloud cut into parts: one label per point, every label from 0 borne by somebody.
+    """A cloud cut into parts: one label per point, every label from 0 on at least one.
 
     Parameters
     ----------
@@ -984,6 +984,9 @@ class Matching:
         How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
+    second_opinion : bool, optional
+        Whether an independent method judges the result, too; the method's own default where none is
+        given: True where its confidence is the agreement of the two.
     settings : TransferSettings, optional
         Everything that can be set, in place of `method` and `rule`.
     progress : progress, optional
@@ -1681,7 +1684,7 @@ class SemanticCloud:
     points : (m, 3) array_like
         In the frame and units of the mesh as read.
     features : (m, d) array_like
-        From anybody's network; kept as float32.
+        From any network; kept as float32.
     n_views : (m,) array_like, optional
         How many views saw each point; 1 where none are given.
 
@@ -1910,7 +1913,7 @@ class Transfer:
     """
     @property
     def confidence(self) -> float:
-        """float: agreement with an independent opinion, in [0, 1]."""
+        """float: the probability that the IoU with the true region is at least one half, in [0, 1]."""
         ...
     @property
     def hypotheses(self) -> list[Hypothesis]:
@@ -2576,7 +2579,7 @@ def prepare(
     ----------
     mesh : mesh_like
     features : (n, d) array_like, optional
-        A feature vector per vertex, from anybody's network.
+        A feature vector per vertex, from any network.
     embeddings : Embeddings or path, optional
         Patch embeddings of rendered views of this very mesh.
     cloud : SemanticCloud, optional
@@ -2870,7 +2873,7 @@ def transfer(
     region : Region or path
         Where the demonstration touched the source.
     source_features : (n_source, d) array_like, optional
-        A feature vector per vertex, from anybody's network.
+        A feature vector per vertex, from any network.
     target_features : (n_target, d) array_like, optional
     source_embeddings : Embeddings or path, optional
         Patch embeddings of rendered views.
@@ -2885,6 +2888,9 @@ def transfer(
         How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
+    second_opinion : bool, optional
+        Whether an independent method judges the result, too; the method's own default where none is
+        given: True where its confidence is the agreement of the two.
     settings : TransferSettings, optional
         Everything that can be set, in place of `method` and `rule`.
     k : int, optional
