@@ -13,8 +13,8 @@ def main() -> None:
         target = semfm.prepare(found.mesh, features=found.shared_features(), settings=settings)
         matching = semfm.Matching(source, target, settings=settings)
         for name, region in (("grip", mug.region), ("body", body)):
-            carried = matching.transfer(region)
-            print(f"{found.kind:8} {name:7} {carried.verdict:7} {carried.confidence:.2f}")
+            result = matching.transfer(region)
+            print(f"{found.kind:8} {name:7} {result.verdict:7} {result.confidence:.2f}")
 
 
 if __name__ == "__main__":

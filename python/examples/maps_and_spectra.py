@@ -13,7 +13,7 @@ def main() -> None:
     print("eigenvalues of the source", np.round(source.basis.values[:5], 1))
     print("eigenvalues of the target", np.round(target.basis.values[:5], 1))
 
-    # Somebody clicked eight landmarks on both. Each vertex belongs to the nearest, along the surface.
+    # Eight landmarks, clicked on both. Each vertex belongs to the nearest, along the surface.
     landmarks = semfm.farthest_points(hammer.vertices, 8)
     sides = []
     for shape in (source, target):

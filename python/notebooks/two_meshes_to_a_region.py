@@ -1,10 +1,10 @@
 # %% [markdown]
 # # From two meshes to a region
 #
-# Somebody showed a robot where to hold one object. Here is where to hold another of its kind.
+# One object was demonstrated to a robot: where to hold it. Here is where to hold another of its kind.
 #
 # SemFM finds semantic parts that two objects share, lays a *functional map* between their surfaces
-# through those anchors, and carries the demonstrated region along it. This notebook walks that road
+# through those anchors, and transfers the demonstrated region along it. This notebook does so
 # with two procedural objects and simulated embeddings, so that it runs anywhere within a minute:
 # `pip install 'semfm[viz]' notebook`. With your own objects only the first two cells change.
 
@@ -78,14 +78,14 @@ plt.show()
 # %% [markdown]
 # ## The map
 #
-# Matching a pair is costly next to asking it: one `Matching` carries any number of regions. The
+# Matching a pair is costly next to asking it: one `Matching` transfers any number of regions. The
 # functional map *C* takes coefficients of functions on the source to coefficients on the target; the
 # point map runs the other way and says for each target vertex which source vertex it stands for.
 
 # %%
 matching = semfm.Matching(*prepared)
-carried = matching.transfer(demonstrated)
-semfm.plot.anchors(carried)
+result = matching.transfer(demonstrated)
+semfm.plot.anchors(result)
 plt.show()
 semfm.plot.functional_map(matching.functional_map)
 plt.show()
@@ -96,7 +96,7 @@ plt.show()
 # Above the region, below the map as colours: equal colours are matched places.
 
 # %%
-semfm.plot.transfer(carried)
+semfm.plot.transfer(result)
 plt.show()
 
 # %% [markdown]
@@ -106,16 +106,16 @@ plt.show()
 # first; the hypotheses say where else it could be) or *refuse*.
 
 # %%
-semfm.plot.confidence(carried)
+semfm.plot.confidence(result)
 plt.show()
-print(f"{carried.verdict}, confidence {carried.confidence:.2f}")
-print(f"overlap with the true handle (IoU): {carried.region.iou(kettle.region):.2f}")
-weights = carried.weights
+print(f"{result.verdict}, confidence {result.confidence:.2f}")
+print(f"overlap with the true handle (IoU): {result.region.iou(kettle.region):.2f}")
+weights = result.weights
 centre = weights @ target.vertices / weights.sum()
 print(f"reach for {np.round(centre, 3)}, in the target's own frame")
 
 # %% [markdown]
 # ## Further
 #
-# `carried.write("carried")` writes everything that `semfm-cli transfer` writes, among it a scene for
+# `result.write("transfer")` writes everything that `semfm-cli transfer` writes, among it a scene for
 # Foxglove or Rerun; `semfm.adapters` hands all of this to trimesh, open3d, polyscope and rerun.

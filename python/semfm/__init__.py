@@ -1,4 +1,4 @@
-"""SemFM: carry a demonstrated region from one object to another by semantic functional maps.
+"""SemFM: transfer a demonstrated region from one object to another by semantic functional maps.
 
 A demonstration touches one object, the *source*; SemFM finds where to act on another of its kind,
 the *target*::
@@ -7,13 +7,14 @@ the *target*::
 
     mug, kettle = semfm.Mesh.read("mug.obj"), semfm.Mesh.read("kettle.ply")
     grip = semfm.Region.near(mug, contact=[0.05, 0.0, 0.04], radius=0.03)
-    carried = semfm.transfer(
+    result = semfm.transfer(
         mug, kettle, grip,
         source_embeddings="mug.emb.mcap", target_embeddings="kettle.emb.mcap")
-    print(carried.verdict, carried.region.vertices)
+    print(result.verdict, result.region.vertices)
 
-`transfer` is the easy door. `prepare` and `Matching` keep what is costly when one object meets many
-others or one pair carries many regions. Below lie the pieces, named as in Rust and in the papers:
+`transfer` is the short call. `prepare` and `Matching` keep what is costly when one object is matched
+with many others or one pair transfers many regions. They are made of pieces named as in Rust and in
+the papers:
 `Mesh`, `Shape`, `Eigenbasis`, `SemanticCloud`, `Anchors`, `FunctionalMap`, `PointMap`, `Region`.
 
 Arrays may be of any numeric dtype, order and stride; views that come out are read-only and share
@@ -25,7 +26,6 @@ from . import errors
 from ._semfm import (
     Alignment,
     Anchors,
-    Camera,
     Clusters,
     DemoObject,
     Eigenbasis,
@@ -41,6 +41,7 @@ from ._semfm import (
     Mesh,
     MeshFile,
     PatchEmbeddings,
+    Pinhole,
     PointMap,
     PreparedObject,
     Region,
@@ -96,7 +97,6 @@ from .errors import (
 __all__ = [
     "Alignment",
     "Anchors",
-    "Camera",
     "Cancelled",
     "Clusters",
     "ComputationError",
@@ -121,6 +121,7 @@ __all__ = [
     "MeshFile",
     "MissingPackage",
     "PatchEmbeddings",
+    "Pinhole",
     "PointMap",
     "PreparedObject",
     "Region",

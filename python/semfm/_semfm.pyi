@@ -102,7 +102,14 @@ class Anchors:
         """(a,) float64 array: cosine of the two mean features of each pair."""
         ...
     @staticmethod
-    def select(source_cloud: SemanticCloud, source_clusters: Clusters, target_cloud: SemanticCloud, target_clusters: Clusters, *, alpha: int = 2) -> Anchors:
+    def select(
+        source_cloud: SemanticCloud,
+        source_clusters: Clusters,
+        target_cloud: SemanticCloud,
+        target_clusters: Clusters,
+        *,
+        alpha: int = 2,
+    ) -> Anchors:
         """The one-to-one pairs of clusters with the largest total cosine between mean features.
 
         Parameters
@@ -120,88 +127,8 @@ class Anchors:
         """
         ...
 
-class Camera:
-    """A pinhole camera without distortion, posed in the object's frame: x right, y down, z forward.
-
-    A point projects to ``u = fx x / z + cx``, ``v = fy y / z + cy`` in pixels; the centre of the
-    pixel in column c and row r is at (c + ½, r + ½).
-
-    Parameters
-    ----------
-    width : int
-        Pixels.
-    height : int
-        Pixels.
-    fx : float
-        Focal length along x, in pixels.
-    fy : float
-        Focal length along y, in pixels.
-    cx : float
-        Principal point, x, in pixels.
-    cy : float
-        Principal point, y, in pixels.
-    camera_from_object : (4, 4) array_like
-        Rigid motion from the object's frame to the camera's, as a homogeneous matrix.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import semfm
-    >>> camera = semfm.Camera(64, 48, 70, 70, 32, 24, np.eye(4))
-    >>> camera.project([[0, 0, 2]]).tolist()
-    [[32.0, 24.0, 2.0]]
-    """
-    def __init__(self, width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_object: ArrayLike) -> None: ...
-    def __eq__(self, other: object) -> bool: ...
-    @property
-    def camera_from_object(self) -> NDArray[numpy.float64]:
-        """(4, 4) float64 array: rigid motion from the object's frame to the camera's."""
-        ...
-    @property
-    def cx(self) -> float:
-        """float: principal point, x, in pixels."""
-        ...
-    @property
-    def cy(self) -> float:
-        """float: principal point, y, in pixels."""
-        ...
-    @property
-    def eye(self) -> NDArray[numpy.float64]:
-        """(3,) float64 array: where the camera stands, in the object's frame."""
-        ...
-    @property
-    def fx(self) -> float:
-        """float: focal length along x, in pixels."""
-        ...
-    @property
-    def fy(self) -> float:
-        """float: focal length along y, in pixels."""
-        ...
-    @property
-    def height(self) -> int:
-        """int: pixels."""
-        ...
-    def project(self, points: ArrayLike) -> NDArray[numpy.float64]:
-        """Pixel position and depth of points.
-
-        Parameters
-        ----------
-        points : (n, 3) array_like
-            In the object's frame.
-
-        Returns
-        -------
-        (n, 3) float64 array
-            u, v, and depth z; u and v mean nothing where z ≤ 0.
-        """
-        ...
-    @property
-    def width(self) -> int:
-        """int: pixels."""
-        ...
-
 class Clusters:
-    """A cloud cut into parts: one label per point, every label from 0 borne by somebody.
+    """A cloud cut into parts: one label per point, every label from 0 on at least one.
 
     Parameters
     ----------
@@ -227,7 +154,9 @@ class DemoObject:
 
     Made by `demo_object`.
     """
-    def embeddings(self, level: str = 'medium', *, progress: Optional[_Progress] = None) -> Embeddings:
+    def embeddings(
+        self, level: str = "medium", *, progress: Optional[_Progress] = None
+    ) -> Embeddings:
         """Simulated patch embeddings of the default views.
 
         Parameters
@@ -282,7 +211,9 @@ class DemoObject:
         (n, 21) float32 array
         """
         ...
-    def write(self, folder: _Path, level: str = 'medium', *, progress: Optional[_Progress] = None) -> dict[str, Any]:
+    def write(
+        self, folder: _Path, level: str = "medium", *, progress: Optional[_Progress] = None
+    ) -> dict[str, Any]:
         """Writes ``NAME.obj``, ``NAME.json`` (the truth) and ``NAME.emb.mcap`` into a folder.
 
         Parameters
@@ -319,7 +250,13 @@ class Eigenbasis:
     eigenbasis : computes one from a Laplacian.
     Shape.basis : the one of a prepared mesh.
     """
-    def __init__(self, values: ArrayLike, functions: ArrayLike, mass: ArrayLike, residuals: Optional[ArrayLike] = None) -> None: ...
+    def __init__(
+        self,
+        values: ArrayLike,
+        functions: ArrayLike,
+        mass: ArrayLike,
+        residuals: Optional[ArrayLike] = None,
+    ) -> None: ...
     def diffuse(self, functions: ArrayLike, t: float) -> NDArray[numpy.float64]:
         """Heat diffusion exp(−tΔ)F on the truncated basis.
 
@@ -431,18 +368,25 @@ class Embeddings:
     ----------
     mesh : mesh_like
         The mesh that the views show.
-    cameras : list of Camera
+    cameras : list of Pinhole
         One per view, all of one size.
     patches : list of PatchEmbeddings
         One per view, all of one dimension.
     encoder : str, default "unnamed"
         Name of the encoder, for the file.
     """
-    def __init__(self, mesh: _MeshLike, cameras: Iterable[Camera], patches: Iterable[PatchEmbeddings], *, encoder: str = 'unnamed') -> None: ...
+    def __init__(
+        self,
+        mesh: _MeshLike,
+        cameras: Iterable[Pinhole],
+        patches: Iterable[PatchEmbeddings],
+        *,
+        encoder: str = "unnamed",
+    ) -> None: ...
     def __len__(self) -> int: ...
     @property
-    def cameras(self) -> list[Camera]:
-        """list of Camera: one per view."""
+    def cameras(self) -> list[Pinhole]:
+        """list of Pinhole: one per view."""
         ...
     @property
     def dim(self) -> int:
@@ -457,8 +401,50 @@ class Embeddings:
         """str: hash of the mesh that the views show."""
         ...
     @property
+    def metadata(self) -> dict[str, Any]:
+        """dict: the file's metadata record ``semfm``, all entries as text."""
+        ...
+    @property
     def n_views(self) -> int:
         """int: number of views."""
+        ...
+    @staticmethod
+    def of_views(
+        views: ViewsFile,
+        patches: Iterable[PatchEmbeddings],
+        *,
+        encoder: str,
+        revision: str = "unknown",
+        preprocessing: str = "unknown",
+        rolls: int = 1,
+        outliers: str = "unknown",
+        more: Optional[Mapping[str, Any]] = None,
+    ) -> Embeddings:
+        """What an encoder made of the views of a file; `semfm-embed` calls this.
+
+        Parameters
+        ----------
+        views : ViewsFile
+            The views that were encoded; their metadata are kept.
+        patches : list of PatchEmbeddings
+            One per view, all of one dimension.
+        encoder : str
+            Name of the encoder.
+        revision : str, default "unknown"
+            Its revision, or the hash of its file.
+        preprocessing : str, default "unknown"
+            How a picture was made into the encoder's input.
+        rolls : int, default 1
+            Number of turned pictures of each view that were averaged.
+        outliers : str, default "unknown"
+            What was done with outlier tokens.
+        more : dict, optional
+            Further entries of the metadata, text by name.
+
+        Returns
+        -------
+        Embeddings
+        """
         ...
     @property
     def patches(self) -> list[PatchEmbeddings]:
@@ -481,7 +467,7 @@ class Embeddings:
     def simulated(self) -> bool:
         """bool: True where the embeddings were made up, without a network."""
         ...
-    def write(self, path: _Path, *, dtype: str = 'f16') -> None:
+    def write(self, path: _Path, *, dtype: str = "f16") -> None:
         """Writes a ``NAME.emb.mcap``, whole or not at all.
 
         Parameters
@@ -519,7 +505,22 @@ class FunctionalMap:
         """
         ...
     @staticmethod
-    def fit(source: Eigenbasis, target: Eigenbasis, source_descriptors: ArrayLike, target_descriptors: ArrayLike, *, k: Optional[int] = None, laplacian: float = 0.0, descriptors: float = 0.0, orientation: float = 0.0, reversing: bool = False, source_mesh: Optional[_MeshLike] = None, target_mesh: Optional[_MeshLike] = None, coefficients: bool = False, progress: Optional[_Progress] = None) -> FunctionalMap:
+    def fit(
+        source: Eigenbasis,
+        target: Eigenbasis,
+        source_descriptors: ArrayLike,
+        target_descriptors: ArrayLike,
+        *,
+        k: Optional[int] = None,
+        laplacian: float = 0.0,
+        descriptors: float = 0.0,
+        orientation: float = 0.0,
+        reversing: bool = False,
+        source_mesh: Optional[_MeshLike] = None,
+        target_mesh: Optional[_MeshLike] = None,
+        coefficients: bool = False,
+        progress: Optional[_Progress] = None,
+    ) -> FunctionalMap:
         """The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
 
         Without regularisers and with fewer descriptors than eigenfunctions the minimum-norm one.
@@ -581,7 +582,9 @@ class FunctionalMap:
         """
         ...
     @staticmethod
-    def from_point_map(map: PointMap, source: Eigenbasis, target: Eigenbasis, *, k: Optional[int] = None) -> FunctionalMap:
+    def from_point_map(
+        map: PointMap, source: Eigenbasis, target: Eigenbasis, *, k: Optional[int] = None
+    ) -> FunctionalMap:
         """C f = f ∘ T in the two bases: ``Φ_targetᵀ M_target Φ_source[T]``.
 
         Parameters
@@ -626,7 +629,16 @@ class FunctionalMap:
         path : path
         """
         ...
-    def to_point_map(self, source: Eigenbasis, target: Eigenbasis, *, adjoint: bool = False, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0) -> PointMap:
+    def to_point_map(
+        self,
+        source: Eigenbasis,
+        target: Eigenbasis,
+        *,
+        adjoint: bool = False,
+        source_features: Optional[ArrayLike] = None,
+        target_features: Optional[ArrayLike] = None,
+        feature_weight: float = 0.0,
+    ) -> PointMap:
         """The point map target → source: each target vertex takes the source vertex whose delta
         function, sent through C, comes nearest to its own.
 
@@ -647,7 +659,19 @@ class FunctionalMap:
         PointMap
         """
         ...
-    def zoomout(self, source: Eigenbasis, target: Eigenbasis, *, k_final: int = 50, step: int = 5, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0, target_samples: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> FunctionalMap:
+    def zoomout(
+        self,
+        source: Eigenbasis,
+        target: Eigenbasis,
+        *,
+        k_final: int = 50,
+        step: int = 5,
+        source_features: Optional[ArrayLike] = None,
+        target_features: Optional[ArrayLike] = None,
+        feature_weight: float = 0.0,
+        target_samples: Optional[ArrayLike] = None,
+        progress: Optional[_Progress] = None,
+    ) -> FunctionalMap:
         """ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
 
         Parameters
@@ -756,7 +780,7 @@ class Grasps:
     def widths(self) -> NDArray[numpy.float64]:
         """(g,) float64 array: distances between the closed pads, metres."""
         ...
-    def write(self, path: _Path, *, format: Optional[str] = 'json') -> None:
+    def write(self, path: _Path, *, format: Optional[str] = "json") -> None:
         """Writes the grasps, whole or not at all.
 
         Parameters
@@ -861,7 +885,7 @@ class HeatGeodesics:
     >>> float(distances[0]), round(float(distances.max()), 1)  # half a great circle
     (0.0, 3.1)
     """
-    def __init__(self, mesh: _MeshLike, *, kind: str = 'tufted', time: float = 1.0) -> None: ...
+    def __init__(self, mesh: _MeshLike, *, kind: str = "tufted", time: float = 1.0) -> None: ...
     def distances(self, sources: Union[int, ArrayLike]) -> NDArray[numpy.float64]:
         """Distance of every vertex from the nearest source.
 
@@ -945,7 +969,7 @@ class Laplacian:
         ...
 
 class Matching:
-    """A matched pair: computed once, it carries any number of regions.
+    """A matched pair: computed once, it transfers any number of regions.
 
     Parameters
     ----------
@@ -957,9 +981,12 @@ class Matching:
         ``fused`` (where neither this nor `settings` is given), ``semfm``, ``anchored``,
         ``sinkhorn``, ``nearest`` or ``wks``.
     rule : str, optional
-        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+        How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
+    second_opinion : bool, optional
+        Whether an independent method judges the result, too; the method's own default where none is
+        given: True where its confidence is the agreement of the two.
     settings : TransferSettings, optional
         Everything that can be set, in place of `method` and `rule`.
     progress : progress, optional
@@ -974,7 +1001,17 @@ class Matching:
     >>> matching.transfer(mug.region).verdict in ("accept", "check", "refuse")
     True
     """
-    def __init__(self, source: PreparedObject, target: PreparedObject, *, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, settings: Optional[TransferSettings] = None, progress: Optional[_Progress] = None) -> None: ...
+    def __init__(
+        self,
+        source: PreparedObject,
+        target: PreparedObject,
+        *,
+        method: Optional[str] = None,
+        rule: Optional[str] = None,
+        seed: Optional[int] = None,
+        settings: Optional[TransferSettings] = None,
+        progress: Optional[_Progress] = None,
+    ) -> None: ...
     @property
     def anchors(self) -> Anchors:
         """Anchors: the paired parts of the two objects."""
@@ -992,7 +1029,7 @@ class Matching:
         """PreparedObject: the one to act on."""
         ...
     def transfer(self, region: Union[Region, _Path]) -> Transfer:
-        """Carries one region.
+        """Transfers one region.
 
         Parameters
         ----------
@@ -1195,7 +1232,14 @@ class PatchEmbeddings:
     valid : (rows, cols) array_like, optional
         False where the patch is to be ignored (bool).
     """
-    def __init__(self, data: ArrayLike, rect: ArrayLike, *, coverage: Optional[ArrayLike] = None, valid: Optional[ArrayLike] = None) -> None: ...
+    def __init__(
+        self,
+        data: ArrayLike,
+        rect: ArrayLike,
+        *,
+        coverage: Optional[ArrayLike] = None,
+        valid: Optional[ArrayLike] = None,
+    ) -> None: ...
     @property
     def coverage(self) -> NDArray[numpy.uint8]:
         """(rows, cols) uint8 array: share of each patch covered by the object, a read-only view."""
@@ -1215,6 +1259,142 @@ class PatchEmbeddings:
     @property
     def valid(self) -> NDArray[numpy.bool_]:
         """(rows, cols) bool array: False where the patch is to be ignored, a read-only view."""
+        ...
+
+class Pinhole:
+    """A pinhole camera without distortion: x right, y down, z forward, in the units of the world.
+
+    A point (x, y, z) of the camera's frame projects to ``u = fx x / z + cx``, ``v = fy y / z + cy``
+    in pixels, where the centre of pixel (0, 0) is at (½, ½). The world is the frame that the camera
+    stands in: an object's in rendered views. The two constructors differ in how the numbers that
+    they are given count pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm
+    >>> camera = semfm.Pinhole.with_pixel_centres_at_half(64, 48, 70, 70, 32, 24, np.eye(4))
+    >>> camera.project([[0, 0, 2]]).tolist()
+    [[32.0, 24.0, 2.0]]
+    >>> camera == semfm.Pinhole.with_pixel_centres_at_integers(
+    ...     64, 48, 70, 70, 31.5, 23.5, np.eye(4))
+    True
+    """
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def camera_from_world(self) -> NDArray[numpy.float64]:
+        """(4, 4) float64 array: rigid motion from the world's frame to the camera's."""
+        ...
+    @property
+    def cx(self) -> float:
+        """float: principal point, x, in pixels."""
+        ...
+    @property
+    def cy(self) -> float:
+        """float: principal point, y, in pixels."""
+        ...
+    @property
+    def eye(self) -> NDArray[numpy.float64]:
+        """(3,) float64 array: where the camera stands, in the world's frame."""
+        ...
+    @property
+    def fx(self) -> float:
+        """float: focal length along x, in pixels."""
+        ...
+    @property
+    def fy(self) -> float:
+        """float: focal length along y, in pixels."""
+        ...
+    @property
+    def height(self) -> int:
+        """int: pixels."""
+        ...
+    def project(self, points: ArrayLike) -> NDArray[numpy.float64]:
+        """Pixel position and depth of points.
+
+        Parameters
+        ----------
+        points : (n, 3) array_like
+            In the world's frame.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            u, v, and depth z; u and v mean nothing where z ≤ 0.
+        """
+        ...
+    @property
+    def width(self) -> int:
+        """int: pixels."""
+        ...
+    @staticmethod
+    def with_pixel_centres_at_half(
+        width: int,
+        height: int,
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        camera_from_world: ArrayLike,
+    ) -> Pinhole:
+        """A camera whose numbers count as ours do: the centre of pixel (0, 0) is at (½, ½).
+
+        Parameters
+        ----------
+        width : int
+            Pixels.
+        height : int
+            Pixels.
+        fx : float
+            Focal length along x, in pixels.
+        fy : float
+            Focal length along y, in pixels.
+        cx : float
+            Principal point, x, in pixels.
+        cy : float
+            Principal point, y, in pixels.
+        camera_from_world : (4, 4) array_like
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+
+        Returns
+        -------
+        Pinhole
+        """
+        ...
+    @staticmethod
+    def with_pixel_centres_at_integers(
+        width: int,
+        height: int,
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        camera_from_world: ArrayLike,
+    ) -> Pinhole:
+        """A camera whose numbers come from a calibration (OpenCV, ROS `CameraInfo`), in which the centre
+        of pixel (0, 0) is at (0, 0): half a pixel is added to its principal point.
+
+        Parameters
+        ----------
+        width : int
+            Pixels.
+        height : int
+            Pixels.
+        fx : float
+            Focal length along x, in pixels.
+        fy : float
+            Focal length along y, in pixels.
+        cx : float
+            Principal point, x, in pixels.
+        cy : float
+            Principal point, y, in pixels.
+        camera_from_world : (4, 4) array_like
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+
+        Returns
+        -------
+        Pinhole
+        """
         ...
 
 class PointMap:
@@ -1389,13 +1569,13 @@ class Region:
         """(n,) bool array: whether each vertex counts."""
         ...
     @staticmethod
-    def masked(mesh: _MeshLike, camera: Camera, mask: ArrayLike) -> Region:
+    def masked(mesh: _MeshLike, camera: Pinhole, mask: ArrayLike) -> Region:
         """All vertices that a camera sees inside a mask.
 
         Parameters
         ----------
         mesh : mesh_like
-        camera : Camera
+        camera : Pinhole
         mask : (height, width) array_like
             Of dtype bool, of the camera's size.
 
@@ -1504,7 +1684,7 @@ class SemanticCloud:
     points : (m, 3) array_like
         In the frame and units of the mesh as read.
     features : (m, d) array_like
-        From anybody's network; kept as float32.
+        From any network; kept as float32.
     n_views : (m,) array_like, optional
         How many views saw each point; 1 where none are given.
 
@@ -1515,7 +1695,9 @@ class SemanticCloud:
     >>> cloud
     SemanticCloud(2 points, dim 3)
     """
-    def __init__(self, points: ArrayLike, features: ArrayLike, n_views: Optional[ArrayLike] = None) -> None: ...
+    def __init__(
+        self, points: ArrayLike, features: ArrayLike, n_views: Optional[ArrayLike] = None
+    ) -> None: ...
     def __len__(self) -> int: ...
     @property
     def dim(self) -> int:
@@ -1574,7 +1756,20 @@ class Shape:
     >>> shape.basis.functions.shape
     (800, 20)
     """
-    def __init__(self, mesh: _MeshLike, *, k: int = 60, clip_k: bool = True, working_vertices: int = 10000, dust_share: float = 1e-06, laplacian: str = 'tufted', bridges: bool = True, tolerance: float = 1e-08, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> None: ...
+    def __init__(
+        self,
+        mesh: _MeshLike,
+        *,
+        k: int = 60,
+        clip_k: bool = True,
+        working_vertices: int = 10000,
+        dust_share: float = 1e-06,
+        laplacian: str = "tufted",
+        bridges: bool = True,
+        tolerance: float = 1e-08,
+        cache: Optional[_Cache] = None,
+        progress: Optional[_Progress] = None,
+    ) -> None: ...
     @property
     def basis(self) -> Eigenbasis:
         """Eigenbasis: that of the working mesh at area 1 (n_working × k)."""
@@ -1584,7 +1779,7 @@ class Shape:
         """Laplacian: that of the working mesh at area 1, bridges included."""
         ...
     def onto_original(self, values: ArrayLike) -> NDArray[numpy.float64]:
-        """Values on the working vertices, carried onto the original's.
+        """Values on the working vertices, extended to the original's.
 
         Parameters
         ----------
@@ -1665,7 +1860,14 @@ class SurfaceIndex:
     (3.0, [[0.5, 0.25, 0.25]])
     """
     def __init__(self, mesh: _MeshLike) -> None: ...
-    def closest(self, queries: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32], NDArray[numpy.float64]]:
+    def closest(
+        self, queries: ArrayLike
+    ) -> tuple[
+        NDArray[numpy.float64],
+        NDArray[numpy.float64],
+        NDArray[numpy.uint32],
+        NDArray[numpy.float64],
+    ]:
         """The point of the surface nearest to each query.
 
         Parameters
@@ -1680,7 +1882,9 @@ class SurfaceIndex:
         barycentric : (q, 3) float64 array
         """
         ...
-    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.int32]]:
+    def first_hit(
+        self, origins: ArrayLike, directions: ArrayLike
+    ) -> tuple[NDArray[numpy.float64], NDArray[numpy.int32]]:
         """The first triangle that each ray meets.
 
         Parameters
@@ -1703,13 +1907,13 @@ class SurfaceIndex:
         ...
 
 class Transfer:
-    """A carried region and everything known about it.
+    """A transferred region and everything known about it.
 
     Vertices are those of the meshes as given. Made by `transfer` and `Matching.transfer`.
     """
     @property
     def confidence(self) -> float:
-        """float: agreement with an independent opinion, in [0, 1]."""
+        """float: the probability that the IoU with the true region is at least one half, in [0, 1]."""
         ...
     @property
     def hypotheses(self) -> list[Hypothesis]:
@@ -1755,7 +1959,13 @@ class Transfer:
     def weights(self) -> NDArray[numpy.float64]:
         """(n_target,) float64 array: weight of each target vertex, a read-only view."""
         ...
-    def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, progress: Optional[_Progress] = None) -> list[str]:
+    def write(
+        self,
+        folder: _Path,
+        *,
+        about: Optional[Mapping[str, Any]] = None,
+        progress: Optional[_Progress] = None,
+    ) -> list[str]:
         """Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
         meshes, picture and scene.
 
@@ -1792,7 +2002,7 @@ class TransferSettings:
     >>> settings.zoomout["k_final"], settings.zoomout["step"], settings.n_anchors
     (40, 5, 3)
     """
-    def __init__(self, method: str = 'fused', **changes: Any) -> None: ...
+    def __init__(self, method: str = "fused", **changes: Any) -> None: ...
     def __eq__(self, other: object) -> bool: ...
     def to_dict(self) -> dict[str, Any]:
         """All settings by name, groups as dicts.
@@ -1808,11 +2018,11 @@ class View:
 
     See Also
     --------
-    render, read_views
+    render, ViewsFile
     """
     @property
-    def camera(self) -> Camera:
-        """Camera: the one the picture was taken with."""
+    def camera(self) -> Pinhole:
+        """Pinhole: the one the picture was taken with."""
         ...
     @property
     def depth(self) -> NDArray[numpy.float32]:
@@ -1827,7 +2037,101 @@ class View:
         """(height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view."""
         ...
 
-def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = Ellipsis, init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
+class ViewsFile:
+    """The rendered views of an object, as a ``NAME.views.mcap`` holds them: for `semfm-embed`, and for
+    Foxglove.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        The mesh that was rendered.
+    views : list of View
+        At least one, all of one size.
+    rig : str, default "given as cameras"
+        How the cameras were placed, in words, for the file.
+    background : str, default "as rendered"
+        What stands behind the object, in words, for the file.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import semfm, semfm.zoo
+    >>> mesh = semfm.zoo.torus(40, 20)
+    >>> views = semfm.render(mesh, semfm.rig(mesh, count=3, size=64))
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "torus.views.mcap")
+    >>> semfm.ViewsFile(mesh, views).write(path)
+    >>> file = semfm.ViewsFile.read(path)
+    >>> file, file.mesh == mesh, file.metadata["n_views"]
+    (ViewsFile(3 views, 64 × 64), True, '3')
+    >>> folder.cleanup()
+    """
+    def __init__(
+        self,
+        mesh: _MeshLike,
+        views: Iterable[View],
+        *,
+        rig: str = "given as cameras",
+        background: str = "as rendered",
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def cameras(self) -> list[Pinhole]:
+        """list of Pinhole: one per view."""
+        ...
+    @property
+    def mesh(self) -> Optional[Mesh]:
+        """Mesh, optional: the mesh that the views show, vertex by vertex as it was rendered; None where the file has none."""
+        ...
+    @property
+    def mesh_hash(self) -> str:
+        """str: hash of the mesh that the views show."""
+        ...
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """dict: the file's metadata record ``semfm``, all entries as text."""
+        ...
+    @property
+    def n_views(self) -> int:
+        """int: number of views."""
+        ...
+    @staticmethod
+    def read(path: _Path) -> ViewsFile:
+        """Reads a ``NAME.views.mcap`` and checks everything in it.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        ViewsFile
+        """
+        ...
+    @property
+    def views(self) -> list[View]:
+        """list of View: the views, as numbered."""
+        ...
+    def write(self, path: _Path) -> None:
+        """Writes a ``NAME.views.mcap`` with its mesh, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        """
+        ...
+
+def align(
+    mesh: _MeshLike,
+    points: ArrayLike,
+    *,
+    viewpoint: Optional[tuple[float, float, float]] = Ellipsis,
+    init: Optional[ArrayLike] = None,
+    scale_range: Optional[tuple[float, float]] = None,
+    n_starts: Optional[int] = 400,
+    seed: Optional[int] = 0,
+    progress: Optional[_Progress] = None,
+) -> Alignment:
     """Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
 
     Parameters
@@ -1855,7 +2159,9 @@ def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float
     """
     ...
 
-def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Camera:
+def camera_towards(
+    mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8
+) -> Pinhole:
     """One camera that looks along ``-direction`` at the whole object: for pictures of results.
 
     Parameters
@@ -1872,7 +2178,7 @@ def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size
 
     Returns
     -------
-    Camera
+    Pinhole
     """
     ...
 
@@ -1889,7 +2195,15 @@ def cotan_laplacian(mesh: _MeshLike) -> Laplacian:
     """
     ...
 
-def demo_object(category: str = 'containers', seed: int = 0, *, instance: int = 0, n_vertices: int = 3000, holes: int = 0, floaters: int = 0) -> DemoObject:
+def demo_object(
+    category: str = "containers",
+    seed: int = 0,
+    *,
+    instance: int = 0,
+    n_vertices: int = 3000,
+    holes: int = 0,
+    floaters: int = 0,
+) -> DemoObject:
     """Makes a procedural object of one of the paper's six categories.
 
     Parameters
@@ -1920,7 +2234,14 @@ def demo_object(category: str = 'containers', seed: int = 0, *, instance: int = 
     """
     ...
 
-def diffused_indicators(basis: Eigenbasis, labels: ArrayLike, chosen: ArrayLike, *, t: float = 0.005, norm: str = 'surface') -> NDArray[numpy.float64]:
+def diffused_indicators(
+    basis: Eigenbasis,
+    labels: ArrayLike,
+    chosen: ArrayLike,
+    *,
+    t: float = 0.005,
+    norm: str = "surface",
+) -> NDArray[numpy.float64]:
     """Coefficients of the indicator functions of labels, diffused by heat and scaled to unit norm.
 
     Parameters
@@ -1942,7 +2263,14 @@ def diffused_indicators(basis: Eigenbasis, labels: ArrayLike, chosen: ArrayLike,
     """
     ...
 
-def eigenbasis(laplacian: Laplacian, k: int, *, tolerance: float = 1e-08, seed: int = 0, progress: Optional[_Progress] = None) -> Eigenbasis:
+def eigenbasis(
+    laplacian: Laplacian,
+    k: int,
+    *,
+    tolerance: float = 1e-08,
+    seed: int = 0,
+    progress: Optional[_Progress] = None,
+) -> Eigenbasis:
     """The first k eigenpairs of a Laplacian.
 
     Residuals, orthonormality and (by an inertia count) completeness are verified before a basis is
@@ -1987,7 +2315,29 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+def find_grasps(
+    mesh: _MeshLike,
+    region: Region,
+    gripper: Union[Gripper, _Path],
+    *,
+    scale: float,
+    camera_from_object: Optional[ArrayLike] = None,
+    table: Optional[Any] = None,
+    scene_meshes: Optional[Iterable[_MeshLike]] = None,
+    scene_points: Optional[ArrayLike] = None,
+    scene_margin: Optional[float] = 0.005,
+    top: Optional[int] = 20,
+    n_samples: Optional[int] = 1000,
+    friction: Optional[float] = 0.5,
+    width_range: Optional[tuple[float, float]] = None,
+    approach: Optional[ArrayLike] = None,
+    approach_cone: Optional[float] = None,
+    demonstrated_approach: Optional[ArrayLike] = None,
+    clearance: Optional[float] = 0.0,
+    pad_in_region: Optional[float] = 0.5,
+    seed: Optional[int] = 0,
+    progress: Optional[_Progress] = None,
+) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
     Every grasp that comes back was checked: the open hand on its way in and where it closes meets
@@ -2051,7 +2401,9 @@ def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path],
     """
     ...
 
-def geodesic_distances(mesh: _MeshLike, sources: Union[int, ArrayLike], *, kind: str = 'tufted', time: float = 1.0) -> NDArray[numpy.float64]:
+def geodesic_distances(
+    mesh: _MeshLike, sources: Union[int, ArrayLike], *, kind: str = "tufted", time: float = 1.0
+) -> NDArray[numpy.float64]:
     """Distance of every vertex from the nearest source: `HeatGeodesics` for a single question.
 
     Parameters
@@ -2108,7 +2460,7 @@ def icosphere(subdivisions: int) -> Mesh:
     """
     ...
 
-def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
+def laplacian(mesh: _MeshLike, kind: str = "tufted") -> Laplacian:
     """The Laplacian of a mesh.
 
     Parameters
@@ -2130,8 +2482,18 @@ def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
     """
     ...
 
-def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = 'pull', n_samples: int = 1200, depth_tolerance: float = 0.01, radius: float = 0.06, seed: int = 0, progress: Optional[_Progress] = None) -> SemanticCloud:
-    """Carries the embeddings of views onto samples of the surface.
+def lift(
+    mesh: _MeshLike,
+    embeddings: Union[Embeddings, _Path],
+    *,
+    rule: str = "pull",
+    n_samples: int = 1200,
+    depth_tolerance: float = 0.01,
+    radius: float = 0.06,
+    seed: int = 0,
+    progress: Optional[_Progress] = None,
+) -> SemanticCloud:
+    """Lifts the embeddings of views onto samples of the surface.
 
     Parameters
     ----------
@@ -2196,14 +2558,28 @@ def point_cloud_laplacian(points: ArrayLike, *, n_neighbors: int = 30, mollify_f
     """
     ...
 
-def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, n_samples: Optional[int] = None, seed: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> PreparedObject:
+def prepare(
+    mesh: _MeshLike,
+    *,
+    features: Optional[ArrayLike] = None,
+    embeddings: Optional[Union[Embeddings, _Path]] = None,
+    cloud: Optional[SemanticCloud] = None,
+    method: Optional[str] = None,
+    settings: Optional[TransferSettings] = None,
+    k: Optional[int] = None,
+    working_vertices: Optional[int] = None,
+    n_samples: Optional[int] = None,
+    seed: Optional[int] = None,
+    cache: Optional[_Cache] = None,
+    progress: Optional[_Progress] = None,
+) -> PreparedObject:
     """Makes an object ready to be matched with any number of others.
 
     Parameters
     ----------
     mesh : mesh_like
     features : (n, d) array_like, optional
-        A feature vector per vertex, from anybody's network.
+        A feature vector per vertex, from any network.
     embeddings : Embeddings or path, optional
         Patch embeddings of rendered views of this very mesh.
     cloud : SemanticCloud, optional
@@ -2254,27 +2630,25 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     """
     ...
 
-def read_views(path: _Path) -> list[View]:
-    """Reads the views of a ``NAME.views.mcap``.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    list of View
-    """
-    ...
-
-def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, occlusion: float = 0.0, edges: float = 0.0, normals: bool = False, progress: Optional[_Progress] = None) -> list[View]:
+def render(
+    mesh: Union[_MeshLike, MeshFile],
+    cameras: Optional[Iterable[Pinhole]] = None,
+    *,
+    colors: Optional[ArrayLike] = None,
+    supersampling: int = 2,
+    background: Optional[ArrayLike] = None,
+    occlusion: float = 0.0,
+    edges: float = 0.0,
+    normals: bool = False,
+    progress: Optional[_Progress] = None,
+) -> list[View]:
     """One picture per camera, with depth and triangle of every pixel.
 
     Parameters
     ----------
     mesh : mesh_like or MeshFile
         A `MeshFile` is drawn in its own colours.
-    cameras : list of Camera, optional
+    cameras : list of Pinhole, optional
         As `rig` makes them where none are given.
     colors : (n, 3) array_like, optional
         sRGB of each vertex, 0 to 1.
@@ -2304,7 +2678,17 @@ def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Camera]]
     """
     ...
 
-def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True, close_ups: int = 0) -> list[Camera]:
+def rig(
+    mesh: _MeshLike,
+    *,
+    count: int = 14,
+    size: int = 224,
+    field_of_view: float = 0.5235987755982988,
+    fill: float = 0.8,
+    max_zoom: float = 1.5,
+    principal_frame: bool = True,
+    close_ups: int = 0,
+) -> list[Pinhole]:
     """Cameras all around an object, each zoomed and centred on its silhouette.
 
     Parameters
@@ -2327,7 +2711,7 @@ def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: flo
 
     Returns
     -------
-    list of Camera
+    list of Pinhole
     """
     ...
 
@@ -2346,7 +2730,9 @@ def run_cli(arguments: Iterable[str]) -> int:
     """
     ...
 
-def sample_even(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+def sample_even(
+    mesh: _MeshLike, n: int, *, seed: int = 0
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
     """Points as far from each other as they can be, out of six times as many uniform ones.
 
     Parameters
@@ -2372,7 +2758,9 @@ def sample_even(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[nump
     """
     ...
 
-def sample_uniform(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+def sample_uniform(
+    mesh: _MeshLike, n: int, *, seed: int = 0
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
     """Independent points, uniform by area.
 
     Parameters
@@ -2409,7 +2797,15 @@ def set_num_threads(n_threads: int) -> None:
     """
     ...
 
-def spectral_clusters(cloud: SemanticCloud, *, n_clusters: int = 5, neighbours: int = 10, starts: int = 10, seed: int = 0, progress: Optional[_Progress] = None) -> Clusters:
+def spectral_clusters(
+    cloud: SemanticCloud,
+    *,
+    n_clusters: int = 5,
+    neighbours: int = 10,
+    starts: int = 10,
+    seed: int = 0,
+    progress: Optional[_Progress] = None,
+) -> Clusters:
     """Cuts a cloud into parts: spectral clustering on its neighbour graph, weighed by features.
 
     Parameters
@@ -2446,8 +2842,27 @@ def torus(n_around: int, n_across: int) -> Mesh:
     """
     ...
 
-def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
-    """Carries a demonstrated region from one object to another.
+def transfer(
+    source: Union[_MeshLike, PreparedObject],
+    target: Union[_MeshLike, PreparedObject],
+    region: Union[Region, _Path],
+    *,
+    source_features: Optional[ArrayLike] = None,
+    target_features: Optional[ArrayLike] = None,
+    source_embeddings: Optional[Union[Embeddings, _Path]] = None,
+    target_embeddings: Optional[Union[Embeddings, _Path]] = None,
+    source_cloud: Optional[SemanticCloud] = None,
+    target_cloud: Optional[SemanticCloud] = None,
+    method: Optional[str] = None,
+    rule: Optional[str] = None,
+    seed: Optional[int] = None,
+    settings: Optional[TransferSettings] = None,
+    k: Optional[int] = None,
+    working_vertices: Optional[int] = None,
+    cache: Optional[_Cache] = None,
+    progress: Optional[_Progress] = None,
+) -> Transfer:
+    """Transfers a demonstrated region from one object to another.
 
     Parameters
     ----------
@@ -2458,7 +2873,7 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     region : Region or path
         Where the demonstration touched the source.
     source_features : (n_source, d) array_like, optional
-        A feature vector per vertex, from anybody's network.
+        A feature vector per vertex, from any network.
     target_features : (n_target, d) array_like, optional
     source_embeddings : Embeddings or path, optional
         Patch embeddings of rendered views.
@@ -2470,9 +2885,12 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
         ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
         ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
     rule : str, optional
-        How a map carries the region: ``preimage`` (where none is given) or ``image``.
+        How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
+    second_opinion : bool, optional
+        Whether an independent method judges the result, too; the method's own default where none is
+        given: True where its confidence is the agreement of the two.
     settings : TransferSettings, optional
         Everything that can be set, in place of `method` and `rule`.
     k : int, optional
@@ -2492,10 +2910,10 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     --------
     >>> import semfm
     >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
-    >>> carried = semfm.transfer(
+    >>> result = semfm.transfer(
     ...     mug.mesh, kettle.mesh, mug.region,
     ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
-    >>> carried.region.n_vertices == kettle.mesh.n_vertices
+    >>> result.region.n_vertices == kettle.mesh.n_vertices
     True
     """
     ...
@@ -2537,15 +2955,12 @@ def wks(basis: Eigenbasis, *, n_energies: int = 100) -> NDArray[numpy.float64]:
     """
     ...
 
-def write_views(path: _Path, views: Iterable[View], mesh: _MeshLike) -> None:
-    """Writes views of a mesh as ``NAME.views.mcap``, whole or not at all: for `semfm-embed`.
+def write_file(path: _Path, content: bytes) -> None:
+    """Writes bytes to a file, whole or not at all.
 
     Parameters
     ----------
     path : path
-    views : list of View
-        All of one size.
-    mesh : mesh_like
-        The mesh that was rendered.
+    content : bytes
     """
     ...

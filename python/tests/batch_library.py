@@ -61,7 +61,7 @@ class Deadly(Demonstration):
     always: tuple = ()
     marks: str = ""
 
-    def carry(self, row):
+    def transfer(self, row):
         if row.name in self.always:
             os.kill(os.getpid(), signal.SIGKILL)
         if row.name in self.once:
@@ -69,7 +69,7 @@ class Deadly(Demonstration):
             if not mark.exists():
                 mark.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
-        return super().carry(row)
+        return super().transfer(row)
 
 
 def settings() -> semfm.TransferSettings:

@@ -28,7 +28,7 @@ def small(tmp_path):
     return library(tmp_path, 6)
 
 
-def carried(small, out="answers", **options):
+def transferred(small, out="answers", **options):
     return semfm.batch.transfer(
         small.source,
         small.region,
@@ -52,7 +52,7 @@ def test_answers_are_those_of_a_single_transfer(small, format):
     if format == "parquet":
         pytest.importorskip("pyarrow")
     told = []
-    summary = carried(
+    summary = transferred(
         small, format=format, point_maps=True, progress=lambda *step: told.append(step)
     )
     assert (summary.n_rows, summary.n_done, summary.n_failed, summary.n_skipped) == (6, 6, 0, 0)
@@ -80,7 +80,7 @@ def test_answers_are_those_of_a_single_transfer(small, format):
 
 def test_parquet_is_one_table_for_others(small):
     pq = pytest.importorskip("pyarrow.parquet")
-    carried(small, shard_size=4)
+    transferred(small, shard_size=4)
     table = pq.read_table(small.folder / "answers" / "records")
     assert table.num_rows == 6 and table.schema.equals(shards.schema())
     assert len(list((small.folder / "answers" / "records").iterdir())) == 2
@@ -154,7 +154,7 @@ def test_failures_are_recorded_and_retried(small):
         {"name": "short", "mesh": "object-000.ply", "features": "short.npy"},
     ]
     small.write()
-    summary = carried(small)
+    summary = transferred(small)
     assert (summary.n_done, summary.n_failed) == (6, 3)
     found = by_name(small)
     assert (
@@ -166,11 +166,11 @@ def test_failures_are_recorded_and_retried(small):
     with pytest.raises(ValueError, match="short has no region"):
         semfm.batch.region_of(found["short"])
     # As they were, they stay failed; on request they are tried; a mended file is tried by itself.
-    assert carried(small).n_skipped == 9
-    again = carried(small, retry_failed=True)
+    assert transferred(small).n_skipped == 9
+    again = transferred(small, retry_failed=True)
     assert (again.n_skipped, again.n_failed) == (6, 3)
     np.save(bad, np.load(small.folder / "object-000.npy"))
-    mended = carried(small)
+    mended = transferred(small)
     # "no mesh" names the mended file too, and still has no mesh.
     assert (mended.n_done, mended.n_failed, mended.n_skipped) == (1, 1, 7)
     assert by_name(small)["no numpy"]["status"] == "done"
@@ -206,7 +206,7 @@ def test_a_hanging_object_is_given_up(small, monkeypatch):
     os.mkfifo(small.folder / "endless.npy")
     small.rows.insert(0, {"name": "hangs", "mesh": "object-000.ply", "features": "endless.npy"})
     small.write()
-    summary = carried(small, timeout_s=1.5)
+    summary = transferred(small, timeout_s=1.5)
     assert summary.errors == {"timeout": 1} and summary.n_done == 6
     assert "killed" in by_name(small)["hangs"]["error"]
 
@@ -220,17 +220,17 @@ def test_what_is_done_is_not_done_again(small):
             raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):
-        carried(small, progress=enough)
+        transferred(small, progress=enough)
     first = by_name(small)
     assert 3 <= len(first) < 6
-    second = carried(small)
+    second = transferred(small)
     assert (second.n_skipped, second.n_done) == (len(first), 6 - len(first))
     found = by_name(small)
     assert len(found) == 6 and all(found[name] == first[name] for name in first)
     # A target that changed is done again, alone.
     semfm.zoo.icosphere(2).write(small.folder / "object-001.ply")
     np.save(small.folder / "object-001.npy", np.eye(162, 21, dtype=np.float32))
-    third = carried(small)
+    third = transferred(small)
     assert (third.n_skipped, third.n_done) == (5, 1)
     assert by_name(small)["object-001"]["n_vertices"] == 162
 
@@ -239,27 +239,27 @@ def test_what_is_done_is_not_done_again(small):
 def test_half_written_shards_are_discarded(small, format):
     if format == "parquet":
         pytest.importorskip("pyarrow")
-    carried(small, format=format, shard_size=2)
+    transferred(small, format=format, shard_size=2)
     inner = small.folder / "answers" / "records"
     first = sorted(inner.iterdir())[0]
     first.write_bytes(first.read_bytes()[:-20])
     (inner / ".semfm-part-of-a-shard").write_bytes(b"half")
-    again = carried(small, format=format)
+    again = transferred(small, format=format)
     assert (again.n_discarded, again.n_done, again.n_skipped) == (2, 2, 4)
     assert len(by_name(small)) == 6 and not list(inner.glob(".semfm-*"))
 
 
 def test_a_folder_belongs_to_one_question_and_one_writer(small):
-    carried(small)
+    transferred(small)
     with pytest.raises(semfm.InvalidInput, match="settings differ") as caught:
-        carried(small, settings=semfm.TransferSettings("nearest"))
+        transferred(small, settings=semfm.TransferSettings("nearest"))
     assert caught.value.code == "other-batch"
 
     def second(stage, done, total):
         with pytest.raises(semfm.FileError, match="another batch"):
-            carried(small, out="other")
+            transferred(small, out="other")
 
-    carried(small, out="other", progress=second)
+    transferred(small, out="other", progress=second)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
@@ -357,7 +357,7 @@ def test_manifests_of_every_format_agree(tmp_path):
 )
 def test_options_that_are_wrong_are_named(small, options, message):
     with pytest.raises(semfm.InvalidInput, match=message):
-        carried(small, **options)
+        transferred(small, **options)
     assert not (small.folder / "answers").exists()
 
 

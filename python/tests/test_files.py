@@ -54,7 +54,7 @@ def test_every_truncation_and_bit_flip_is_refused_or_harmless(tmp_path):
             assert contents(broken) == truth
         except FormatError:
             refused += 1
-    assert refused > 200, "the CRCs catch nearly all flips; the rest hit what carries no data"
+    assert refused > 200, "the CRCs catch nearly all flips; the rest hit what transfers no data"
 
 
 def edit(topic: str, **fields):

@@ -90,7 +90,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def embedded(folder):
-    """The views through a tiny ONNX encoder and semfm-embed's own road."""
+    """The views through a tiny ONNX encoder and semfm-embed itself."""
     pytest.importorskip("onnxruntime")
     views, path = folder / "source.views.mcap", folder / "source.emb.mcap"
     assert embed([str(views), "-o", str(path), "--model", str(write_encoder(folder))]) == 0

@@ -23,7 +23,7 @@ def required(name):
 
 
 @pytest.fixture(scope="module")
-def carried():
+def result():
     source, target = (semfm.demo_object("tools", instance=i, n_vertices=400) for i in (0, 1))
     return semfm.transfer(
         source.mesh,
@@ -48,32 +48,32 @@ def cap(sphere):
 RED, GREY = [219, 41, 41, 255], [199, 199, 199, 255]
 
 
-def test_a_transfer_has_two_sides_that_do_not_touch(carried):
-    source, target = parts_of(carried)
+def test_a_transfer_has_two_sides_that_do_not_touch(result):
+    source, target = parts_of(result)
     assert (source.name, target.name) == ("source", "target")
     assert source.vertices[:, 0].max() < (target.vertices + target.offset)[:, 0].min()
-    assert np.array_equal(target.scalars["region"], carried.weights)
-    looked_up = source.layers["places"][carried.point_map.source_of]
+    assert np.array_equal(target.scalars["region"], result.weights)
+    looked_up = source.layers["places"][result.point_map.source_of]
     assert np.array_equal(target.layers["places"], looked_up)
     bytes_ = color_bytes(source.colors)
-    assert bytes_[carried.source_region.mask].tolist()[0] == RED
-    assert bytes_[~carried.source_region.mask].tolist()[0] == GREY
+    assert bytes_[result.source_region.mask].tolist()[0] == RED
+    assert bytes_[~result.source_region.mask].tolist()[0] == GREY
 
 
-def test_what_does_not_fit_is_refused(sphere, cap, carried):
+def test_what_does_not_fit_is_refused(sphere, cap, result):
     with pytest.raises(semfm.InvalidInput, match="found both"):
         parts_of(sphere, cap, sphere.vertices)
     with pytest.raises(semfm.InvalidInput, match="has its own"):
-        parts_of(carried, cap)
+        parts_of(result, cap)
     with pytest.raises(semfm.InvalidInput, match="SemanticCloud"):
-        parts_of(carried.source.cloud, cap)
+        parts_of(result.source.cloud, cap)
     with pytest.raises(semfm.InvalidInput, match="region: expected shape"):
         parts_of(sphere, [1.0])
     with pytest.raises(TypeError, match="found str"):
         parts_of("mug.obj")
 
 
-def test_trimesh_and_back(sphere, cap, carried):
+def test_trimesh_and_back(sphere, cap, result):
     trimesh = required("trimesh")
     there = to_trimesh(sphere, region=cap)
     assert semfm.Mesh.from_trimesh(there) == sphere
@@ -81,26 +81,26 @@ def test_trimesh_and_back(sphere, cap, carried):
     assert there.visual.vertex_colors[cap.mask].tolist() == [RED] * int(cap.mask.sum())
     double = semfm.Mesh(np.vstack([sphere.vertices] * 2), sphere.faces)
     assert len(to_trimesh(double).vertices) == 2 * sphere.n_vertices
-    cloud = to_trimesh(carried.source.cloud)
+    cloud = to_trimesh(result.source.cloud)
     assert isinstance(cloud, trimesh.PointCloud) and len(cloud.vertices) == len(
-        carried.source.cloud
+        result.source.cloud
     )
-    scene = to_trimesh(carried)
+    scene = to_trimesh(result)
     transform, name = scene.graph["target"]
     assert sorted(scene.geometry) == ["source", "target"] and transform[0, 3] != 0
-    assert np.array_equal(scene.geometry[name].vertices, carried.target.mesh.vertices)
+    assert np.array_equal(scene.geometry[name].vertices, result.target.mesh.vertices)
 
 
-def test_open3d_and_back(sphere, cap, carried):
+def test_open3d_and_back(sphere, cap, result):
     required("open3d")
     there = to_open3d(sphere, region=cap)
     assert semfm.Mesh.from_open3d(there) == sphere and there.has_vertex_normals()
     colors = np.asarray(there.vertex_colors)
     assert np.allclose(colors[cap.mask], [0.86, 0.16, 0.16])
-    source, target = to_open3d(carried)
-    assert semfm.Mesh.from_open3d(target) == carried.target.mesh
-    cloud = to_open3d(carried.source.cloud)
-    assert np.array_equal(np.asarray(cloud.points), carried.source.cloud.points)
+    source, target = to_open3d(result)
+    assert semfm.Mesh.from_open3d(target) == result.target.mesh
+    cloud = to_open3d(result.source.cloud)
+    assert np.array_equal(np.asarray(cloud.points), result.source.cloud.points)
 
 
 def test_polyscope_has_structures_and_quantities(tmp_path):
@@ -119,12 +119,12 @@ mesh = to_polyscope(sphere, "ball", region=cap)
 assert polyscope.has_surface_mesh("ball") and mesh.n_vertices() == sphere.n_vertices
 objects = [semfm.demo_object("tools", instance=i, n_vertices=300) for i in (0, 1)]
 features = dict(zip(("source_features", "target_features"), (o.shared_features() for o in objects)))
-carried = semfm.transfer(objects[0].mesh, objects[1].mesh, objects[0].region, **features)
-source, target = to_polyscope(carried, "pair")
+result = semfm.transfer(objects[0].mesh, objects[1].mesh, objects[0].region, **features)
+source, target = to_polyscope(result, "pair")
 assert polyscope.has_surface_mesh("pair source") and polyscope.has_surface_mesh("pair target")
 assert target.get_transform()[0, 3] != 0 and np.array_equal(source.get_transform(), np.eye(4))
-cloud = to_polyscope(carried.source.cloud)
-assert polyscope.has_point_cloud("cloud") and cloud.n_points() == len(carried.source.cloud)
+cloud = to_polyscope(result.source.cloud)
+assert polyscope.has_point_cloud("cloud") and cloud.n_points() == len(result.source.cloud)
 """
     command = [sys.executable, "-c", code]
     run = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
@@ -133,14 +133,14 @@ assert polyscope.has_point_cloud("cloud") and cloud.n_points() == len(carried.so
     assert run.returncode == 0, run.stderr
 
 
-def test_rerun_is_told_everything(sphere, cap, carried, tmp_path):
+def test_rerun_is_told_everything(sphere, cap, result, tmp_path):
     rerun = required("rerun")
     recording = rerun.RecordingStream("semfm_test")
     file = tmp_path / "all.rrd"
     recording.save(str(file))
     assert to_rerun(sphere, region=cap, recording=recording) == ["mesh"]
-    assert to_rerun(carried, "pair", recording=recording) == ["pair/source", "pair/target"]
-    assert to_rerun(carried.source.cloud, recording=recording) == ["cloud"]
+    assert to_rerun(result, "pair", recording=recording) == ["pair/source", "pair/target"]
+    assert to_rerun(result.source.cloud, recording=recording) == ["cloud"]
     views = semfm.render(sphere, semfm.rig(sphere, count=2, size=32))
     assert to_rerun(views, recording=recording) == ["views/0", "views/1"]
     assert to_rerun(views[0].camera, "eye", recording=recording) == ["eye"]

@@ -37,9 +37,9 @@ DOCS = dict(documented())
 def test_everything_public_is_documented_and_exported():
     assert [name for name, doc in DOCS.items() if not doc.strip()] == []
     exported = {name for name in DOCS if "." not in name}
-    inner = {"run_cli", "icosphere", "torus"}
+    inner = {"run_cli", "write_file", "icosphere", "torus"}
     assert exported - inner == {name for name in semfm.__all__ if name in exported}
-    assert set(semfm.zoo.__all__) == inner - {"run_cli"}
+    assert set(semfm.zoo.__all__) == inner - {"run_cli", "write_file"}
     assert all(hasattr(semfm, name) for name in semfm.__all__)
 
 

@@ -1,4 +1,4 @@
-"""Manners: views that keep their owner, a free interpreter, Ctrl-C, progress, pickles, panics."""
+"""What every class does: views that keep their owner, a free interpreter, Ctrl-C, progress, pickles, panics."""
 
 from __future__ import annotations
 
@@ -185,8 +185,8 @@ print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     assert run.stdout.strip() == "0", run.stderr
 
 
-def test_results_do_not_depend_on_the_number_of_threads(carried):
-    mug, kettle = carried.source, carried.target
+def test_results_do_not_depend_on_the_number_of_threads(result):
+    mug, kettle = result.source, result.target
     answers = []
     try:
         for n_threads in (1, 3):
@@ -196,20 +196,20 @@ def test_results_do_not_depend_on_the_number_of_threads(carried):
             again = semfm.transfer(
                 semfm.prepare(mug.mesh, cloud=mug.cloud),
                 semfm.prepare(kettle.mesh, cloud=kettle.cloud),
-                carried.source_region,
+                result.source_region,
             )
             answers.append((shape.basis.functions.tobytes(), again.weights.tobytes()))
     finally:
         semfm.set_num_threads(0)
     assert answers[0] == answers[1]
-    assert answers[0][1] == carried.weights.tobytes()
+    assert answers[0][1] == result.weights.tobytes()
 
 
 # ---- pickles and copies
 
 
 @pytest.fixture(scope="module")
-def carried():
+def result():
     mug, kettle = (
         semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1)
     )
@@ -222,10 +222,10 @@ def carried():
     )
 
 
-def values_of(carried):
+def values_of(result):
     """One value of every class that can be pickled, and what makes two of them equal."""
-    mesh, matching = carried.source.mesh, semfm.Matching(carried.source, carried.target)
-    shape, camera = carried.source.shape, semfm.rig(mesh, count=2)[0]
+    mesh, matching = result.source.mesh, semfm.Matching(result.source, result.target)
+    shape, camera = result.source.shape, semfm.rig(mesh, count=2)[0]
     view = semfm.render(mesh, [camera])[0]
     patches = semfm.PatchEmbeddings(
         np.arange(24, dtype=float).reshape(2, 3, 4), [0, 0, 48, 32], valid=np.eye(2, 3) > 0
@@ -236,30 +236,30 @@ def values_of(carried):
         "Shape": (shape, lambda s: (s.original.hash, s.basis.functions, s.report["k"])),
         "Laplacian": (shape.laplacian, lambda x: (x.stiffness.toarray(), x.mass)),
         "Eigenbasis": (shape.basis, lambda b: (b.values, b.functions, b.mass, b.residuals)),
-        "Camera": (camera, lambda c: (c.camera_from_object, c.fx, c.cx, c.width)),
+        "Pinhole": (camera, lambda c: (c.camera_from_world, c.fx, c.cx, c.width)),
         "View": (view, lambda v: (v.rgb, v.depth, v.triangles)),
         "PatchEmbeddings": (patches, lambda p: (p.data, p.rect, p.coverage, p.valid)),
         "Embeddings": (embeddings, lambda e: (e.encoder, e.mesh_hash, e.patches[0].data)),
-        "SemanticCloud": (carried.source.cloud, lambda c: (c.points, c.features, c.n_views)),
+        "SemanticCloud": (result.source.cloud, lambda c: (c.points, c.features, c.n_views)),
         "Clusters": (semfm.Clusters([3, 1, 3]), lambda c: (c.labels,)),
         "Anchors": (matching.anchors, lambda a: (a.pairs, a.scores, a.margins, a.cosines)),
         "FunctionalMap": (matching.functional_map, lambda f: (f.matrix,)),
-        "PointMap": (carried.point_map, lambda p: (p.source_of, p.n_source)),
-        "Region": (carried.region, lambda r: (r.weights,)),
-        "TransferSettings": (carried.settings, lambda s: (s.to_dict(),)),
+        "PointMap": (result.point_map, lambda p: (p.source_of, p.n_source)),
+        "Region": (result.region, lambda r: (r.weights,)),
+        "TransferSettings": (result.settings, lambda s: (s.to_dict(),)),
         "PreparedObject": (
-            carried.source,
+            result.source,
             lambda p: (p.cloud.features, p.shape.basis.values, p.stages_ms),
         ),
         "Transfer": (
-            carried,
+            result,
             lambda t: (t.weights, t.confidence, t.verdict, t.point_map.source_of, t.report),
         ),
     }
 
 
-def test_everything_can_be_pickled_and_copied(carried):
-    for name, (value, facts) in values_of(carried).items():
+def test_everything_can_be_pickled_and_copied(result):
+    for name, (value, facts) in values_of(result).items():
         for again in (
             pickle.loads(pickle.dumps(value, protocol=5)),
             copy.copy(value),
@@ -271,22 +271,22 @@ def test_everything_can_be_pickled_and_copied(carried):
             assert repr(again) == repr(value)
 
 
-def test_a_pickled_transfer_writes_the_same_files(carried, tmp_path):
-    again = pickle.loads(pickle.dumps(carried))
-    for name, each in (("first", carried), ("again", again)):
+def test_a_pickled_transfer_writes_the_same_files(result, tmp_path):
+    again = pickle.loads(pickle.dumps(result))
+    for name, each in (("first", result), ("again", again)):
         each.write(tmp_path / name)
     for file in ("region.json", "point_map.json", "target.ply", "report.json"):
         first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "again"))
         assert first == second, file
 
 
-def test_npz_files_give_maps_and_bases_back(carried, tmp_path):
-    basis, target = carried.source.shape.basis, carried.target.shape.basis
+def test_npz_files_give_maps_and_bases_back(result, tmp_path):
+    basis, target = result.source.shape.basis, result.target.shape.basis
     basis.to_npz(tmp_path / "basis.npz")
     again = semfm.Eigenbasis.from_npz(tmp_path / "basis.npz")
     assert np.array_equal(again.functions, basis.functions)
-    carried.point_map.to_npz(tmp_path / "map.npz")
-    assert semfm.PointMap.from_npz(tmp_path / "map.npz") == carried.point_map
+    result.point_map.to_npz(tmp_path / "map.npz")
+    assert semfm.PointMap.from_npz(tmp_path / "map.npz") == result.point_map
     fitted = semfm.FunctionalMap.fit(basis, target, semfm.wks(basis), semfm.wks(target), k=20)
     fitted.to_npz(tmp_path / "fitted.npz")
     assert semfm.FunctionalMap.from_npz(tmp_path / "fitted.npz") == fitted

@@ -37,7 +37,7 @@ def test_a_transfer_by_features_is_the_same_at_the_shell(pair, method, tmp_path)
         "--method", method, "--seed", 5, "--no-cache", "-o", tmp_path / "shell",
     )  # fmt: skip
     assert run.returncode in (0, 1), run.stderr
-    carried = semfm.transfer(
+    result = semfm.transfer(
         files[0]["mesh"],
         semfm.Mesh.read(files[1]["mesh"]),
         folder / "grip.json",
@@ -46,11 +46,11 @@ def test_a_transfer_by_features_is_the_same_at_the_shell(pair, method, tmp_path)
         method=method,
         seed=5,
     )
-    carried.write(tmp_path / "python")
+    result.write(tmp_path / "python")
     same_files(tmp_path)
     report = json.loads((tmp_path / "shell/report.json").read_text())
-    assert carried.report["map"] == report["map"] and carried.verdict == report["verdict"]
-    assert run.returncode == (1 if carried.verdict == "refuse" else 0)
+    assert result.report["map"] == report["map"] and result.verdict == report["verdict"]
+    assert run.returncode == (1 if result.verdict == "refuse" else 0)
 
 
 def test_a_transfer_by_embeddings_is_the_same_at_the_shell(pair, tmp_path):
@@ -65,7 +65,7 @@ def test_a_transfer_by_embeddings_is_the_same_at_the_shell(pair, tmp_path):
     matching = semfm.Matching(*prepared)
     matching.transfer(folder / "grip.json").write(tmp_path / "python")
     same_files(tmp_path)
-    # The reusable door is the easy door, asked twice.
+    # The reusable value gives what the short call gives.
     again = semfm.transfer(*prepared, source.region)
     assert np.array_equal(again.weights, matching.transfer(source.region).weights)
 

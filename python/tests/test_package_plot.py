@@ -25,7 +25,7 @@ def pair():
 
 
 @pytest.fixture(scope="module")
-def carried(pair):
+def result(pair):
     source, target = pair
     return semfm.transfer(
         source.mesh,
@@ -91,31 +91,31 @@ def test_axes_that_are_given_are_drawn_into(pair):
     assert not axes[0].images and axes[1].images and plt.get_fignums() == [figure.number]
 
 
-def test_a_transfer_shows_both_regions_and_the_verdict(carried):
-    figure = semfm.plot.transfer(carried)
+def test_a_transfer_shows_both_regions_and_the_verdict(result):
+    figure = semfm.plot.transfer(result)
     above, below = figure.axes[:2], figure.axes[2:]
     assert all(red(axes) > 500 for axes in above) and all(axes.images for axes in below)
-    assert carried.verdict in figure.get_suptitle()
-    confidence = semfm.plot.confidence(carried)
+    assert result.verdict in figure.get_suptitle()
+    confidence = semfm.plot.confidence(result)
     bars = [bar.get_width() for bar in confidence.axes[2].patches]
-    assert bars[0] == carried.confidence
-    assert bars[1:] == [each.probability for each in carried.hypotheses]
+    assert bars[0] == result.confidence
+    assert bars[1:] == [each.probability for each in result.hypotheses]
 
 
 def test_the_parts_shown_are_those_that_were_paired(pair):
     source, target = pair
-    carried = semfm.transfer(
+    result = semfm.transfer(
         source.mesh,
         target.mesh,
         source.region,
         source_embeddings=source.embeddings("easy"),
         target_embeddings=target.embeddings("easy"),
     )
-    figure = semfm.plot.anchors(carried)
+    figure = semfm.plot.anchors(result)
     told = [text.get_text() for text in figure.legends[0].get_texts()]
-    used = carried.report["anchors"]
+    used = result.report["anchors"]
     assert told == [f"{a['source']} ~ {a['target']}: cosine {a['cosine']:.2f}" for a in used]
-    assert len(told) == carried.settings.n_anchors
+    assert len(told) == result.settings.n_anchors
 
 
 def test_an_identity_carries_every_colour_to_its_place(pair):

@@ -174,7 +174,7 @@ def test_files_without_a_sound_mesh_are_refused(tmp_path, change, reason):
         ('{"vertices": [0], "weights": [1, 1]}', "one per vertex"),
         ('{"vertices": [0], "weights": [1.5]}', "weights[0]"),
         ('{"vertices": [0], "weights": [0.4]}', "an empty region"),
-        ('{"vertices": [0], "mesh": {"n_vertices": 3}}', "mesh n_vertices"),
+        ('{"vertices": [0], "mesh": {"n_vertices": 3}}', "mesh.n_vertices"),
         ('{"format": "semfm.region/2", "vertices": [0]}', "format"),
         ("[1, 2]", "`vertices`"),
         ("{", "JSON"),

@@ -1,19 +1,20 @@
 //! `align`: the pose and scale of an object in what a camera sees.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use semfm::align::Alignment as Found;
 use semfm::align::{self, AlignSettings, Observation, Sim3};
 
-use crate::arrays::{self, Axis};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::run;
 use crate::mesh::from_any;
-use crate::work::run;
-use crate::{errors, lend};
+use crate::{arrays_out, errors};
 
 /// Pose and scale of an object before a camera, and how far to trust them: see `align`.
 #[pyclass(frozen, module = "semfm")]
 pub struct Alignment {
-    found: Held<Found>,
+    found: Arc<Found>,
 }
 
 #[pymethods]
@@ -23,7 +24,7 @@ impl Alignment {
     #[getter]
     fn camera_from_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let rows = self.found.camera_from_object.to_rows();
-        lend::owned_rows(py, rows.as_flattened().to_vec(), 4)
+        arrays_out::owned_rows(py, rows.as_flattened().to_vec(), 4)
     }
 
     /// (4, 4) float64 array: the same once the object is measured in metres, for `find_grasps`.
@@ -140,10 +141,10 @@ pub fn align_(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Alignment> {
     let mesh = from_any(mesh, "mesh")?;
-    let points = arrays::points(points, "points")?;
+    let points = arrays_in::points(points, "points")?;
     let init = match init {
         Some(init) => {
-            let (numbers, _) = arrays::floats(init, "init", &[Axis::Is(4), Axis::Is(4)])?;
+            let (numbers, _) = arrays_in::floats(init, "init", &[Axis::Is(4), Axis::Is(4)])?;
             let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
             Some(Sim3::from_rows(rows).map_err(|error| errors::raise(py, &error.into()))?)
         }
@@ -158,5 +159,5 @@ pub fn align_(
         };
         Ok(align::align(&mesh, &observed, &settings, task)?)
     })?;
-    Ok(Alignment { found: Held::new(found) })
+    Ok(Alignment { found: Arc::new(found) })
 }

@@ -1,17 +1,18 @@
 //! `Clusters` of a cloud, and `Anchors` between the clusters of two.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use semfm::fmap;
 use semfm::fmap::clusters::{self, ClusterSettings};
 
-use crate::arrays::{self, Axis};
+use crate::arrays_in::{self, Axis};
 use crate::cloud::SemanticCloud;
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::mesh::Reduced;
-use crate::work::run;
-use crate::{errors, lend};
+use crate::{arrays_out, errors};
 
-/// A cloud cut into parts: one label per point, every label from 0 borne by somebody.
+/// A cloud cut into parts: one label per point, every label from 0 on at least one.
 ///
 /// Parameters
 /// ----------
@@ -23,31 +24,35 @@ use crate::{errors, lend};
 /// spectral_clusters : cuts a cloud by its features.
 #[pyclass(frozen, module = "semfm")]
 pub struct Clusters {
-    pub held: Held<clusters::Clusters>,
+    pub inner: Arc<clusters::Clusters>,
 }
 
 #[pymethods]
 impl Clusters {
     #[new]
     fn new(labels: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (labels, _) = arrays::ids(labels, "labels", &[Axis::Any("m")])?;
-        Ok(Self { held: Held::new(clusters::Clusters::from_labels(&labels)) })
+        let (labels, _) = arrays_in::ids(labels, "labels", &[Axis::Any("m")])?;
+        Ok(Self { inner: Arc::new(clusters::Clusters::from_labels(&labels)) })
     }
 
     /// (m,) uint32 array: label of each point, a read-only view.
     #[getter]
     fn labels<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |clusters| clusters.held.labels())
+        arrays_out::vector(slf, |clusters| clusters.inner.labels())
     }
 
     /// int: number of parts.
     #[getter]
     fn n_clusters(&self) -> usize {
-        self.held.n_clusters()
+        self.inner.n_clusters()
     }
 
     fn __repr__(&self) -> String {
-        format!("Clusters({} parts of {} points)", self.held.n_clusters(), self.held.labels().len())
+        format!(
+            "Clusters({} parts of {} points)",
+            self.inner.n_clusters(),
+            self.inner.labels().len()
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -102,11 +107,11 @@ pub fn spectral_clusters(
             return Err(errors::invalid(py, name, &format!("at most {MOST}"), &count.to_string()));
         }
     }
-    let cloud = cloud.get().held.clone();
+    let cloud = cloud.get().inner.clone();
     let settings = ClusterSettings { n_clusters, neighbours, starts, seed };
     let cut =
         run(py, progress, move |task| Ok(clusters::spectral_clusters(&cloud, &settings, task)?))?;
-    Ok(Clusters { held: Held::new(cut) })
+    Ok(Clusters { inner: Arc::new(cut) })
 }
 
 /// The paired parts of two objects, by falling cosine.
@@ -116,7 +121,7 @@ pub fn spectral_clusters(
 /// Anchors.select, Matching.anchors
 #[pyclass(frozen, module = "semfm")]
 pub struct Anchors {
-    pub held: Held<fmap::Anchors>,
+    pub inner: Arc<fmap::Anchors>,
 }
 
 #[pymethods]
@@ -145,8 +150,8 @@ impl Anchors {
         alpha: usize,
     ) -> PyResult<Self> {
         let py = source_cloud.py();
-        let clouds = (source_cloud.get().held.clone(), target_cloud.get().held.clone());
-        let cuts = (source_clusters.get().held.clone(), target_clusters.get().held.clone());
+        let clouds = (source_cloud.get().inner.clone(), target_cloud.get().inner.clone());
+        let cuts = (source_clusters.get().inner.clone(), target_clusters.get().inner.clone());
         for (name, cloud, cut) in
             [("source_clusters", &clouds.0, &cuts.0), ("target_clusters", &clouds.1, &cuts.1)]
         {
@@ -166,42 +171,42 @@ impl Anchors {
             let target = fmap::ClusteredCloud { cloud: &clouds.1, clusters: &cuts.1 };
             Ok(fmap::Anchors::select(source, target, alpha))
         })?;
-        Ok(Self { held: Held::new(anchors) })
+        Ok(Self { inner: Arc::new(anchors) })
     }
 
     /// (a, 2) uint32 array: cluster of the source and of the target of each pair.
     #[getter]
     fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let pairs = self.held.pairs.iter().flat_map(|pair| [pair.source, pair.target]);
-        lend::owned_rows::<u32>(py, pairs.collect(), 2)
+        let pairs = self.inner.pairs.iter().flat_map(|pair| [pair.source, pair.target]);
+        arrays_out::owned_rows::<u32>(py, pairs.collect(), 2)
     }
 
     /// (a,) float64 array: cosine of the two mean features of each pair.
     #[getter]
     fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.pairs.iter().map(|pair| pair.cosine).collect())
+        arrays_out::owned(py, self.inner.pairs.iter().map(|pair| pair.cosine).collect())
     }
 
     /// (a,) float64 array: by how much each cosine exceeds its best rival; infinite without one.
     #[getter]
     fn margins<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.pairs.iter().map(|pair| pair.margin).collect())
+        arrays_out::owned(py, self.inner.pairs.iter().map(|pair| pair.margin).collect())
     }
 
     /// (K_source, K_target) float64 array: all cosines, a read-only view.
     #[getter]
     fn cosines<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::matrix(slf, |anchors| anchors.held.cosines.as_ref())
+        arrays_out::matrix(slf, |anchors| anchors.inner.cosines.as_ref())
     }
 
     fn __len__(&self) -> usize {
-        self.held.pairs.len()
+        self.inner.pairs.len()
     }
 
     fn __repr__(&self) -> String {
         let pair =
             |pair: &fmap::Anchor| format!("{}–{} {:.2}", pair.source, pair.target, pair.cosine);
-        let pairs: Vec<String> = self.held.pairs.iter().map(pair).collect();
+        let pairs: Vec<String> = self.inner.pairs.iter().map(pair).collect();
         format!("Anchors({})", pairs.join(", "))
     }
 
@@ -209,7 +214,7 @@ impl Anchors {
         slf: &Bound<'py, Self>,
     ) -> PyResult<(Bound<'py, PyAny>, (Vec<(u32, u32, f64, f64)>, Bound<'py, PyAny>))> {
         let restore = slf.py().import("semfm._semfm")?.getattr("_restore_anchors")?;
-        let pairs = &slf.get().held.pairs;
+        let pairs = &slf.get().inner.pairs;
         let pairs = pairs.iter().map(|p| (p.source, p.target, p.cosine, p.margin)).collect();
         Ok((restore, (pairs, Self::cosines(slf)?)))
     }
@@ -229,10 +234,11 @@ pub fn _restore_anchors(
     pairs: Vec<(u32, u32, f64, f64)>,
     cosines: &Bound<'_, PyAny>,
 ) -> PyResult<Anchors> {
-    let cosines = arrays::matrix(cosines, "cosines", [Axis::Any("source"), Axis::Any("target")])?;
+    let cosines =
+        arrays_in::matrix(cosines, "cosines", [Axis::Any("source"), Axis::Any("target")])?;
     let pairs = pairs.into_iter();
     let pairs = pairs
         .map(|(source, target, cosine, margin)| fmap::Anchor { source, target, cosine, margin })
         .collect();
-    Ok(Anchors { held: Held::new(fmap::Anchors { pairs, cosines }) })
+    Ok(Anchors { inner: Arc::new(fmap::Anchors { pairs, cosines }) })
 }

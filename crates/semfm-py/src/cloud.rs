@@ -1,15 +1,16 @@
 //! `SemanticCloud`: surface points with features, and lifting embeddings onto a surface.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use semfm::geom;
 use semfm::views::{self, LiftRule, LiftSettings};
 
-use crate::arrays::{self, Axis, within_memory};
+use crate::arrays_in::{self, Axis, within_memory};
 use crate::embeddings::Embeddings;
-use crate::held::Held;
+use crate::interruptible::{guard, run};
 use crate::mesh::{Reduced, from_any};
-use crate::work::{guard, run};
-use crate::{errors, lend};
+use crate::{arrays_out, errors};
 
 /// Points on an object's surface, each with a feature vector.
 ///
@@ -18,7 +19,7 @@ use crate::{errors, lend};
 /// points : (m, 3) array_like
 ///     In the frame and units of the mesh as read.
 /// features : (m, d) array_like
-///     From anybody's network; kept as float32.
+///     From any network; kept as float32.
 /// n_views : (m,) array_like, optional
 ///     How many views saw each point; 1 where none are given.
 ///
@@ -30,7 +31,7 @@ use crate::{errors, lend};
 /// SemanticCloud(2 points, dim 3)
 #[pyclass(frozen, module = "semfm")]
 pub struct SemanticCloud {
-    pub held: Held<geom::SemanticCloud>,
+    pub inner: Arc<geom::SemanticCloud>,
 }
 
 #[pymethods]
@@ -43,55 +44,55 @@ impl SemanticCloud {
         n_views: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let points_py = points;
-        let points = arrays::points(points, "points")?;
+        let points = arrays_in::points(points, "points")?;
         let rows = Axis::Is(points.len());
-        let (features, shape) = arrays::floats32(features, "features", &[rows, Axis::Any("d")])?;
+        let (features, shape) = arrays_in::floats32(features, "features", &[rows, Axis::Any("d")])?;
         let n_views = match n_views {
-            Some(n_views) => arrays::ids(n_views, "n_views", &[rows])?.0,
+            Some(n_views) => arrays_in::ids(n_views, "n_views", &[rows])?.0,
             None => vec![1; points.len()],
         };
         let cloud = guard(points_py.py(), || {
             Ok(geom::SemanticCloud::new(points, features, shape[1], n_views)?)
         })?;
-        Ok(Self { held: Held::new(cloud) })
+        Ok(Self { inner: Arc::new(cloud) })
     }
 
     /// (m, 3) float64 array: positions, a read-only view.
     #[getter]
     fn points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, 3, |cloud| bytemuck::cast_slice::<_, f64>(cloud.held.points()))
+        arrays_out::rows(slf, 3, |cloud| bytemuck::cast_slice::<_, f64>(cloud.inner.points()))
     }
 
     /// (m, d) float32 array: features, a read-only view.
     #[getter]
     fn features<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, slf.get().held.dim(), |cloud| cloud.held.features())
+        arrays_out::rows(slf, slf.get().inner.dim(), |cloud| cloud.inner.features())
     }
 
     /// (m,) uint32 array: how many views saw each point, 0 where a neighbour lent its features; a read-only view.
     #[getter]
     fn n_views<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |cloud| cloud.held.n_views())
+        arrays_out::vector(slf, |cloud| cloud.inner.n_views())
     }
 
     /// int: number of points m.
     #[getter]
     fn n_points(&self) -> usize {
-        self.held.n_points()
+        self.inner.n_points()
     }
 
     /// int: feature dimension d.
     #[getter]
     fn dim(&self) -> usize {
-        self.held.dim()
+        self.inner.dim()
     }
 
     fn __len__(&self) -> usize {
-        self.held.n_points()
+        self.inner.n_points()
     }
 
     fn __repr__(&self) -> String {
-        format!("SemanticCloud({} points, dim {})", self.held.n_points(), self.held.dim())
+        format!("SemanticCloud({} points, dim {})", self.inner.n_points(), self.inner.dim())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -108,7 +109,7 @@ impl SemanticCloud {
     }
 }
 
-/// Carries the embeddings of views onto samples of the surface.
+/// Lifts the embeddings of views onto samples of the surface.
 ///
 /// Parameters
 /// ----------
@@ -158,12 +159,12 @@ pub fn lift(
         }
     };
     let settings = LiftSettings { rule, n_samples, seed };
-    let held = from_any(mesh, "mesh")?;
-    let file = embeddings_of(embeddings, "embeddings", &held)?;
+    let shared = from_any(mesh, "mesh")?;
+    let file = embeddings_of(embeddings, "embeddings", &shared)?;
     within_memory(py, "n_samples", n_samples, file.dim())?;
     let lifted =
-        run(py, progress, move |task| Ok(views::lift(&held, &file.views, &settings, task)?))?;
-    Ok(SemanticCloud { held: Held::new(lifted.cloud) })
+        run(py, progress, move |task| Ok(views::lift(&shared, &file.views, &settings, task)?))?;
+    Ok(SemanticCloud { inner: Arc::new(lifted.cloud) })
 }
 
 /// Embeddings, or the file of them, that were made of this very mesh.
@@ -171,15 +172,15 @@ pub fn embeddings_of(
     value: &Bound<'_, PyAny>,
     name: &str,
     mesh: &semfm::Mesh,
-) -> PyResult<Held<views::mcap::EmbeddingsFile>> {
+) -> PyResult<Arc<views::mcap::EmbeddingsFile>> {
     let py = value.py();
-    let held = if let Ok(embeddings) = value.cast::<Embeddings>() {
-        embeddings.get().held.clone()
+    let shared = if let Ok(embeddings) = value.cast::<Embeddings>() {
+        embeddings.get().inner.clone()
     } else if let Ok(path) = value.extract() {
-        Embeddings::read(py, path)?.held
+        Embeddings::read(py, path)?.inner
     } else {
         return Err(errors::wrong_type(name, "Embeddings or a path", value));
     };
-    guard(py, || Ok(held.check_mesh(mesh)?))?;
-    Ok(held)
+    guard(py, || Ok(shared.check_mesh(mesh)?))?;
+    Ok(shared)
 }

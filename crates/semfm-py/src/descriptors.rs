@@ -6,10 +6,10 @@ use semfm::fmap::descriptors::{DescriptorNorm, Indicators, diffused_indicators a
 use semfm::geom;
 use semfm::geom::descriptors::{self, HksSettings, WksSettings};
 
-use crate::arrays::{self, Axis, within_memory};
+use crate::arrays_in::{self, Axis, within_memory};
 use crate::eigenbasis::Eigenbasis;
-use crate::work::run;
-use crate::{errors, lend};
+use crate::interruptible::run;
+use crate::{arrays_out, errors};
 
 /// Heat kernel signature (Sun, Ovsjanikov & Guibas 2009): heat left at each vertex after each time.
 ///
@@ -61,10 +61,10 @@ fn signature<'py>(
     describe: impl FnOnce(&geom::Eigenbasis) -> geom::Result<Mat<f64>> + Send + 'static,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = basis.py();
-    let basis = basis.get().held.clone();
+    let basis = basis.get().inner.clone();
     within_memory(py, name, count, basis.n_vertices())?;
     let result = run(py, None, move |_| Ok(describe(&basis)?))?;
-    lend::owned_matrix(py, result.as_ref())
+    arrays_out::owned_matrix(py, result.as_ref())
 }
 
 /// Coefficients of the indicator functions of labels, diffused by heat and scaled to unit norm.
@@ -95,9 +95,9 @@ pub fn diffused_indicators<'py>(
     norm: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = basis.py();
-    let basis = basis.get().held.clone();
-    let labels = arrays::ids(labels, "labels", &[Axis::Is(basis.n_vertices())])?.0;
-    let chosen = arrays::ids(chosen, "chosen", &[Axis::Any("c")])?.0;
+    let basis = basis.get().inner.clone();
+    let labels = arrays_in::ids(labels, "labels", &[Axis::Is(basis.n_vertices())])?.0;
+    let chosen = arrays_in::ids(chosen, "chosen", &[Axis::Any("c")])?.0;
     let norm = match norm {
         "surface" => DescriptorNorm::Surface,
         "vertices" => DescriptorNorm::Vertices,
@@ -113,5 +113,5 @@ pub fn diffused_indicators<'py>(
         let indicators = Indicators { heat_time: t, norm, k: basis.k() };
         Ok(indicate(&basis, &labels, &chosen, &indicators))
     })?;
-    lend::owned_matrix(py, result.as_ref())
+    arrays_out::owned_matrix(py, result.as_ref())
 }

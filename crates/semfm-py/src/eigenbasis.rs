@@ -7,12 +7,12 @@ use pyo3::types::PyDict;
 use semfm::geom;
 use semfm::geom::eigensolver::{EigenSettings, eigenbasis as solve};
 
-use crate::arrays::{self, Axis, within_memory};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis, within_memory};
+use crate::interruptible::run;
 use crate::laplacian::Laplacian;
 use crate::mesh::Reduced;
-use crate::work::run;
-use crate::{errors, json, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// The first k eigenpairs of ``L φ = λ M φ``, ascending, orthonormal for the lumped mass M.
 ///
@@ -33,10 +33,10 @@ use crate::{errors, json, lend};
 /// Shape.basis : the one of a prepared mesh.
 #[pyclass(frozen, module = "semfm")]
 pub struct Eigenbasis {
-    pub held: Held<geom::Eigenbasis>,
+    pub inner: Shared<geom::Eigenbasis>,
 }
 
-/// How far a basis that somebody hands us may be from orthonormal: what f32 files lose.
+/// How far a basis that is given may be from orthonormal: what f32 files lose.
 const ORTHONORMALITY: f64 = 1e-4;
 
 #[pymethods]
@@ -50,13 +50,13 @@ impl Eigenbasis {
         residuals: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = values.py();
-        let (values, shape) = arrays::floats(values, "values", &[Axis::Any("k")])?;
+        let (values, shape) = arrays_in::floats(values, "values", &[Axis::Any("k")])?;
         let k = shape[0];
-        let (mass, shape) = arrays::floats(mass, "mass", &[Axis::Any("n")])?;
+        let (mass, shape) = arrays_in::floats(mass, "mass", &[Axis::Any("n")])?;
         let n = shape[0];
-        let functions = arrays::matrix(functions, "functions", [Axis::Is(n), Axis::Is(k)])?;
+        let functions = arrays_in::matrix(functions, "functions", [Axis::Is(n), Axis::Is(k)])?;
         let residuals = match residuals {
-            Some(residuals) => arrays::floats(residuals, "residuals", &[Axis::Is(k)])?.0,
+            Some(residuals) => arrays_in::floats(residuals, "residuals", &[Axis::Is(k)])?.0,
             None => vec![0.0; k],
         };
         if k == 0 || n == 0 {
@@ -81,43 +81,43 @@ impl Eigenbasis {
             let found = format!("|ΦᵀMΦ − I| up to {error:.1e}");
             return Err(errors::invalid(py, "functions", expected, &found));
         }
-        Ok(Self { held: Held::new(basis) })
+        Ok(Self { inner: Shared::new(basis) })
     }
 
     /// int: number of eigenpairs k.
     #[getter]
     fn k(&self) -> usize {
-        self.held.k()
+        self.inner.k()
     }
 
     /// int: number of vertices n.
     #[getter]
     fn n_vertices(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 
     /// (k,) float64 array: eigenvalues λ, ascending, a read-only view.
     #[getter]
     fn values<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |basis| basis.held.values.as_slice())
+        arrays_out::vector(slf, |basis| basis.inner.values.as_slice())
     }
 
     /// (n, k) float64 array: eigenfunctions Φ, one column each, a read-only view.
     #[getter]
     fn functions<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::matrix(slf, |basis| basis.held.functions.as_ref())
+        arrays_out::matrix(slf, |basis| basis.inner.functions.as_ref())
     }
 
     /// (n,) float64 array: lumped mass, a read-only view.
     #[getter]
     fn mass<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |basis| basis.held.mass.as_slice())
+        arrays_out::vector(slf, |basis| basis.inner.mass.as_slice())
     }
 
     /// (k,) float64 array: relative residuals of the pairs, a read-only view.
     #[getter]
     fn residuals<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |basis| basis.held.residuals.as_slice())
+        arrays_out::vector(slf, |basis| basis.inner.residuals.as_slice())
     }
 
     /// Largest entry of |ΦᵀMΦ − I|.
@@ -126,7 +126,7 @@ impl Eigenbasis {
     /// -------
     /// float
     fn orthonormality_error(&self, py: Python<'_>) -> PyResult<f64> {
-        let basis = self.held.clone();
+        let basis = self.inner.clone();
         run(py, None, move |_| Ok(basis.orthonormality_error()))
     }
 
@@ -140,8 +140,8 @@ impl Eigenbasis {
     /// -------
     /// (k,) or (k, p) float64 array
     fn project<'py>(&self, functions: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.held.n_vertices();
-        let basis = self.held.clone();
+        let n = self.inner.n_vertices();
+        let basis = self.inner.clone();
         columns(functions, "functions", Axis::Is(n), move |f| basis.project_all(f))
     }
 
@@ -155,14 +155,14 @@ impl Eigenbasis {
     /// -------
     /// (n,) or (n, p) float64 array
     fn reconstruct<'py>(&self, coefficients: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let k = self.held.k();
+        let k = self.inner.k();
         let rows = coefficients.len().unwrap_or(k);
         if rows > k {
             let expected = format!("at most {k} rows, one per eigenfunction");
             let py = coefficients.py();
             return Err(errors::invalid(py, "coefficients", &expected, &rows.to_string()));
         }
-        let basis = self.held.clone();
+        let basis = self.inner.clone();
         columns(coefficients, "coefficients", Axis::Is(rows), move |a| basis.reconstruct_all(a))
     }
 
@@ -182,8 +182,8 @@ impl Eigenbasis {
             let py = functions.py();
             return Err(errors::invalid(py, "t", "a time of at least 0", &t.to_string()));
         }
-        let n = self.held.n_vertices();
-        let basis = self.held.clone();
+        let n = self.inner.n_vertices();
+        let basis = self.inner.clone();
         columns(functions, "functions", Axis::Is(n), move |f| basis.diffuse_all(f, t))
     }
 
@@ -197,18 +197,18 @@ impl Eigenbasis {
     /// -------
     /// Eigenbasis
     fn truncated(&self, py: Python<'_>, k: usize) -> PyResult<Self> {
-        let basis = &self.held;
+        let basis = &self.inner;
         if !(1..=basis.k()).contains(&k) {
             let expected = format!("1 to {}", basis.k());
             return Err(errors::invalid(py, "k", &expected, &k.to_string()));
         }
-        let held = Held::new(geom::Eigenbasis {
+        let shared = Shared::new(geom::Eigenbasis {
             values: basis.values[..k].to_vec(),
             functions: basis.first(k).to_owned(),
             mass: basis.mass.clone(),
             residuals: basis.residuals[..k].to_vec(),
         });
-        Ok(Self { held })
+        Ok(Self { inner: shared })
     }
 
     /// Writes `values`, `functions`, `mass` and `residuals` to an .npz file.
@@ -242,7 +242,7 @@ impl Eigenbasis {
     }
 
     fn __repr__(&self) -> String {
-        format!("Eigenbasis({} pairs on {} vertices)", self.held.k(), self.held.n_vertices())
+        format!("Eigenbasis({} pairs on {} vertices)", self.inner.k(), self.inner.n_vertices())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -274,16 +274,16 @@ fn columns<'py>(
         .and_then(|ndim| ndim.extract::<usize>())
         .is_ok_and(|ndim| ndim == 1);
     let matrix = if single {
-        let values = arrays::floats(functions, name, &[rows])?.0;
+        let values = arrays_in::floats(functions, name, &[rows])?.0;
         faer::Mat::from_fn(values.len(), 1, |i, _| values[i])
     } else {
-        arrays::matrix(functions, name, [rows, Axis::Any("p")])?
+        arrays_in::matrix(functions, name, [rows, Axis::Any("p")])?
     };
     let result = run(py, None, move |_| Ok(work(matrix.as_ref())))?;
     if single {
-        return Ok(lend::owned(py, result.col(0).iter().copied().collect::<Vec<f64>>()));
+        return Ok(arrays_out::owned(py, result.col(0).iter().copied().collect::<Vec<f64>>()));
     }
-    lend::owned_matrix(py, result.as_ref())
+    arrays_out::owned_matrix(py, result.as_ref())
 }
 
 /// The first k eigenpairs of a Laplacian.
@@ -322,11 +322,11 @@ pub fn eigenbasis(
     seed: u64,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Eigenbasis> {
-    let laplacian = laplacian.get().held.clone();
+    let laplacian = laplacian.get().inner.clone();
     check_size(py, k, laplacian.n_vertices())?;
     let settings = EigenSettings { tolerance, seed };
     let basis = run(py, progress, move |task| Ok(solve(&laplacian, k, &settings, task)?))?;
-    Ok(Eigenbasis { held: Held::new(basis) })
+    Ok(Eigenbasis { inner: Shared::new(basis) })
 }
 
 /// Refuses a k whose basis, or whose dense solution, no machine would hold.

@@ -2,20 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use semfm::geom::Pinhole;
+use semfm::geom;
 use semfm::views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata};
 use semfm::views::{self, EmbeddedView};
 
-use crate::arrays::{self, Axis};
-use crate::camera::Camera;
-use crate::held::Held;
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::{guard, run};
 use crate::mesh::from_any;
+use crate::pinhole::Pinhole;
 use crate::views_file::ViewsFile;
-use crate::work::{guard, run};
-use crate::{errors, json, lend};
+use crate::{arrays_out, errors, json};
 
 /// What an encoder says about a view: one vector per image patch.
 ///
@@ -31,7 +31,7 @@ use crate::{errors, json, lend};
 ///     False where the patch is to be ignored (bool).
 #[pyclass(frozen, module = "semfm")]
 pub struct PatchEmbeddings {
-    pub held: Held<views::PatchEmbeddings>,
+    pub inner: Arc<views::PatchEmbeddings>,
 }
 
 #[pymethods]
@@ -47,60 +47,60 @@ impl PatchEmbeddings {
         let py = data.py();
         let axes = [Axis::Any("rows"), Axis::Any("cols"), Axis::Any("d")];
         // Numbers of patches that do not count may be anything.
-        let (data, shape) = arrays::any32(data, "data", &axes)?;
+        let (data, shape) = arrays_in::any32(data, "data", &axes)?;
         let [rows, cols, dim] = [shape[0], shape[1], shape[2]];
         let grid = [Axis::Is(rows), Axis::Is(cols)];
         let coverage = match coverage {
-            Some(coverage) => arrays::bytes(coverage, "coverage", &grid)?.0,
+            Some(coverage) => arrays_in::bytes(coverage, "coverage", &grid)?.0,
             None => vec![255; rows * cols],
         };
         let valid = match valid {
-            Some(valid) => arrays::mask(valid, "valid", &grid)?.0,
+            Some(valid) => arrays_in::mask(valid, "valid", &grid)?.0,
             None => vec![true; rows * cols],
         };
-        let rect = arrays::floats32(rect, "rect", &[Axis::Is(4)])?.0;
+        let rect = arrays_in::floats32(rect, "rect", &[Axis::Is(4)])?.0;
         let rect = [rect[0], rect[1], rect[2], rect[3]];
         let grid = views::PatchGrid { rows, cols, rect };
         let patches =
             guard(py, || Ok(views::PatchEmbeddings::new(grid, dim, data, coverage, valid)?))?;
-        Ok(Self { held: Held::new(patches) })
+        Ok(Self { inner: Arc::new(patches) })
     }
 
     /// (rows, cols, d) float32 array: the vectors, a read-only view.
     #[getter]
     fn data<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let patches = &slf.get().held;
+        let patches = &slf.get().inner;
         let shape = (patches.grid().rows, patches.grid().cols, patches.dim());
-        lend::vector(slf, |patches| patches.held.data())?.call_method1("reshape", (shape,))
+        arrays_out::vector(slf, |patches| patches.inner.data())?.call_method1("reshape", (shape,))
     }
 
     /// (4,) float32 array: left, top, right, bottom of the grid in pixels.
     #[getter]
     fn rect<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.grid().rect.to_vec())
+        arrays_out::owned(py, self.inner.grid().rect.to_vec())
     }
 
     /// (rows, cols) uint8 array: share of each patch covered by the object, a read-only view.
     #[getter]
     fn coverage<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, slf.get().held.grid().cols, |patches| patches.held.coverage())
+        arrays_out::rows(slf, slf.get().inner.grid().cols, |patches| patches.inner.coverage())
     }
 
     /// (rows, cols) bool array: False where the patch is to be ignored, a read-only view.
     #[getter]
     fn valid<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, slf.get().held.grid().cols, |patches| patches.held.valid())
+        arrays_out::rows(slf, slf.get().inner.grid().cols, |patches| patches.inner.valid())
     }
 
     /// int: dimension d of each vector.
     #[getter]
     fn dim(&self) -> usize {
-        self.held.dim()
+        self.inner.dim()
     }
 
     fn __repr__(&self) -> String {
-        let views::PatchGrid { rows, cols, .. } = self.held.grid();
-        format!("PatchEmbeddings({rows} × {cols}, dim {})", self.held.dim())
+        let views::PatchGrid { rows, cols, .. } = self.inner.grid();
+        format!("PatchEmbeddings({rows} × {cols}, dim {})", self.inner.dim())
     }
 
     fn __reduce__<'py>(
@@ -140,7 +140,7 @@ pub fn _restore_patches(
 /// ----------
 /// mesh : mesh_like
 ///     The mesh that the views show.
-/// cameras : list of Camera
+/// cameras : list of Pinhole
 ///     One per view, all of one size.
 /// patches : list of PatchEmbeddings
 ///     One per view, all of one dimension.
@@ -148,18 +148,18 @@ pub fn _restore_patches(
 ///     Name of the encoder, for the file.
 #[pyclass(frozen, module = "semfm")]
 pub struct Embeddings {
-    pub held: Held<EmbeddingsFile>,
+    pub inner: Arc<EmbeddingsFile>,
 }
 
 impl Embeddings {
     fn of(
         metadata: EmbeddingsMetadata,
-        cameras: Vec<Pinhole>,
+        cameras: Vec<geom::Pinhole>,
         grids: Vec<views::PatchEmbeddings>,
     ) -> Self {
         let views = cameras.into_iter().zip(grids);
         let views = views.map(|(camera, patches)| EmbeddedView { camera, patches }).collect();
-        Self { held: Held::new(EmbeddingsFile { path: PathBuf::new(), metadata, views }) }
+        Self { inner: Arc::new(EmbeddingsFile { path: PathBuf::new(), metadata, views }) }
     }
 }
 
@@ -171,7 +171,7 @@ fn grids_of(patches: &Bound<'_, PyAny>) -> PyResult<Vec<views::PatchEmbeddings>>
         let grid = grid
             .cast::<PatchEmbeddings>()
             .map_err(|_| errors::wrong_type("patches", "PatchEmbeddings objects", &grid))?;
-        grids.push((*grid.get().held).clone());
+        grids.push((*grid.get().inner).clone());
     }
     Ok(grids)
 }
@@ -187,8 +187,8 @@ impl Embeddings {
         encoder: &str,
     ) -> PyResult<Self> {
         let py = mesh.py();
-        let held = from_any(mesh, "mesh")?;
-        let cameras = crate::camera::list(cameras)?;
+        let shared = from_any(mesh, "mesh")?;
+        let cameras = crate::pinhole::list(cameras)?;
         let grids = grids_of(patches)?;
         if cameras.len() != grids.len() || grids.is_empty() {
             let expected = format!("{}, one per camera, and at least one", cameras.len());
@@ -206,7 +206,7 @@ impl Embeddings {
                 return Err(errors::invalid(py, "patches", &format!("dimension {dim}"), &found));
             }
         }
-        let mut views = ViewsMetadata::of(&held, width, height);
+        let mut views = ViewsMetadata::of(&shared, width, height);
         (views.rig, views.background) = ("given as cameras".into(), "unknown".into());
         let metadata = EmbeddingsMetadata {
             views,
@@ -292,7 +292,7 @@ impl Embeddings {
     #[staticmethod]
     pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let file = run(py, None, move |_| Ok(EmbeddingsFile::read(&path)?))?;
-        Ok(Self { held: Held::new(file) })
+        Ok(Self { inner: Arc::new(file) })
     }
 
     /// Writes a ``NAME.emb.mcap``, whole or not at all.
@@ -311,66 +311,66 @@ impl Embeddings {
                 return Err(errors::invalid(py, "dtype", "'f16' or 'f32'", &format!("{other:?}")));
             }
         };
-        let held = self.held.clone();
-        run(py, None, move |_| Ok(held.write(&path, dtype)?))
+        let shared = self.inner.clone();
+        run(py, None, move |_| Ok(shared.write(&path, dtype)?))
     }
 
     /// int: number of views.
     #[getter]
     fn n_views(&self) -> usize {
-        self.held.views.len()
+        self.inner.views.len()
     }
 
     /// int: dimension d of the vectors.
     #[getter]
     fn dim(&self) -> usize {
-        self.held.dim()
+        self.inner.dim()
     }
 
-    /// list of Camera: one per view.
+    /// list of Pinhole: one per view.
     #[getter]
-    fn cameras(&self) -> Vec<Camera> {
-        self.held.views.iter().map(|view| Camera { camera: view.camera }).collect()
+    fn cameras(&self) -> Vec<Pinhole> {
+        self.inner.views.iter().map(|view| Pinhole { camera: view.camera }).collect()
     }
 
     /// list of PatchEmbeddings: one per view.
     #[getter]
     fn patches(&self) -> Vec<PatchEmbeddings> {
-        let grid = |view: &EmbeddedView| PatchEmbeddings { held: Held::new(view.patches.clone()) };
-        self.held.views.iter().map(grid).collect()
+        let grid = |view: &EmbeddedView| PatchEmbeddings { inner: Arc::new(view.patches.clone()) };
+        self.inner.views.iter().map(grid).collect()
     }
 
     /// str: hash of the mesh that the views show.
     #[getter]
     fn mesh_hash(&self) -> String {
-        self.held.metadata.views.mesh.hash.to_string()
+        self.inner.metadata.views.mesh.hash.to_string()
     }
 
     /// str: name of the encoder.
     #[getter]
     fn encoder(&self) -> String {
-        self.held.metadata.encoder.clone()
+        self.inner.metadata.encoder.clone()
     }
 
     /// dict: the file's metadata record ``semfm``, all entries as text.
     #[getter]
     fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        json::text_entries(py, &self.held.metadata.entries(self.held.views.len()))
+        json::text_entries(py, &self.inner.metadata.entries(self.inner.views.len()))
     }
 
     /// bool: True where the embeddings were made up, without a network.
     #[getter]
     fn simulated(&self) -> bool {
-        self.held.metadata.simulated
+        self.inner.metadata.simulated
     }
 
     fn __len__(&self) -> usize {
-        self.held.views.len()
+        self.inner.views.len()
     }
 
     fn __repr__(&self) -> String {
-        let (n, dim) = (self.held.views.len(), self.held.dim());
-        format!("Embeddings({n} views, dim {dim}, by {:?})", self.held.metadata.encoder)
+        let (n, dim) = (self.inner.views.len(), self.inner.dim());
+        format!("Embeddings({n} views, dim {dim}, by {:?})", self.inner.metadata.encoder)
     }
 
     fn __reduce__<'py>(

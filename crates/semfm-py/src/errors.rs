@@ -6,7 +6,7 @@
 use pyo3::prelude::*;
 use semfm::geom;
 
-/// The exception of an error of any floor, with its code and place.
+/// The exception of an error of any crate, with its code and place.
 pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
     let class = match error {
         semfm::Error::Geom(geom::Error::InFile { .. }) => "FormatError",

@@ -1,6 +1,7 @@
 //! `FunctionalMap`: fitted, refined, read off.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use faer::Mat;
 use pyo3::prelude::*;
@@ -9,13 +10,13 @@ use semfm::fmap::fit::{FitSettings, FitSide, OrientedSurface, fit};
 use semfm::fmap::zoomout::{self, MapSide, ZoomOutSettings};
 use semfm::{fmap, geom};
 
-use crate::arrays::{self, Axis};
+use crate::arrays_in::{self, Axis};
 use crate::eigenbasis::Eigenbasis;
-use crate::held::Held;
+use crate::interruptible::{guard, run};
 use crate::mesh::{Reduced, from_any};
 use crate::point_map::PointMap;
-use crate::work::{guard, run};
-use crate::{errors, json, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// C (k_target × k_source): takes coefficients of a source function to those on the target.
 ///
@@ -28,7 +29,7 @@ use crate::{errors, json, lend};
 /// PointMap : the map of vertices, which runs the other way.
 #[pyclass(frozen, module = "semfm")]
 pub struct FunctionalMap {
-    pub held: Held<fmap::FunctionalMap>,
+    pub inner: Arc<fmap::FunctionalMap>,
 }
 
 #[pymethods]
@@ -36,12 +37,12 @@ impl FunctionalMap {
     #[new]
     fn new(matrix: &Bound<'_, PyAny>) -> PyResult<Self> {
         let axes = [Axis::Any("k_target"), Axis::Any("k_source")];
-        let c = arrays::matrix(matrix, "matrix", axes)?;
+        let c = arrays_in::matrix(matrix, "matrix", axes)?;
         if c.nrows() == 0 || c.ncols() == 0 {
             let found = format!("{} × {}", c.nrows(), c.ncols());
             return Err(errors::invalid(matrix.py(), "matrix", "at least 1 × 1", &found));
         }
-        Ok(Self { held: Held::new(fmap::FunctionalMap::new(c)) })
+        Ok(Self { inner: Arc::new(fmap::FunctionalMap::new(c)) })
     }
 
     /// The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
@@ -113,7 +114,7 @@ impl FunctionalMap {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = source.py();
-        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
         let k = k.unwrap_or(source.k().min(target.k()));
         if k == 0 {
             return Err(errors::invalid(py, "k", "at least 1", "0"));
@@ -123,36 +124,32 @@ impl FunctionalMap {
         }
         let rows = |basis: &geom::Eigenbasis| if coefficients { k } else { basis.n_vertices() };
         let axes = [Axis::Is(rows(&source)), Axis::Any("p")];
-        let a = arrays::laid(source_descriptors, "source_descriptors", axes)?;
+        let a = arrays_in::laid(source_descriptors, "source_descriptors", axes)?;
         let axes = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
-        let b = arrays::laid(target_descriptors, "target_descriptors", axes)?;
-        let mesh = |value: Option<&Bound<'_, PyAny>>, name| {
-            value.map(|value| from_any(value, name)).transpose()
-        };
-        let meshes = (mesh(source_mesh, "source_mesh")?, mesh(target_mesh, "target_mesh")?);
-        if orientation > 0.0 && (meshes.0.is_none() || meshes.1.is_none()) {
+        let b = arrays_in::laid(target_descriptors, "target_descriptors", axes)?;
+        let source_mesh = source_mesh.map(|mesh| from_any(mesh, "source_mesh")).transpose()?;
+        let target_mesh = target_mesh.map(|mesh| from_any(mesh, "target_mesh")).transpose()?;
+        if orientation > 0.0 && (source_mesh.is_none() || target_mesh.is_none()) {
             let expected = "both, where an orientation is asked for";
             return Err(errors::invalid(py, "source_mesh, target_mesh", expected, "None"));
         }
         let settings = FitSettings { laplacian, descriptors, orientation, reversing };
         let map = run(py, progress, move |task| {
-            let project = |basis: &geom::Eigenbasis, f: &arrays::Laid| {
+            let project = |basis: &geom::Eigenbasis, f: &arrays_in::Laid| {
                 let f = f.view();
                 if coefficients { f.to_owned() } else { basis.project_first(k, f) }
             };
             let (a, b) = (project(&source, &a), project(&target, &b));
-            let surface = |mesh: &Option<Held<semfm::Mesh>>| {
-                let mesh = mesh.as_deref().filter(|_| orientation > 0.0);
-                mesh.map(OrientedSurface::new).transpose()
-            };
-            let surfaces = (surface(&meshes.0)?, surface(&meshes.1)?);
+            let is_oriented = orientation > 0.0;
+            let source_surface = surface(source_mesh.as_deref().filter(|_| is_oriented))?;
+            let target_surface = surface(target_mesh.as_deref().filter(|_| is_oriented))?;
             let source =
-                FitSide { surface: surfaces.0.as_ref(), ..FitSide::new(&source, a.as_ref()) };
+                FitSide { surface: source_surface.as_ref(), ..FitSide::new(&source, a.as_ref()) };
             let target =
-                FitSide { surface: surfaces.1.as_ref(), ..FitSide::new(&target, b.as_ref()) };
+                FitSide { surface: target_surface.as_ref(), ..FitSide::new(&target, b.as_ref()) };
             Ok(fit(source, target, &settings, task)?.map)
         })?;
-        Ok(Self { held: Held::new(map) })
+        Ok(Self { inner: Arc::new(map) })
     }
 
     /// C f = f ∘ T in the two bases: ``Φ_targetᵀ M_target Φ_source[T]``.
@@ -178,18 +175,18 @@ impl FunctionalMap {
         k: Option<usize>,
     ) -> PyResult<Self> {
         let py = map.py();
-        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
         let k = k.unwrap_or(source.k().min(target.k()));
         let n_source = map.get().n_source;
         if n_source != source.n_vertices() {
             let expected = format!("a map onto {} source vertices", source.n_vertices());
             return Err(errors::invalid(py, "map", &expected, &n_source.to_string()));
         }
-        let map = map.get().held.clone();
-        let held = run(py, None, move |_| {
+        let map = map.get().inner.clone();
+        let shared = run(py, None, move |_| {
             Ok(fmap::FunctionalMap::from_point_map(&map, &source, &target, k)?)
         })?;
-        Ok(Self { held: Held::new(held) })
+        Ok(Self { inner: Arc::new(shared) })
     }
 
     /// ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
@@ -232,14 +229,14 @@ impl FunctionalMap {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = source.py();
-        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
         let on_both = features(&source, &target, source_features, target_features)?;
         if !(feature_weight >= 0.0 && feature_weight.is_finite()) {
             let found = feature_weight.to_string();
             return Err(errors::invalid(py, "feature_weight", "a number of at least 0", &found));
         }
         let samples = match target_samples {
-            Some(samples) => arrays::ids(samples, "target_samples", &[Axis::Any("s")])?.0,
+            Some(samples) => arrays_in::ids(samples, "target_samples", &[Axis::Any("s")])?.0,
             None => Vec::new(),
         };
         let n = target.n_vertices();
@@ -247,7 +244,7 @@ impl FunctionalMap {
             let (expected, found) = (format!("ids below {n}"), id.to_string());
             return Err(errors::invalid(py, "target_samples", &expected, &found));
         }
-        let start = (*self.held).clone();
+        let start = (*self.inner).clone();
         let settings = ZoomOutSettings { k_start: 1, k_final, step, feature_weight };
         let grown = run(py, progress, move |task| {
             let (on_source, on_target) = on_both
@@ -257,7 +254,7 @@ impl FunctionalMap {
             let target = MapSide { basis: &target, features: on_target, samples: &samples };
             Ok(zoomout::zoomout(start, &source, &target, &settings, task)?)
         })?;
-        Ok(Self { held: Held::new(grown) })
+        Ok(Self { inner: Arc::new(grown) })
     }
 
     /// The point map target → source: each target vertex takes the source vertex whose delta
@@ -292,11 +289,11 @@ impl FunctionalMap {
         feature_weight: f64,
     ) -> PyResult<PointMap> {
         let py = source.py();
-        let (source, target) = (source.get().held.clone(), target.get().held.clone());
+        let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
         self.check_bases(py, &source, &target)?;
         let on_both = features(&source, &target, source_features, target_features)?;
         let n_source = source.n_vertices();
-        let map = self.held.clone();
+        let map = self.inner.clone();
         let found = run(py, None, move |_| {
             Ok(match &on_both {
                 Some((a, b)) => {
@@ -309,25 +306,25 @@ impl FunctionalMap {
                 None => map.point_map(&source, &target),
             })
         })?;
-        Ok(PointMap { held: Held::new(found), n_source })
+        Ok(PointMap { inner: Shared::new(found), n_source })
     }
 
     /// (k_target, k_source) float64 array: C, a read-only view.
     #[getter]
     fn matrix<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::matrix(slf, |map| map.held.matrix())
+        arrays_out::matrix(slf, |map| map.inner.matrix())
     }
 
     /// int: size of the source basis.
     #[getter]
     fn k_source(&self) -> usize {
-        self.held.k_source()
+        self.inner.k_source()
     }
 
     /// int: size of the target basis.
     #[getter]
     fn k_target(&self) -> usize {
-        self.held.k_target()
+        self.inner.k_target()
     }
 
     /// ‖C Cᵀ − I‖ / √k_target: 0 where the map keeps areas.
@@ -336,7 +333,7 @@ impl FunctionalMap {
     /// -------
     /// float
     fn orthogonality(&self, py: Python<'_>) -> PyResult<f64> {
-        guard(py, || Ok(self.held.orthogonality()))
+        guard(py, || Ok(self.inner.orthogonality()))
     }
 
     /// ‖C Λ_source − Λ_target C‖ / (λ_max ‖C‖): 0 where the map keeps lengths.
@@ -355,9 +352,9 @@ impl FunctionalMap {
         target: &Bound<'_, Eigenbasis>,
     ) -> PyResult<f64> {
         let py = source.py();
-        let (source, target) = (&source.get().held, &target.get().held);
+        let (source, target) = (&source.get().inner, &target.get().inner);
         self.check_bases(py, source, target)?;
-        guard(py, || Ok(self.held.commutativity(source, target)))
+        guard(py, || Ok(self.inner.commutativity(source, target)))
     }
 
     /// Writes `matrix` to an .npz file.
@@ -387,11 +384,11 @@ impl FunctionalMap {
     }
 
     fn __repr__(&self) -> String {
-        format!("FunctionalMap({} × {})", self.held.k_target(), self.held.k_source())
+        format!("FunctionalMap({} × {})", self.inner.k_target(), self.inner.k_source())
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+        other.cast::<Self>().is_ok_and(|other| *other.get().inner == *self.inner)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -415,8 +412,8 @@ impl FunctionalMap {
         source: &geom::Eigenbasis,
         target: &geom::Eigenbasis,
     ) -> PyResult<()> {
-        check_size(py, "source", self.held.k_source(), source)?;
-        check_size(py, "target", self.held.k_target(), target)
+        check_size(py, "source", self.inner.k_source(), source)?;
+        check_size(py, "target", self.inner.k_target(), target)
     }
 }
 
@@ -439,9 +436,9 @@ fn features(
         (None, None) => Ok(None),
         (Some(a), Some(b)) => {
             let rows = [Axis::Is(source.n_vertices()), Axis::Any("d")];
-            let a = arrays::matrix(a, "source_features", rows)?;
+            let a = arrays_in::matrix(a, "source_features", rows)?;
             let rows = [Axis::Is(target.n_vertices()), Axis::Is(a.ncols())];
-            Ok(Some((a, arrays::matrix(b, "target_features", rows)?)))
+            Ok(Some((a, arrays_in::matrix(b, "target_features", rows)?)))
         }
         (Some(lonely), None) => {
             Err(errors::invalid(lonely.py(), "target_features", "features of both sides", "None"))
@@ -450,4 +447,9 @@ fn features(
             Err(errors::invalid(lonely.py(), "source_features", "features of both sides", "None"))
         }
     }
+}
+
+/// The surface whose orientation a map is fitted to, where it is.
+fn surface(mesh: Option<&semfm::Mesh>) -> semfm::fmap::Result<Option<OrientedSurface>> {
+    mesh.map(OrientedSurface::new).transpose()
 }

@@ -1,14 +1,15 @@
 //! Distances along the surface, by the heat method.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use semfm::geom::geodesic::{self, HeatSettings};
 
-use crate::arrays::{self, Axis, within_memory};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis, within_memory};
+use crate::arrays_out;
+use crate::interruptible::run;
 use crate::laplacian::kind_of;
-use crate::lend;
 use crate::mesh::from_any;
-use crate::work::run;
 
 /// Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
 /// once, then every question costs two triangular solves.
@@ -30,7 +31,7 @@ use crate::work::run;
 /// (0.0, 3.1)
 #[pyclass(frozen, module = "semfm")]
 pub struct HeatGeodesics {
-    held: Held<geodesic::HeatGeodesics>,
+    inner: Arc<geodesic::HeatGeodesics>,
 }
 
 #[pymethods]
@@ -41,8 +42,8 @@ impl HeatGeodesics {
         let py = mesh.py();
         let settings = HeatSettings { kind: kind_of(py, kind)?, time };
         let mesh = from_any(mesh, "mesh")?;
-        let held = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
-        Ok(Self { held: Held::new(held) })
+        let shared = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
+        Ok(Self { inner: Arc::new(shared) })
     }
 
     /// Distance of every vertex from the nearest source.
@@ -62,9 +63,9 @@ impl HeatGeodesics {
     fn distances<'py>(&self, sources: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = sources.py();
         let sources = ids(sources)?;
-        let heat = self.held.clone();
+        let heat = self.inner.clone();
         let distances = run(py, None, move |_| Ok(heat.distances(&sources)?))?;
-        Ok(lend::owned(py, distances))
+        Ok(arrays_out::owned(py, distances))
     }
 
     /// Distances from each source alone.
@@ -81,8 +82,8 @@ impl HeatGeodesics {
     fn distances_from_each<'py>(&self, sources: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = sources.py();
         let sources = ids(sources)?;
-        within_memory(py, "sources", sources.len(), self.held.n_vertices())?;
-        let heat = self.held.clone();
+        within_memory(py, "sources", sources.len(), self.inner.n_vertices())?;
+        let heat = self.inner.clone();
         // In blocks, so that Ctrl-C leaves no long work behind.
         let blocks = run(py, None, move |task| {
             let block = |ids: &[u32]| {
@@ -93,10 +94,10 @@ impl HeatGeodesics {
         })?;
         let blocks: Vec<_> = blocks
             .iter()
-            .map(|block| lend::owned_matrix(py, block.as_ref()))
+            .map(|block| arrays_out::owned_matrix(py, block.as_ref()))
             .collect::<PyResult<_>>()?;
         if blocks.is_empty() {
-            return py.import("numpy")?.call_method1("zeros", ((self.held.n_vertices(), 0),));
+            return py.import("numpy")?.call_method1("zeros", ((self.inner.n_vertices(), 0),));
         }
         py.import("numpy")?.call_method1("concatenate", (blocks, 1))
     }
@@ -104,14 +105,14 @@ impl HeatGeodesics {
     /// int: number of vertices n.
     #[getter]
     fn n_vertices(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 }
 
 fn ids(sources: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
     match sources.extract::<u32>() {
         Ok(single) => Ok(vec![single]),
-        Err(_) => Ok(arrays::ids(sources, "sources", &[Axis::Any("s")])?.0),
+        Err(_) => Ok(arrays_in::ids(sources, "sources", &[Axis::Any("s")])?.0),
     }
 }
 

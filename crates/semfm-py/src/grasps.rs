@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -10,14 +11,14 @@ use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
 use semfm::GraspResult;
 use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
 
-use crate::arrays::{self, Axis};
+use crate::arrays_in::{self, Axis};
+use crate::grasp_pickle::PickledGrasps;
 use crate::gripper::{Gripper, matrix};
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::mesh::from_any;
-use crate::plain_grasps::PlainGrasps;
 use crate::region::Region;
-use crate::work::run;
-use crate::{errors, json, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// One parallel-jaw grasp, in the frame of the object scaled to metres.
 #[pyclass(frozen, module = "semfm")]
@@ -86,7 +87,7 @@ impl Grasp {
 }
 
 fn rows(py: Python<'_>, points: [DVec3; 2]) -> PyResult<Bound<'_, PyAny>> {
-    lend::owned_rows(py, points.iter().flat_map(|p| p.to_array()).collect(), 3)
+    arrays_out::owned_rows(py, points.iter().flat_map(|p| p.to_array()).collect(), 3)
 }
 
 /// Grasps of an object, best first, and what became of the other candidates: see `find_grasps`.
@@ -94,8 +95,8 @@ fn rows(py: Python<'_>, points: [DVec3; 2]) -> PyResult<Bound<'_, PyAny>> {
 /// A sequence of `Grasp`.
 #[pyclass(frozen, module = "semfm", sequence)]
 pub struct Grasps {
-    found: Held<grasp::Grasps>,
-    mesh: Held<semfm::Mesh>,
+    found: Arc<grasp::Grasps>,
+    mesh: Shared<semfm::Mesh>,
     gripper: Py<Gripper>,
     scale: f64,
     camera_from_object: Option<Pose>,
@@ -109,7 +110,7 @@ impl Grasps {
         write: impl FnOnce(&GraspResult<'_>) -> semfm::Result<T> + Send + 'static,
     ) -> PyResult<T> {
         let (found, mesh) = (self.found.clone(), self.mesh.clone());
-        let gripper = self.gripper.get().held.clone();
+        let gripper = self.gripper.get().inner.clone();
         let (object_scale, camera_from_object) = (self.scale, self.camera_from_object);
         run(py, None, move |_| {
             let (mesh, gripper, found) = (&*mesh, &*gripper, &*found);
@@ -151,13 +152,13 @@ impl Grasps {
     /// (g,) float64 array: scores, falling.
     #[getter]
     fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.found.grasps.iter().map(|grasp| grasp.score).collect())
+        arrays_out::owned(py, self.found.grasps.iter().map(|grasp| grasp.score).collect())
     }
 
     /// (g,) float64 array: distances between the closed pads, metres.
     #[getter]
     fn widths<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.found.grasps.iter().map(|grasp| grasp.width).collect())
+        arrays_out::owned(py, self.found.grasps.iter().map(|grasp| grasp.width).collect())
     }
 
     /// Gripper: the hand.
@@ -225,10 +226,10 @@ impl Grasps {
         (String, crate::mesh::Mesh, Py<Gripper>, f64, Option<[f64; 16]>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_grasps")?;
-        let plain = serde_json::to_string(&PlainGrasps::of(&self.found))
+        let plain = serde_json::to_string(&PickledGrasps::of(&self.found))
             .map_err(|error| errors::internal(py, &error.to_string()))?;
         let camera = self.camera_from_object.map(|pose| pose.to_mat4().to_cols_array());
-        let mesh = crate::mesh::Mesh { held: self.mesh.clone() };
+        let mesh = crate::mesh::Mesh { inner: self.mesh.clone() };
         Ok((restore, (plain, mesh, self.gripper.clone_ref(py), self.scale, camera)))
     }
 
@@ -247,7 +248,7 @@ impl Grasps {
 
 fn stack(py: Python<'_>, poses: impl Iterator<Item = Pose>) -> PyResult<Bound<'_, PyAny>> {
     let numbers = poses.flat_map(|pose| pose.to_mat4().transpose().to_cols_array());
-    lend::owned(py, numbers.collect()).call_method1("reshape", (-1, 4, 4))
+    arrays_out::owned(py, numbers.collect()).call_method1("reshape", (-1, 4, 4))
 }
 
 /// Grasps out of a pickle.
@@ -260,11 +261,11 @@ pub fn _restore_grasps(
     scale: f64,
     camera_from_object: Option<[f64; 16]>,
 ) -> PyResult<Grasps> {
-    let plain: PlainGrasps = serde_json::from_str(plain)
+    let plain: PickledGrasps = serde_json::from_str(plain)
         .map_err(|error| errors::invalid(py, "pickle", "grasps", &error.to_string()))?;
     Ok(Grasps {
-        found: Held::new(plain.restore()),
-        mesh: mesh.get().held.clone(),
+        found: Arc::new(plain.restore()),
+        mesh: mesh.get().inner.clone(),
         gripper,
         scale,
         camera_from_object: camera_from_object
@@ -369,7 +370,7 @@ pub fn find_grasps(
     let camera_from_object = camera_from_object.map(|pose| rigid(pose)).transpose()?;
     let object_from_answer = camera_from_object.map_or(Pose::IDENTITY, |pose| pose.inverse());
     let direction = |value: Option<&Bound<'_, PyAny>>, name: &str| -> PyResult<Option<DVec3>> {
-        let vector = value.map(|value| arrays::point(value, name)).transpose()?;
+        let vector = value.map(|value| arrays_in::point(value, name)).transpose()?;
         Ok(vector.map(|vector| object_from_answer.rotation * vector))
     };
     let mut settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
@@ -382,7 +383,7 @@ pub fn find_grasps(
     let table = match &table {
         Some((point, normal)) => {
             let normal = direction(Some(normal), "normal of the table")?.unwrap_or_default();
-            Some((object_from_answer * arrays::point(point, "point of the table")?, normal))
+            Some((object_from_answer * arrays_in::point(point, "point of the table")?, normal))
         }
         None => None,
     };
@@ -391,11 +392,11 @@ pub fn find_grasps(
         meshes.push(from_any(&item, "scene_meshes")?);
     }
     let points = match scene_points {
-        Some(points) => arrays::points(points, "scene_points")?,
+        Some(points) => arrays_in::points(points, "scene_points")?,
         None => Vec::new(),
     };
-    let (weights, object) = (region.get().held.clone(), mesh.clone());
-    let hand = gripper.get().held.clone();
+    let (weights, object) = (region.get().inner.clone(), mesh.clone());
+    let hand = gripper.get().inner.clone();
     let found = run(py, progress, move |task| {
         let placed = |p: &DVec3| object_from_answer * *p;
         let mut scene = Scene::new();
@@ -411,13 +412,13 @@ pub fn find_grasps(
         let object = GraspObject::from_mesh(&object, scale)?;
         Ok(grasp::find_grasps(&object, weights.weights(), &hand, &scene, &settings, task)?)
     })?;
-    Ok(Grasps { found: Held::new(found), mesh, gripper, scale, camera_from_object })
+    Ok(Grasps { found: Arc::new(found), mesh, gripper, scale, camera_from_object })
 }
 
 /// A rigid motion from a homogeneous matrix.
 fn rigid(value: &Bound<'_, PyAny>) -> PyResult<Pose> {
     let name = "camera_from_object";
-    let (numbers, _) = arrays::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
+    let (numbers, _) = arrays_in::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
     let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
     let sim3 = semfm::align::Sim3::from_rows(rows)
         .map_err(|error| errors::raise(value.py(), &error.into()))?;

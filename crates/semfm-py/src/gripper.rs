@@ -1,14 +1,14 @@
 //! `Gripper`: a two-finger gripper.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::robot::{self, GripperSettings, JointPosition, Pose};
 
-use crate::held::Held;
-use crate::lend;
-use crate::work::run;
+use crate::arrays_out;
+use crate::interruptible::run;
 
 /// A parallel-jaw gripper: +z along the approach, y along the closing direction, origin between the
 /// finger pads (TCP), metres.
@@ -30,7 +30,7 @@ use crate::work::run;
 /// {'panda_finger_joint1': 0.02, 'panda_finger_joint2': 0.02}
 #[pyclass(frozen, module = "semfm")]
 pub struct Gripper {
-    pub held: Held<robot::Gripper>,
+    pub inner: Arc<robot::Gripper>,
     source: PathBuf,
     packages: Vec<(String, PathBuf)>,
 }
@@ -56,7 +56,7 @@ impl Gripper {
             let settings = GripperSettings { packages: folders, ..Default::default() };
             Ok(robot::Gripper::open(&name_or_path.to_string_lossy(), &settings)?)
         })?;
-        Ok(Self { held: Held::new(gripper), source, packages })
+        Ok(Self { inner: Arc::new(gripper), source, packages })
     }
 
     /// Names of the built-in grippers.
@@ -72,25 +72,25 @@ impl Gripper {
     /// str: as in the URDF, or of the built-in set.
     #[getter]
     fn name(&self) -> &str {
-        &self.held.name
+        &self.inner.name
     }
 
     /// tuple of float, float: distances between the pads that the joints can reach, metres.
     #[getter]
     fn opening(&self) -> (f64, f64) {
-        (*self.held.opening.start(), *self.held.opening.end())
+        (*self.inner.opening.start(), *self.inner.opening.end())
     }
 
     /// tuple of float, float: the pads' sides across (x) and along (z) the approach, metres.
     #[getter]
     fn pad(&self) -> (f64, f64) {
-        (self.held.pad[0], self.held.pad[1])
+        (self.inner.pad[0], self.inner.pad[1])
     }
 
     /// list of str: what was replaced or left out when the URDF was read.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.held.notes.clone()
+        self.inner.notes.clone()
     }
 
     /// The TCP in the flange's frame.
@@ -104,7 +104,7 @@ impl Gripper {
     /// -------
     /// (4, 4) float64 array
     fn flange_from_tcp<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyAny>> {
-        matrix(py, self.held.flange_from_tcp_at(width))
+        matrix(py, self.inner.flange_from_tcp_at(width))
     }
 
     /// Positions of the joints that open and close the gripper.
@@ -120,7 +120,7 @@ impl Gripper {
     ///     Metres or radians; empty where the joints are not known by name.
     fn joints_at<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyDict>> {
         let joints = PyDict::new(py);
-        for JointPosition { name, position } in self.held.joints_at(width) {
+        for JointPosition { name, position } in self.inner.joints_at(width) {
             joints.set_item(name, position)?;
         }
         Ok(joints)
@@ -144,7 +144,7 @@ impl Gripper {
 
     fn __repr__(&self) -> String {
         let (closed, open) = self.opening();
-        format!("Gripper({}, {closed} to {open:.3} m)", self.held.name)
+        format!("Gripper({}, {closed} to {open:.3} m)", self.inner.name)
     }
 }
 
@@ -165,5 +165,5 @@ pub fn _restore_gripper(
 /// A pose as a homogeneous matrix.
 pub fn matrix(py: Python<'_>, pose: Pose) -> PyResult<Bound<'_, PyAny>> {
     let rows = pose.to_mat4().transpose().to_cols_array();
-    lend::owned_rows(py, rows.to_vec(), 4)
+    arrays_out::owned_rows(py, rows.to_vec(), 4)
 }

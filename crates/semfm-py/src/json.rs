@@ -9,7 +9,7 @@ use semfm::geom::io::write_atomically;
 use serde_json::Value;
 
 use crate::errors;
-use crate::work::run;
+use crate::interruptible::run;
 
 /// A dict, a list or a number from whatever can be written as JSON.
 pub fn to_python<'py>(

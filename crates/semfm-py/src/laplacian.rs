@@ -9,11 +9,11 @@ use semfm::geom::laplacian::{
     point_cloud_laplacian, tufted_laplacian,
 };
 
-use crate::arrays::{self, Axis, within_memory};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis, within_memory};
+use crate::interruptible::run;
 use crate::mesh::{Reduced, from_any};
-use crate::work::run;
-use crate::{errors, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors};
 
 /// Stiffness and lumped mass of a surface: ``L = M⁻¹ · stiffness`` is the Laplace–Beltrami operator.
 ///
@@ -32,7 +32,7 @@ use crate::{errors, lend};
 /// laplacian, tufted_laplacian, cotan_laplacian, point_cloud_laplacian
 #[pyclass(frozen, module = "semfm")]
 pub struct Laplacian {
-    pub held: Held<geom::Laplacian>,
+    pub inner: Shared<geom::Laplacian>,
 }
 
 #[pymethods]
@@ -40,7 +40,7 @@ impl Laplacian {
     #[new]
     fn new(stiffness: &Bound<'_, PyAny>, mass: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = mass.py();
-        let (mass, shape) = arrays::floats(mass, "mass", &[Axis::Any("n")])?;
+        let (mass, shape) = arrays_in::floats(mass, "mass", &[Axis::Any("n")])?;
         let n = shape[0];
         if let Some(i) = mass.iter().position(|&m| m <= 0.0) {
             let found = format!("{} at {i}", mass[i]);
@@ -56,9 +56,9 @@ impl Laplacian {
             return Err(errors::invalid(py, "stiffness", &expected, &format!("shape {found:?}")));
         }
         let entries = [Axis::Any("nnz")];
-        let rows = arrays::ids(&coo.getattr("row")?, "stiffness.row", &entries)?.0;
-        let columns = arrays::ids(&coo.getattr("col")?, "stiffness.col", &entries)?.0;
-        let values = arrays::floats(&coo.getattr("data")?, "stiffness.data", &entries)?.0;
+        let rows = arrays_in::ids(&coo.getattr("row")?, "stiffness.row", &entries)?.0;
+        let columns = arrays_in::ids(&coo.getattr("col")?, "stiffness.col", &entries)?.0;
+        let values = arrays_in::floats(&coo.getattr("data")?, "stiffness.data", &entries)?.0;
         let triplets: Vec<_> = rows
             .iter()
             .zip(&columns)
@@ -67,28 +67,29 @@ impl Laplacian {
             .collect();
         let stiffness = SparseColMat::try_new_from_triplets(n, n, &triplets)
             .map_err(|error| errors::internal(py, &format!("{error:?}")))?;
-        Ok(Self { held: Held::new(geom::Laplacian { stiffness, mass }) })
+        Ok(Self { inner: Shared::new(geom::Laplacian { stiffness, mass }) })
     }
 
     /// int: number of vertices n.
     #[getter]
     fn n_vertices(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 
     /// (n,) float64 array: the diagonal of the mass matrix, a read-only view.
     #[getter]
     fn mass<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |laplacian| laplacian.held.mass.as_slice())
+        arrays_out::vector(slf, |laplacian| laplacian.inner.mass.as_slice())
     }
 
     /// scipy.sparse.csc_matrix: stiffness (n × n); needs SciPy.
     #[getter]
     fn stiffness<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        let data = lend::vector(slf, |laplacian| laplacian.held.stiffness.val())?;
-        let matrix = &slf.get().held.stiffness;
-        let index = |ids: &[usize]| lend::owned(py, ids.iter().map(|&id| id as i64).collect());
+        let data = arrays_out::vector(slf, |laplacian| laplacian.inner.stiffness.val())?;
+        let matrix = &slf.get().inner.stiffness;
+        let index =
+            |ids: &[usize]| arrays_out::owned(py, ids.iter().map(|&id| id as i64).collect());
         let (rows, columns) = (index(matrix.row_idx()), index(matrix.col_ptr()));
         let options = PyDict::new(py);
         options.set_item("shape", (matrix.nrows(), matrix.ncols()))?;
@@ -104,8 +105,8 @@ impl Laplacian {
     }
 
     fn __repr__(&self) -> String {
-        let entries = self.held.stiffness.val().len();
-        format!("Laplacian({} vertices, {entries} entries)", self.held.n_vertices())
+        let entries = self.inner.stiffness.val().len();
+        format!("Laplacian({} vertices, {entries} entries)", self.inner.n_vertices())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -220,20 +221,20 @@ pub fn point_cloud_laplacian_(
     mollify_factor: f64,
 ) -> PyResult<Laplacian> {
     let py = points.py();
-    let points = arrays::points(points, "points")?;
+    let points = arrays_in::points(points, "points")?;
     // More neighbours than points are all of them.
     let n_neighbors = n_neighbors.min(points.len().max(3));
     within_memory(py, "n_neighbors", n_neighbors, 6 * points.len())?;
     let settings = CloudSettings { n_neighbors, mollify_factor };
     let laplacian = run(py, None, move |_| Ok(point_cloud_laplacian(&points, &settings)?))?;
-    Ok(Laplacian { held: Held::new(laplacian) })
+    Ok(Laplacian { inner: Shared::new(laplacian) })
 }
 
 fn make(
     mesh: &Bound<'_, PyAny>,
     build: impl FnOnce(&semfm::Mesh) -> geom::Result<geom::Laplacian> + Send + 'static,
 ) -> PyResult<Laplacian> {
-    let held = from_any(mesh, "mesh")?;
-    let laplacian = run(mesh.py(), None, move |_| Ok(build(&held)?))?;
-    Ok(Laplacian { held: Held::new(laplacian) })
+    let shared = from_any(mesh, "mesh")?;
+    let laplacian = run(mesh.py(), None, move |_| Ok(build(&shared)?))?;
+    Ok(Laplacian { inner: Shared::new(laplacian) })
 }

@@ -1,9 +1,9 @@
 //! The compiled half of the Python package: arrays in, facade calls, arrays out.
 //!
-//! One room per class, named as in Rust. A class holds the Rust value (`held`) and converts:
-//! `arrays` takes what NumPy has, `lend` hands views out, `work` runs what takes long,
-//! `errors` raises. Documentation is Python's: numpydoc, read by `help`, run by doctest, and read
-//! by the script that writes the type stubs.
+//! One file per class, named as in Rust. A class holds the Rust value (`inner`) and converts:
+//! `arrays_in` checks arrays of NumPy, `arrays_out` makes them, `interruptible` runs what takes
+//! long, `errors` raises. Documentation is Python's: numpydoc, read by `help`, run by doctest, and
+//! read by the script that writes the type stubs.
 #![allow(clippy::type_complexity, reason = "pickles: a function and its arguments, as they are")]
 #![allow(clippy::doc_lazy_continuation, reason = "docstrings are numpydoc, not Markdown")]
 #![allow(clippy::doc_overindented_list_items, reason = "docstrings are numpydoc, not Markdown")]
@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 
 mod align;
 mod anchors;
-mod arrays;
-mod camera;
+mod arrays_in;
+mod arrays_out;
 mod cloud;
 mod descriptors;
 mod eigenbasis;
@@ -21,27 +21,27 @@ mod embeddings;
 mod errors;
 mod functional_map;
 mod geodesic;
+mod grasp_pickle;
 mod grasps;
 mod gripper;
-mod held;
+mod interruptible;
 mod json;
 mod laplacian;
-mod lend;
 mod matching;
 mod mesh;
-mod one_call;
-mod plain_grasps;
+mod pinhole;
 mod point_map;
 mod prepared;
 mod region;
 mod settings;
 mod shape;
+mod shared;
 mod surface;
 mod synth;
 mod transfer;
+mod transfer_function;
 mod view;
 mod views_file;
-mod work;
 
 /// The compiled half of `semfm`.
 #[pymodule]
@@ -52,8 +52,6 @@ mod _semfm {
     use crate::align::{Alignment, align_};
     #[pymodule_export]
     use crate::anchors::{_restore_anchors, Anchors, Clusters, spectral_clusters};
-    #[pymodule_export]
-    use crate::camera::{Camera, camera_towards, rig};
     #[pymodule_export]
     use crate::cloud::{SemanticCloud, lift};
     #[pymodule_export]
@@ -71,6 +69,8 @@ mod _semfm {
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]
+    use crate::interruptible::{_work_for_tests, get_num_threads, set_num_threads};
+    #[pymodule_export]
     use crate::json::write_file;
     #[pymodule_export]
     use crate::laplacian::{
@@ -81,7 +81,7 @@ mod _semfm {
     #[pymodule_export]
     use crate::mesh::{Mesh, MeshFile, mesh_formats, read_mesh};
     #[pymodule_export]
-    use crate::one_call::transfer;
+    use crate::pinhole::{Pinhole, camera_towards, rig};
     #[pymodule_export]
     use crate::point_map::PointMap;
     #[pymodule_export]
@@ -101,11 +101,11 @@ mod _semfm {
     #[pymodule_export]
     use crate::transfer::{_restore_transfer, Hypothesis, Transfer};
     #[pymodule_export]
+    use crate::transfer_function::transfer;
+    #[pymodule_export]
     use crate::view::{_restore_view, View, render};
     #[pymodule_export]
     use crate::views_file::ViewsFile;
-    #[pymodule_export]
-    use crate::work::{_work_for_tests, get_num_threads, set_num_threads};
 
     /// Runs the command line of `semfm-cli`.
     ///
@@ -122,12 +122,12 @@ mod _semfm {
     fn run_cli(py: Python<'_>, arguments: Vec<String>) -> PyResult<u8> {
         let words = std::iter::once("semfm-cli".to_owned()).chain(arguments);
         let words: Vec<String> = words.collect();
-        crate::work::run(py, None, move |_| Ok(semfm_cli::run(words)))
+        crate::interruptible::run(py, None, move |_| Ok(semfm_cli::run(words)))
     }
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        crate::work::silence_panics();
+        crate::interruptible::silence_panics();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -1,4 +1,4 @@
-//! `Matching`: a pair, matched once, that carries any number of regions.
+//! `Matching`: a pair, matched once, that transfers any number of regions.
 
 use std::sync::Arc;
 
@@ -8,15 +8,15 @@ use semfm::fmap::Matching as Matched;
 
 use crate::anchors::Anchors;
 use crate::functional_map::FunctionalMap;
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::point_map::PointMap;
 use crate::prepared::PreparedObject;
 use crate::region::region_of;
 use crate::settings::{Options, TransferSettings};
+use crate::shared::Shared;
 use crate::transfer::Transfer;
-use crate::work::run;
 
-/// A matched pair: computed once, it carries any number of regions.
+/// A matched pair: computed once, it transfers any number of regions.
 ///
 /// Parameters
 /// ----------
@@ -28,9 +28,12 @@ use crate::work::run;
 ///     ``fused`` (where neither this nor `settings` is given), ``semfm``, ``anchored``,
 ///     ``sinkhorn``, ``nearest`` or ``wks``.
 /// rule : str, optional
-///     How a map carries the region: ``preimage`` (where none is given) or ``image``.
+///     How a map transfers the region: ``preimage`` (where none is given) or ``image``.
 /// seed : int, optional
 ///     Of everything drawn by chance; 0 where none is given.
+/// second_opinion : bool, optional
+///     Whether an independent method judges the result, too; the method's own default where none is
+///     given: True where its confidence is the agreement of the two.
 /// settings : TransferSettings, optional
 ///     Everything that can be set, in place of `method` and `rule`.
 /// progress : progress, optional
@@ -56,7 +59,8 @@ pub struct Matching {
 impl Matching {
     #[new]
     #[pyo3(signature = (
-        source, target, *, method=None, rule=None, seed=None, settings=None, progress=None
+        source, target, *, method=None, rule=None, seed=None, second_opinion=None, settings=None,
+        progress=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
     fn new(
@@ -66,17 +70,26 @@ impl Matching {
         method: Option<&str>,
         rule: Option<&str>,
         seed: Option<u64>,
+        second_opinion: Option<bool>,
         settings: Option<&Bound<'_, TransferSettings>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let options =
-            Options { method, rule, seed, settings, k: None, working_vertices: None, cache: None };
+        let options = Options {
+            method,
+            rule,
+            seed,
+            second_opinion,
+            settings,
+            k: None,
+            working_vertices: None,
+            cache: None,
+        };
         let settings = options.pipeline(py)?.transfer;
         let (source, target) = (source.get().clone(), target.get().clone());
         run(py, progress, move |task| Self::of(source, target, &settings, task))
     }
 
-    /// Carries one region.
+    /// Transfers one region.
     ///
     /// Parameters
     /// ----------
@@ -88,9 +101,9 @@ impl Matching {
     /// Transfer
     fn transfer(&self, region: &Bound<'_, PyAny>) -> PyResult<Transfer> {
         let py = region.py();
-        let region = region_of(region, &self.source.held.part(|o| o.object.shape().original()))?;
+        let region = region_of(region, &self.source.mesh_inner())?;
         let matching = self.clone();
-        run(py, None, move |_| matching.carry(region))
+        run(py, None, move |_| matching.transferred(region))
     }
 
     /// Anchors: the paired parts of the two objects.
@@ -98,22 +111,22 @@ impl Matching {
     fn anchors(&self, py: Python<'_>) -> PyResult<Anchors> {
         let pair = Arc::clone(&self.pair);
         let anchors = run(py, None, move |task| Ok(pair.anchors(task)?.clone()))?;
-        Ok(Anchors { held: Held::new(anchors) })
+        Ok(Anchors { inner: Arc::new(anchors) })
     }
 
     /// FunctionalMap, optional: C between the working shapes; None for methods without a map.
     #[getter]
     fn functional_map(&self) -> Option<FunctionalMap> {
         let map = self.pair.functional_map()?;
-        Some(FunctionalMap { held: Held::new(map.clone()) })
+        Some(FunctionalMap { inner: Arc::new(map.clone()) })
     }
 
     /// PointMap: target → source, between the working meshes.
     #[getter]
     fn working_point_map(&self) -> PointMap {
         let map = self.pair.working_point_map();
-        let n_source = self.source.held.object.shape().mesh().n_vertices();
-        PointMap { held: Held::new(map.clone()), n_source }
+        let n_source = self.source.inner.object.shape().mesh().n_vertices();
+        PointMap { inner: Shared::new(map.clone()), n_source }
     }
 
     /// PreparedObject: the demonstrated object.
@@ -141,14 +154,15 @@ impl Matching {
         settings: &fmap::TransferSettings,
         task: &semfm::Task,
     ) -> semfm::Result<Self> {
-        let pair = Matched::new(&source.held.object, &target.held.object, settings, task)?;
+        let pair = Matched::new(&source.inner.object, &target.inner.object, settings, task)?;
         pair.anchors(task)?; // its reports list them, as those of the short call
         Ok(Self { pair: Arc::new(pair), source, target })
     }
 
-    /// Carries one region, which must be of the source's mesh.
-    pub fn carry(&self, region: Held<semfm::Region>) -> semfm::Result<Transfer> {
-        let held = Held::new(self.pair.transfer(&region)?);
-        Ok(Transfer { held, source: self.source.clone(), target: self.target.clone(), region })
+    /// Transfers one region, which must be of the source's mesh.
+    pub fn transferred(&self, region: Shared<semfm::Region>) -> semfm::Result<Transfer> {
+        let transfer = Arc::new(self.pair.transfer(&region)?);
+        let (source, target) = (self.source.clone(), self.target.clone());
+        Ok(Transfer { inner: transfer, source, target, region })
     }
 }

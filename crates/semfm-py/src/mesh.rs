@@ -1,16 +1,17 @@
 //! `Mesh`: checked arrays and mesh files.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io;
 
-use crate::arrays::{self, Axis};
-use crate::held::Held;
-use crate::work::{guard, run};
-use crate::{errors, json, lend};
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::{guard, run};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// A triangle mesh in its own frame and units.
 ///
@@ -40,7 +41,7 @@ use crate::{errors, json, lend};
 /// 0.5
 #[pyclass(frozen, module = "semfm")]
 pub struct Mesh {
-    pub held: Held<semfm::Mesh>,
+    pub inner: Shared<semfm::Mesh>,
 }
 
 #[pymethods]
@@ -48,11 +49,11 @@ impl Mesh {
     #[new]
     fn new(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = vertices.py();
-        let points = arrays::points(vertices, "vertices")?;
-        let (ids, _) = arrays::ids(faces, "faces", &[Axis::Any("m"), Axis::Is(3)])?;
+        let points = arrays_in::points(vertices, "vertices")?;
+        let (ids, _) = arrays_in::ids(faces, "faces", &[Axis::Any("m"), Axis::Is(3)])?;
         let faces = ids.as_chunks::<3>().0.to_vec();
         let mesh = guard(py, || Ok(semfm::Mesh::new(points, faces)?))?;
-        Ok(Self { held: Held::new(mesh) })
+        Ok(Self { inner: Shared::new(mesh) })
     }
 
     /// Reads a mesh file in any format of ``mesh_formats()``; polygons are cut to triangles.
@@ -72,7 +73,7 @@ impl Mesh {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let mesh = run(py, None, move |_| Ok(io::read_mesh(&path)?.mesh))?;
-        Ok(Self { held: Held::new(mesh) })
+        Ok(Self { inner: Shared::new(mesh) })
     }
 
     /// The mesh of a `trimesh.Trimesh`, vertex by vertex (load it with ``process=False``, or trimesh
@@ -126,16 +127,16 @@ impl Mesh {
         colors: Option<&Bound<'_, PyAny>>,
         scalars: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
-        let n = Axis::Is(self.held.n_vertices());
-        let colors = colors.map(|colors| arrays::bytes(colors, "colors", &[n, Axis::Is(4)]));
+        let n = Axis::Is(self.inner.n_vertices());
+        let colors = colors.map(|colors| arrays_in::bytes(colors, "colors", &[n, Axis::Is(4)]));
         let colors = colors.transpose()?.map(|(bytes, _)| bytes.as_chunks::<4>().0.to_vec());
         let mut named: Vec<(String, Vec<f64>)> = Vec::new();
         for (name, values) in scalars.into_iter().flatten() {
             let name: String = name.extract()?;
-            let values = arrays::floats(&values, &format!("scalars[{name:?}]"), &[n])?.0;
+            let values = arrays_in::floats(&values, &format!("scalars[{name:?}]"), &[n])?.0;
             named.push((name, values));
         }
-        let mesh = self.held.clone();
+        let mesh = self.inner.clone();
         run(py, None, move |_| {
             let scalars: Vec<(&str, &[f64])> =
                 named.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
@@ -147,50 +148,50 @@ impl Mesh {
     /// (n, 3) float64 array: positions, a read-only view.
     #[getter]
     fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, 3, |mesh| bytemuck::cast_slice::<_, f64>(mesh.held.vertices()))
+        arrays_out::rows(slf, 3, |mesh| bytemuck::cast_slice::<_, f64>(mesh.inner.vertices()))
     }
 
     /// (m, 3) uint32 array: vertex ids of each triangle, a read-only view.
     #[getter]
     fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::rows(slf, 3, |mesh| mesh.held.faces().as_flattened())
+        arrays_out::rows(slf, 3, |mesh| mesh.inner.faces().as_flattened())
     }
 
     /// int: number of vertices n.
     #[getter]
     fn n_vertices(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 
     /// int: number of triangles m.
     #[getter]
     fn n_faces(&self) -> usize {
-        self.held.n_faces()
+        self.inner.n_faces()
     }
 
     /// float: surface area, in squared units of the mesh.
     #[getter]
     fn area(&self) -> f64 {
-        self.held.area()
+        self.inner.area()
     }
 
     /// float: length of the bounding box's diagonal.
     #[getter]
     fn diagonal(&self) -> f64 {
-        self.held.diagonal()
+        self.inner.diagonal()
     }
 
     /// (2, 3) float64 array: lower and upper corner of the bounding box.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (low, high) = self.held.bounds();
-        lend::owned_rows(py, [low.to_array(), high.to_array()].concat(), 3)
+        let (low, high) = self.inner.bounds();
+        arrays_out::owned_rows(py, [low.to_array(), high.to_array()].concat(), 3)
     }
 
     /// str: the mesh's name, ``blake3:`` and 64 digits over counts, positions and triangles.
     #[getter]
     fn hash(&self) -> String {
-        self.held.hash().to_string()
+        self.inner.hash().to_string()
     }
 
     /// A third of the area of the triangles around each vertex.
@@ -199,7 +200,7 @@ impl Mesh {
     /// -------
     /// (n,) float64 array
     fn vertex_areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.vertex_areas())
+        arrays_out::owned(py, self.inner.vertex_areas())
     }
 
     /// What is regular and what is not: edges, components, boundaries, manifoldness.
@@ -215,21 +216,21 @@ impl Mesh {
     /// >>> semfm.zoo.icosphere(2).report()["watertight"]
     /// True
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mesh = self.held.clone();
+        let mesh = self.inner.clone();
         let report = run(py, None, move |_| Ok(MeshReport::new(&mesh)))?;
         json::to_python(py, &report)
     }
 
     fn __repr__(&self) -> String {
-        format!("Mesh({} vertices, {} triangles)", self.held.n_vertices(), self.held.n_faces())
+        format!("Mesh({} vertices, {} triangles)", self.inner.n_vertices(), self.inner.n_faces())
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+        other.cast::<Self>().is_ok_and(|other| *other.get().inner == *self.inner)
     }
 
     fn __hash__(&self) -> u64 {
-        let hash = self.held.hash().0;
+        let hash = self.inner.hash().0;
         hash.iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
     }
 
@@ -251,19 +252,19 @@ impl Mesh {
 pub type Reduced<'py> = (Bound<'py, PyType>, Bound<'py, PyAny>);
 
 /// A mesh from whatever is one: `Mesh`, a file, or an object with vertices and faces or triangles.
-pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Held<semfm::Mesh>> {
+pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Shared<semfm::Mesh>> {
     if let Ok(mesh) = value.cast::<Mesh>() {
-        return Ok(mesh.get().held.clone());
+        return Ok(mesh.get().inner.clone());
     }
     if let Ok(path) = value.extract::<PathBuf>() {
-        return Ok(Mesh::read(value.py(), path)?.held);
+        return Ok(Mesh::read(value.py(), path)?.inner);
     }
     if value.hasattr("vertices")? {
         if value.hasattr("faces")? {
-            return Ok(Mesh::from_trimesh(value)?.held);
+            return Ok(Mesh::from_trimesh(value)?.inner);
         }
         if value.hasattr("triangles")? {
-            return Ok(Mesh::from_open3d(value)?.held);
+            return Ok(Mesh::from_open3d(value)?.inner);
         }
     }
     let wanted = "a Mesh, a path, or an object with vertices and faces (or triangles)";
@@ -273,7 +274,7 @@ pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Held<semfm::Me
 /// A mesh file: the mesh and what the file says about its colours.
 #[pyclass(frozen, module = "semfm")]
 pub struct MeshFile {
-    pub held: Held<io::MeshFile>,
+    pub inner: Arc<io::MeshFile>,
 }
 
 #[pymethods]
@@ -281,41 +282,41 @@ impl MeshFile {
     /// Mesh: the geometry.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh { held: self.held.part(|file| &file.mesh) }
+        Mesh { inner: Shared::part_of(&self.inner, |file| &file.mesh) }
     }
 
     /// (n, 4) uint8 array, optional: RGBA of each vertex in sRGB; None where the file has none.
     #[getter]
     fn vertex_colors<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        if slf.get().held.appearance.vertex_colors.is_none() {
+        if slf.get().inner.appearance.vertex_colors.is_none() {
             return Ok(None);
         }
         fn colors(file: &MeshFile) -> &[u8] {
-            file.held.appearance.vertex_colors.as_deref().map_or(&[], <[[u8; 4]]>::as_flattened)
+            file.inner.appearance.vertex_colors.as_deref().map_or(&[], <[[u8; 4]]>::as_flattened)
         }
-        lend::rows(slf, 4, colors).map(Some)
+        arrays_out::rows(slf, 4, colors).map(Some)
     }
 
     /// bool: whether the file has vertex colours, materials or images.
     #[getter]
     fn has_colors(&self) -> bool {
-        !self.held.appearance.is_plain()
+        !self.inner.appearance.is_plain()
     }
 
     /// str: the format, such as ``"ply"``.
     #[getter]
     fn format(&self) -> &'static str {
-        self.held.format.name()
+        self.inner.format.name()
     }
 
     /// list of str: what could not be read of the colours, and why.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.held.appearance.notes.clone()
+        self.inner.appearance.notes.clone()
     }
 
     fn __repr__(&self) -> String {
-        let mesh = &self.held.mesh;
+        let mesh = &self.inner.mesh;
         format!("MeshFile({} vertices, {} triangles)", mesh.n_vertices(), mesh.n_faces())
     }
 }
@@ -342,7 +343,7 @@ pub fn read_mesh(py: Python<'_>, path: PathBuf, texture: Option<PathBuf>) -> PyR
         }
         Ok(file)
     })?;
-    Ok(MeshFile { held: Held::new(file) })
+    Ok(MeshFile { inner: Arc::new(file) })
 }
 
 /// The formats of mesh files, by name.

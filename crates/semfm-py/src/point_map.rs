@@ -6,11 +6,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::fmap;
 
-use crate::arrays::{self, Axis};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::guard;
 use crate::mesh::Reduced;
-use crate::work::guard;
-use crate::{errors, json, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// A map target → source: ``source_of[j]`` is the source vertex matched to target vertex ``j``.
 ///
@@ -31,7 +31,7 @@ use crate::{errors, json, lend};
 /// [30.0, 10.0, 30.0]
 #[pyclass(frozen, module = "semfm")]
 pub struct PointMap {
-    pub held: Held<fmap::PointMap>,
+    pub inner: Shared<fmap::PointMap>,
     pub n_source: usize,
 }
 
@@ -39,15 +39,15 @@ pub struct PointMap {
 impl PointMap {
     #[new]
     fn new(source_of: &Bound<'_, PyAny>, n_source: usize) -> PyResult<Self> {
-        let (ids, _) = arrays::ids(source_of, "source_of", &[Axis::Any("n_target")])?;
+        let (ids, _) = arrays_in::ids(source_of, "source_of", &[Axis::Any("n_target")])?;
         let map = guard(source_of.py(), || Ok(fmap::PointMap::new(ids, n_source)?))?;
-        Ok(Self { held: Held::new(map), n_source })
+        Ok(Self { inner: Shared::new(map), n_source })
     }
 
     /// (n_target,) uint32 array: the source vertex of each target vertex, a read-only view.
     #[getter]
     fn source_of<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |map| map.held.source_of.as_slice())
+        arrays_out::vector(slf, |map| map.inner.source_of.as_slice())
     }
 
     /// int: number of source vertices.
@@ -59,7 +59,7 @@ impl PointMap {
     /// int: number of target vertices.
     #[getter]
     fn n_target(&self) -> usize {
-        self.held.n_target()
+        self.inner.n_target()
     }
 
     /// A function on the source, looked up from the target: ``function[source_of]``.
@@ -115,16 +115,18 @@ impl PointMap {
     }
 
     fn __len__(&self) -> usize {
-        self.held.n_target()
+        self.inner.n_target()
     }
 
     fn __repr__(&self) -> String {
-        format!("PointMap({} target vertices → {} source)", self.held.n_target(), self.n_source)
+        format!("PointMap({} target vertices → {} source)", self.inner.n_target(), self.n_source)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        let same = |other: &Self| *other.held == *self.held && other.n_source == self.n_source;
-        other.cast::<Self>().is_ok_and(|other| same(other.get()))
+        other.cast::<Self>().is_ok_and(|other| {
+            let other = other.get();
+            *other.inner == *self.inner && other.n_source == self.n_source
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {

@@ -8,13 +8,13 @@ use semfm::{FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, 
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
-use crate::arrays::{self, Axis};
+use crate::arrays_in::{self, Axis};
 use crate::cloud::{SemanticCloud, embeddings_of};
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::mesh::{Mesh, from_any};
 use crate::settings::{Options, TransferSettings};
 use crate::shape::{Shape, check_shape_size};
-use crate::work::run;
+use crate::shared::Shared;
 use crate::{errors, json};
 
 /// An object ready to be matched: its shape and its semantic cloud.
@@ -23,12 +23,17 @@ use crate::{errors, json};
 #[pyclass(frozen, module = "semfm")]
 #[derive(Clone)]
 pub struct PreparedObject {
-    pub held: Held<Prepared>,
+    pub inner: Arc<Prepared>,
 }
 
 impl PreparedObject {
     pub fn new(object: Prepared) -> Self {
-        Self { held: Held::new(object) }
+        Self { inner: Arc::new(object) }
+    }
+
+    /// The mesh as given.
+    pub fn mesh_inner(&self) -> Shared<semfm::Mesh> {
+        Shared::part_of(self.inner.object.shape(), semfm_geom::Shape::original)
     }
 }
 
@@ -37,37 +42,37 @@ impl PreparedObject {
     /// Mesh: the mesh as given.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh { held: self.held.part(|prepared| prepared.object.shape().original()) }
+        Mesh { inner: self.mesh_inner() }
     }
 
     /// Shape: working mesh and eigenbasis.
     #[getter]
     fn shape(&self) -> Shape {
-        Shape { held: self.held.part(|prepared| &**prepared.object.shape()) }
+        Shape { inner: Arc::clone(self.inner.object.shape()) }
     }
 
     /// SemanticCloud: surface points with features.
     #[getter]
     fn cloud(&self) -> SemanticCloud {
-        SemanticCloud { held: self.held.part(|prepared| &**prepared.object.cloud()) }
+        SemanticCloud { inner: Arc::clone(self.inner.object.cloud()) }
     }
 
     /// bool: whether the shape was read from the cache.
     #[getter(from_cache)]
     fn is_from_cache(&self) -> bool {
-        self.held.report.from_cache
+        self.inner.report.from_cache
     }
 
     /// dict: milliseconds by stage.
     #[getter]
     fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let stages: std::collections::BTreeMap<_, _> =
-            self.held.report.stages_ms.iter().copied().collect();
+            self.inner.report.stages_ms.iter().copied().collect();
         json::to_python(py, &stages)
     }
 
     fn __repr__(&self) -> String {
-        let (shape, cloud) = (self.held.object.shape(), self.held.object.cloud());
+        let (shape, cloud) = (self.inner.object.shape(), self.inner.object.cloud());
         let (n, points, dim) = (shape.original().n_vertices(), cloud.n_points(), cloud.dim());
         format!("PreparedObject({n} vertices, {points} points, dim {dim})")
     }
@@ -80,10 +85,11 @@ impl PreparedObject {
         (Shape, SemanticCloud, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
-        let lifted = self.held.report.lifted.as_ref();
+        let report = &self.inner.report;
+        let lifted = report.lifted.as_ref();
         let lifted = lifted.map(|lifted| (lifted.n_seen, lifted.lifted_by_view.clone()));
-        let stages = self.held.report.stages_ms.clone();
-        Ok((restore, (self.shape(), self.cloud(), self.held.report.from_cache, lifted, stages)))
+        let stages = report.stages_ms.clone();
+        Ok((restore, (self.shape(), self.cloud(), report.from_cache, lifted, stages)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -114,8 +120,7 @@ pub fn _restore_prepared(
             _ => ("prepare", *ms),
         })
         .collect();
-    let (shape, cloud) =
-        (Arc::new((*shape.get().held).clone()), Arc::new((*cloud.get().held).clone()));
+    let (shape, cloud) = (Arc::clone(&shape.get().inner), Arc::clone(&cloud.get().inner));
     let object = run(py, None, move |task| Ok(fmap::PreparedObject::new(shape, cloud, task)?))?;
     let lifted = lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view });
     let report = PreparationReport { from_cache, lifted, stages_ms };
@@ -124,9 +129,9 @@ pub fn _restore_prepared(
 
 /// Where an object's features come from, owned.
 pub enum OwnedMeaning {
-    Views(Held<EmbeddingsFile>),
+    Views(Arc<EmbeddingsFile>),
     PerVertex(Vec<f32>),
-    Cloud(Held<Cloud>),
+    Cloud(Arc<Cloud>),
 }
 
 impl OwnedMeaning {
@@ -143,7 +148,7 @@ impl OwnedMeaning {
             (Some(features), None, None) => {
                 let rows = [Axis::Is(mesh.n_vertices()), Axis::Any("d")];
                 let (values, shape) =
-                    arrays::floats32(features, &format!("{side}features"), &rows)?;
+                    arrays_in::floats32(features, &format!("{side}features"), &rows)?;
                 if shape[1] == 0 {
                     let name = format!("{side}features");
                     return Err(errors::invalid(py, &name, "at least one column", "none"));
@@ -154,7 +159,7 @@ impl OwnedMeaning {
                 let name = format!("{side}embeddings");
                 Ok(Self::Views(embeddings_of(embeddings, &name, mesh)?))
             }
-            (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().held.clone())),
+            (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().inner.clone())),
             (None, None, None) => {
                 let expected = "features per vertex, embeddings, or a cloud";
                 Err(errors::invalid(py, &format!("{side}features"), expected, "none of them"))
@@ -189,7 +194,7 @@ impl OwnedMeaning {
 /// ----------
 /// mesh : mesh_like
 /// features : (n, d) array_like, optional
-///     A feature vector per vertex, from anybody's network.
+///     A feature vector per vertex, from any network.
 /// embeddings : Embeddings or path, optional
 ///     Patch embeddings of rendered views of this very mesh.
 /// cloud : SemanticCloud, optional
@@ -242,10 +247,19 @@ pub fn prepare(
     cache: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PreparedObject> {
-    let options = Options { method, rule: None, seed, settings, k, working_vertices, cache };
+    let options = Options {
+        method,
+        rule: None,
+        seed,
+        second_opinion: None,
+        settings,
+        k,
+        working_vertices,
+        cache,
+    };
     let mut settings = options.pipeline(py)?;
     if let Some(n) = n_samples {
-        arrays::within_memory(py, "n_samples", n, 1024)?;
+        arrays_in::within_memory(py, "n_samples", n, 1024)?;
         settings.lift.n_samples = n;
     }
     let mesh = from_any(mesh, "mesh")?;

@@ -7,12 +7,12 @@ use semfm::fmap::metrics;
 use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
 use semfm::files::{RegionFile, read_region, write_region};
 
-use crate::arrays::{self, Axis};
-use crate::camera::Camera;
-use crate::held::Held;
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::{guard, run};
 use crate::mesh::{MeshFile, Reduced, from_any};
-use crate::work::{guard, run};
-use crate::{errors, lend};
+use crate::pinhole::Pinhole;
+use crate::shared::Shared;
+use crate::{arrays_out, errors};
 
 /// A region (an affordance): a weight in [0, 1] for each vertex of a mesh.
 ///
@@ -33,14 +33,14 @@ use crate::{errors, lend};
 /// [False, True, False, True, False]
 #[pyclass(frozen, module = "semfm")]
 pub struct Region {
-    pub held: Held<semfm::Region>,
+    pub inner: Shared<semfm::Region>,
 }
 
 #[pymethods]
 impl Region {
     #[new]
     fn new(weights: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, _) = arrays::floats(weights, "weights", &[Axis::Any("n")])?;
+        let (values, _) = arrays_in::floats(weights, "weights", &[Axis::Any("n")])?;
         guarded(weights.py(), || Ok(semfm::Region::from_weights(values)?))
     }
 
@@ -59,8 +59,8 @@ impl Region {
     #[staticmethod]
     fn from_vertices(n_vertices: usize, vertices: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = vertices.py();
-        arrays::within_memory(py, "n_vertices", n_vertices, 1)?;
-        let (ids, _) = arrays::ids(vertices, "vertices", &[Axis::Any("v")])?;
+        arrays_in::within_memory(py, "n_vertices", n_vertices, 1)?;
+        let (ids, _) = arrays_in::ids(vertices, "vertices", &[Axis::Any("v")])?;
         guarded(py, || Ok(semfm::Region::from_vertices(n_vertices, &ids)?))
     }
 
@@ -76,8 +76,8 @@ impl Region {
     /// Region
     #[staticmethod]
     fn from_mask(inside: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (inside, _) = arrays::mask(inside, "inside", &[Axis::Any("n")])?;
-        Ok(Self { held: Held::new(semfm::Region::from_mask(&inside)) })
+        let (inside, _) = arrays_in::mask(inside, "inside", &[Axis::Any("n")])?;
+        Ok(Self { inner: Shared::new(semfm::Region::from_mask(&inside)) })
     }
 
     /// All vertices within a geodesic radius of the surface point nearest to a contact.
@@ -102,10 +102,11 @@ impl Region {
     /// True
     #[staticmethod]
     fn near(mesh: &Bound<'_, PyAny>, contact: &Bound<'_, PyAny>, radius: f64) -> PyResult<Self> {
-        let contact = arrays::point(contact, "contact")?;
-        let held = from_any(mesh, "mesh")?;
-        let region = run(mesh.py(), None, move |_| region_around_contact(&held, contact, radius))?;
-        Ok(Self { held: Held::new(region) })
+        let contact = arrays_in::point(contact, "contact")?;
+        let shared = from_any(mesh, "mesh")?;
+        let region =
+            run(mesh.py(), None, move |_| region_around_contact(&shared, contact, radius))?;
+        Ok(Self { inner: Shared::new(region) })
     }
 
     /// All vertices that a camera sees inside a mask.
@@ -113,7 +114,7 @@ impl Region {
     /// Parameters
     /// ----------
     /// mesh : mesh_like
-    /// camera : Camera
+    /// camera : Pinhole
     /// mask : (height, width) array_like
     ///     Of dtype bool, of the camera's size.
     ///
@@ -123,15 +124,15 @@ impl Region {
     #[staticmethod]
     fn masked(
         mesh: &Bound<'_, PyAny>,
-        camera: &Bound<'_, Camera>,
+        camera: &Bound<'_, Pinhole>,
         mask: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let camera = camera.get().camera;
         let size = [Axis::Is(camera.height() as usize), Axis::Is(camera.width() as usize)];
-        let (mask, _) = arrays::mask(mask, "mask", &size)?;
-        let held = from_any(mesh, "mesh")?;
-        let region = run(mesh.py(), None, move |_| region_under_mask(&held, &camera, &mask))?;
-        Ok(Self { held: Held::new(region) })
+        let (mask, _) = arrays_in::mask(mask, "mask", &size)?;
+        let shared = from_any(mesh, "mesh")?;
+        let region = run(mesh.py(), None, move |_| region_under_mask(&shared, &camera, &mask))?;
+        Ok(Self { inner: Shared::new(region) })
     }
 
     /// All vertices painted red, or in the paint given.
@@ -153,7 +154,7 @@ impl Region {
         file: &Bound<'_, MeshFile>,
         paint: Option<(u8, u8, u8)>,
     ) -> PyResult<Self> {
-        let colors = file.get().held.appearance.vertex_colors.as_deref();
+        let colors = file.get().inner.appearance.vertex_colors.as_deref();
         guarded(py, || region_of_paint(colors, paint.map(|(r, g, b)| [r, g, b])))
     }
 
@@ -171,8 +172,8 @@ impl Region {
     /// Region
     #[staticmethod]
     fn read(path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let held = from_any(mesh, "mesh")?;
-        guarded(mesh.py(), || read_region(&path, &held))
+        let shared = from_any(mesh, "mesh")?;
+        guarded(mesh.py(), || read_region(&path, &shared))
     }
 
     /// Writes a region file, whole or not at all.
@@ -183,8 +184,8 @@ impl Region {
     /// mesh : mesh_like
     ///     The mesh it belongs to.
     fn write(&self, path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<()> {
-        let held = self.of(mesh)?;
-        guard(mesh.py(), || write_region(&path, &self.held, &held))
+        let shared = self.of(mesh)?;
+        guard(mesh.py(), || write_region(&path, &self.inner, &shared))
     }
 
     /// The region file's content as text.
@@ -198,38 +199,38 @@ impl Region {
     /// -------
     /// str
     fn to_json(&self, mesh: &Bound<'_, PyAny>) -> PyResult<String> {
-        let held = self.of(mesh)?;
-        guard(mesh.py(), || Ok(RegionFile::new(&self.held, &held).to_json().to_string()))
+        let shared = self.of(mesh)?;
+        guard(mesh.py(), || Ok(RegionFile::new(&self.inner, &shared).to_json().to_string()))
     }
 
     /// (n,) float64 array: weight of each vertex, a read-only view.
     #[getter]
     fn weights<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |region| region.held.weights())
+        arrays_out::vector(slf, |region| region.inner.weights())
     }
 
     /// (v,) uint32 array: ids of the vertices that count, ascending.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.vertices())
+        arrays_out::owned(py, self.inner.vertices())
     }
 
     /// (n,) bool array: whether each vertex counts.
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        lend::owned(py, self.held.mask())
+        arrays_out::owned(py, self.inner.mask())
     }
 
     /// int: vertices of the mesh, inside or not.
     #[getter]
     fn n_vertices(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 
     /// bool: whether no vertex counts.
     #[getter]
     fn is_empty(&self) -> bool {
-        self.held.is_empty()
+        self.inner.is_empty()
     }
 
     /// Intersection over union with the true region, in vertices or in areas.
@@ -248,27 +249,27 @@ impl Region {
     #[pyo3(signature = (truth, areas=None))]
     fn iou(&self, truth: &Bound<'_, Self>, areas: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
         let py = truth.py();
-        let truth = &truth.get().held;
+        let truth = &truth.get().inner;
         match areas {
-            None => guard(py, || Ok(metrics::iou(&self.held, truth)?)),
+            None => guard(py, || Ok(metrics::iou(&self.inner, truth)?)),
             Some(areas) => {
-                let areas = arrays::floats(areas, "areas", &[Axis::Any("n")])?.0;
-                guard(py, || Ok(metrics::area_iou(&self.held, truth, &areas)?))
+                let areas = arrays_in::floats(areas, "areas", &[Axis::Any("n")])?.0;
+                guard(py, || Ok(metrics::area_iou(&self.inner, truth, &areas)?))
             }
         }
     }
 
     fn __len__(&self) -> usize {
-        self.held.n_vertices()
+        self.inner.n_vertices()
     }
 
     fn __repr__(&self) -> String {
-        let (inside, n) = (self.held.vertices().len(), self.held.n_vertices());
+        let (inside, n) = (self.inner.vertices().len(), self.inner.n_vertices());
         format!("Region({inside} of {n} vertices)")
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| *other.get().held == *self.held)
+        other.cast::<Self>().is_ok_and(|other| *other.get().inner == *self.inner)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
@@ -287,13 +288,13 @@ impl Region {
 
 impl Region {
     /// The mesh, if it may be the one of this region.
-    fn of(&self, mesh: &Bound<'_, PyAny>) -> PyResult<Held<semfm::Mesh>> {
-        let held = from_any(mesh, "mesh")?;
-        if held.n_vertices() == self.held.n_vertices() {
-            return Ok(held);
+    fn of(&self, mesh: &Bound<'_, PyAny>) -> PyResult<Shared<semfm::Mesh>> {
+        let shared = from_any(mesh, "mesh")?;
+        if shared.n_vertices() == self.inner.n_vertices() {
+            return Ok(shared);
         }
-        let expected = format!("a mesh of {} vertices, as the region's", self.held.n_vertices());
-        Err(errors::invalid(mesh.py(), "mesh", &expected, &held.n_vertices().to_string()))
+        let expected = format!("a mesh of {} vertices, as the region's", self.inner.n_vertices());
+        Err(errors::invalid(mesh.py(), "mesh", &expected, &shared.n_vertices().to_string()))
     }
 }
 
@@ -301,19 +302,19 @@ fn guarded(
     py: Python<'_>,
     make: impl FnOnce() -> semfm::Result<semfm::Region>,
 ) -> PyResult<Region> {
-    Ok(Region { held: Held::new(guard(py, make)?) })
+    Ok(Region { inner: Shared::new(guard(py, make)?) })
 }
 
 /// A region, or the file of one, on `mesh`.
 pub fn region_of(
     value: &Bound<'_, PyAny>,
-    mesh: &Held<semfm::Mesh>,
-) -> PyResult<Held<semfm::Region>> {
+    mesh: &Shared<semfm::Mesh>,
+) -> PyResult<Shared<semfm::Region>> {
     if let Ok(region) = value.cast::<Region>() {
-        return Ok(region.get().held.clone());
+        return Ok(region.get().inner.clone());
     }
     let wanted = "a Region or a path (for ids, masks and weights see Region's constructors)";
     let path: PathBuf = value.extract().map_err(|_| errors::wrong_type("region", wanted, value))?;
     let region = guard(value.py(), || read_region(&path, mesh))?;
-    Ok(Held::new(region))
+    Ok(Shared::new(region))
 }

@@ -6,8 +6,8 @@ use semfm::{Method, PipelineSettings, fmap};
 use serde_json::Value;
 
 use crate::anchors::MOST;
+use crate::interruptible::guard;
 use crate::shape::cache_of;
-use crate::work::guard;
 use crate::{errors, json};
 
 /// Everything that can be set about a transfer: a method's own constants, and what differs.
@@ -134,11 +134,12 @@ fn merge(py: Python<'_>, value: &mut Value, changes: Value, place: &str) -> PyRe
     Ok(())
 }
 
-/// The options that doors to a transfer have in common.
+/// The options that the functions around a transfer have in common.
 pub struct Options<'a, 'py> {
     pub method: Option<&'a str>,
     pub rule: Option<&'a str>,
     pub seed: Option<u64>,
+    pub second_opinion: Option<bool>,
     pub settings: Option<&'a Bound<'py, TransferSettings>>,
     pub k: Option<usize>,
     pub working_vertices: Option<usize>,
@@ -146,7 +147,7 @@ pub struct Options<'a, 'py> {
 }
 
 impl Options<'_, '_> {
-    /// The settings of the whole road, put together as the shell does.
+    /// The settings of the whole pipeline, put together as the shell does.
     pub fn pipeline(&self, py: Python<'_>) -> PyResult<PipelineSettings> {
         let given = self.settings.map(|settings| settings.get().settings.clone());
         if given.is_some() && (self.method.is_some() || self.rule.is_some()) {
@@ -161,6 +162,9 @@ impl Options<'_, '_> {
         let mut settings = PipelineSettings::of(method);
         if let Some(given) = given {
             settings.transfer = given;
+        }
+        if let Some(wanted) = self.second_opinion {
+            settings.transfer.second_opinion = wanted;
         }
         if let Some(rule) = self.rule {
             settings.transfer.rule = guard(py, || Ok(rule.parse()?))?;

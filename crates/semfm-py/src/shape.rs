@@ -1,6 +1,7 @@
 //! `Shape`: a mesh made ready for maps.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -8,13 +9,13 @@ use semfm::geom::CleanSettings;
 use semfm::geom::laplacian::BridgeSettings;
 use semfm::geom::{self, ShapeCache, ShapeSettings};
 
-use crate::arrays::{self, Axis};
+use crate::arrays_in::{self, Axis};
 use crate::eigenbasis::{Eigenbasis, check_size};
-use crate::held::Held;
+use crate::interruptible::{guard, run};
 use crate::laplacian::{Laplacian, kind_of};
 use crate::mesh::{Mesh, from_any};
-use crate::work::{guard, run};
-use crate::{errors, json, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// A mesh made ready for maps: cleaned, simplified, with its Laplacian and eigenbasis.
 ///
@@ -52,7 +53,7 @@ use crate::{errors, json, lend};
 /// (800, 20)
 #[pyclass(frozen, module = "semfm")]
 pub struct Shape {
-    pub held: Held<geom::Shape>,
+    pub inner: Arc<geom::Shape>,
 }
 
 #[pymethods]
@@ -76,7 +77,7 @@ impl Shape {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = mesh.py();
-        let held = from_any(mesh, "mesh")?;
+        let shared = from_any(mesh, "mesh")?;
         let cache = cache_of(cache)?;
         let settings = ShapeSettings {
             k,
@@ -87,62 +88,62 @@ impl Shape {
             bridges: bridges.then(BridgeSettings::default),
             eigen: geom::eigensolver::EigenSettings { tolerance, ..Default::default() },
         };
-        check_shape_size(py, held.n_vertices(), &settings)?;
+        check_shape_size(py, shared.n_vertices(), &settings)?;
         let made = run(py, progress, move |task| {
-            Ok(cache.shape((*held).clone(), &settings, task)?.shape)
+            Ok(cache.shape((*shared).clone(), &settings, task)?.shape)
         })?;
-        Ok(Self { held: Held::new(made) })
+        Ok(Self { inner: Arc::new(made) })
     }
 
     /// Mesh: the mesh as given.
     #[getter]
     fn original(&self) -> Mesh {
-        Mesh { held: self.held.part(geom::Shape::original) }
+        Mesh { inner: Shared::part_of(&self.inner, geom::Shape::original) }
     }
 
     /// Mesh: the mesh that maps are computed on, in the units of the original.
     #[getter]
     fn working(&self) -> Mesh {
-        Mesh { held: self.held.part(geom::Shape::mesh) }
+        Mesh { inner: Shared::part_of(&self.inner, geom::Shape::mesh) }
     }
 
     /// (n,) uint32 array: the working vertex that stands for each original one, a read-only view.
     #[getter]
     fn working_of_original<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |shape| shape.held.working().of_original.as_slice())
+        arrays_out::vector(slf, |shape| shape.inner.working().of_original.as_slice())
     }
 
     /// (n_working,) uint32 array: the original vertex that each working one is, a read-only view.
     #[getter]
     fn original_of_working<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |shape| shape.held.working().to_original.as_slice())
+        arrays_out::vector(slf, |shape| shape.inner.working().to_original.as_slice())
     }
 
     /// Laplacian: that of the working mesh at area 1, bridges included.
     #[getter]
     fn laplacian(&self) -> Laplacian {
-        Laplacian { held: self.held.part(geom::Shape::laplacian) }
+        Laplacian { inner: Shared::part_of(&self.inner, geom::Shape::laplacian) }
     }
 
     /// Eigenbasis: that of the working mesh at area 1 (n_working × k).
     #[getter]
     fn basis(&self) -> Eigenbasis {
-        Eigenbasis { held: self.held.part(geom::Shape::basis) }
+        Eigenbasis { inner: Shared::part_of(&self.inner, geom::Shape::basis) }
     }
 
     /// float: √area of the working mesh, the length that becomes 1.
     #[getter]
     fn unit(&self) -> f64 {
-        self.held.unit()
+        self.inner.unit()
     }
 
     /// dict: what cleaning, simplification and the solver did, with milliseconds by stage.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        json::to_python(py, self.held.report())
+        json::to_python(py, self.inner.report())
     }
 
-    /// Values on the working vertices, carried onto the original's.
+    /// Values on the working vertices, extended to the original's.
     ///
     /// Parameters
     /// ----------
@@ -154,9 +155,9 @@ impl Shape {
     ///     Exact where a vertex was kept, linear on the nearest working triangle elsewhere.
     fn onto_original<'py>(&self, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = values.py();
-        let n = Axis::Is(self.held.mesh().n_vertices());
-        let values = arrays::floats(values, "values", &[n])?.0;
-        Ok(lend::owned(py, guard(py, || Ok(self.held.onto_original(&values)))?))
+        let n = Axis::Is(self.inner.mesh().n_vertices());
+        let values = arrays_in::floats(values, "values", &[n])?.0;
+        Ok(arrays_out::owned(py, guard(py, || Ok(self.inner.onto_original(&values)))?))
     }
 
     /// Values on the original's vertices, read off at the working ones.
@@ -170,9 +171,9 @@ impl Shape {
     /// (n_working,) float64 array
     fn onto_working<'py>(&self, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = values.py();
-        let n = Axis::Is(self.held.original().n_vertices());
-        let values = arrays::floats(values, "values", &[n])?.0;
-        Ok(lend::owned(py, guard(py, || Ok(self.held.onto_working(&values)))?))
+        let n = Axis::Is(self.inner.original().n_vertices());
+        let values = arrays_in::floats(values, "values", &[n])?.0;
+        Ok(arrays_out::owned(py, guard(py, || Ok(self.inner.onto_working(&values)))?))
     }
 
     /// One implicit step of heat diffusion, ``(M + t L) u = M f``, on the working vertices.
@@ -188,16 +189,16 @@ impl Shape {
     /// (n_working,) float64 array
     fn smooth<'py>(&self, function: &Bound<'py, PyAny>, t: f64) -> PyResult<Bound<'py, PyAny>> {
         let py = function.py();
-        let n = Axis::Is(self.held.mesh().n_vertices());
-        let function = arrays::floats(function, "function", &[n])?.0;
-        let shape = self.held.clone();
+        let n = Axis::Is(self.inner.mesh().n_vertices());
+        let function = arrays_in::floats(function, "function", &[n])?.0;
+        let shape = self.inner.clone();
         let smoothed = run(py, None, move |_| Ok(shape.smooth(&function, t)?))?;
-        Ok(lend::owned(py, smoothed))
+        Ok(arrays_out::owned(py, smoothed))
     }
 
     fn __repr__(&self) -> String {
-        let n = self.held.original().n_vertices();
-        let (working, k) = (self.held.mesh().n_vertices(), self.held.basis().k());
+        let n = self.inner.original().n_vertices();
+        let (working, k) = (self.inner.mesh().n_vertices(), self.inner.basis().k());
         format!("Shape({n} vertices, {working} working, {k} eigenpairs)")
     }
 
@@ -205,7 +206,7 @@ impl Shape {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (Mesh, Bound<'py, PyBytes>))> {
-        let bytes = guard(py, || Ok(self.held.to_bytes()?))?;
+        let bytes = guard(py, || Ok(self.inner.to_bytes()?))?;
         let restore = py.import("semfm._semfm")?.getattr("_restore_shape")?;
         Ok((restore, (self.original(), PyBytes::new(py, &bytes))))
     }
@@ -224,10 +225,10 @@ impl Shape {
 pub fn _restore_shape(mesh: &Bound<'_, Mesh>, bytes: &Bound<'_, PyBytes>) -> PyResult<Shape> {
     let py = mesh.py();
     let shape =
-        guard(py, || Ok(geom::Shape::from_bytes((*mesh.get().held).clone(), bytes.as_bytes())))?;
+        guard(py, || Ok(geom::Shape::from_bytes((*mesh.get().inner).clone(), bytes.as_bytes())))?;
     let damaged =
         || errors::invalid(py, "pickled shape", "bytes of this version of semfm", "others");
-    Ok(Shape { held: Held::new(shape.ok_or_else(damaged)?) })
+    Ok(Shape { inner: Arc::new(shape.ok_or_else(damaged)?) })
 }
 
 /// The cache that an argument means: nothing, the user's own, or a folder.

@@ -1,16 +1,18 @@
 //! `SurfaceIndex`: nearest points and first hits; samples of the surface; the mesh zoo.
 
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use semfm::geom::math::DVec3;
 use semfm::geom::sampling::{self, SurfaceSample};
 use semfm_geom::zoo;
 
-use crate::arrays::{self, within_memory};
-use crate::held::Held;
+use crate::arrays_in::{self, within_memory};
+use crate::interruptible::run;
 use crate::mesh::{Mesh, from_any};
-use crate::work::run;
-use crate::{errors, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors};
 
 /// A tree over the triangles of a mesh: built once, asked often.
 ///
@@ -29,18 +31,18 @@ use crate::{errors, lend};
 /// (3.0, [[0.5, 0.25, 0.25]])
 #[pyclass(frozen, module = "semfm")]
 pub struct SurfaceIndex {
-    mesh: Held<semfm::Mesh>,
-    index: Held<semfm::geom::SurfaceIndex>,
+    mesh: Shared<semfm::Mesh>,
+    index: Arc<semfm::geom::SurfaceIndex>,
 }
 
 #[pymethods]
 impl SurfaceIndex {
     #[new]
     fn new(mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let held = from_any(mesh, "mesh")?;
-        let of = held.clone();
+        let shared = from_any(mesh, "mesh")?;
+        let of = shared.clone();
         let index = run(mesh.py(), None, move |_| Ok(semfm::geom::SurfaceIndex::new(&of)?))?;
-        Ok(Self { mesh: held, index: Held::new(index) })
+        Ok(Self { mesh: shared, index: Arc::new(index) })
     }
 
     /// The point of the surface nearest to each query.
@@ -57,7 +59,7 @@ impl SurfaceIndex {
     /// barycentric : (q, 3) float64 array
     fn closest<'py>(&self, queries: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
         let py = queries.py();
-        let points = arrays::points(queries, "queries")?;
+        let points = arrays_in::points(queries, "queries")?;
         let index = self.index.clone();
         let asked = points.clone();
         let found = run(py, None, move |task| {
@@ -75,13 +77,13 @@ impl SurfaceIndex {
                 errors::invalid(py, "queries", "finite numbers", &format!("{} at {i}", points[i]))
             })?);
         }
-        let flat = |pick: fn(&semfm::geom::SurfacePoint) -> [f64; 3]| {
-            lend::owned_rows(py, hits.iter().flat_map(pick).collect(), 3)
-        };
-        let distances = lend::owned(py, hits.iter().map(|hit| hit.distance).collect());
-        let faces = lend::owned(py, hits.iter().map(|hit| hit.face).collect::<Vec<u32>>());
-        (flat(|hit| hit.point.to_array())?, distances, faces, flat(|hit| hit.barycentric)?)
-            .into_pyobject(py)
+        let positions = hits.iter().flat_map(|hit| hit.point.to_array()).collect();
+        let positions = arrays_out::owned_rows(py, positions, 3)?;
+        let barycentric = hits.iter().flat_map(|hit| hit.barycentric).collect();
+        let barycentric = arrays_out::owned_rows(py, barycentric, 3)?;
+        let distances = arrays_out::owned(py, hits.iter().map(|hit| hit.distance).collect());
+        let faces = arrays_out::owned(py, hits.iter().map(|hit| hit.face).collect::<Vec<u32>>());
+        (positions, distances, faces, barycentric).into_pyobject(py)
     }
 
     /// The first triangle that each ray meets.
@@ -104,9 +106,9 @@ impl SurfaceIndex {
         directions: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyTuple>> {
         let py = origins.py();
-        let origins = arrays::points(origins, "origins")?;
-        let rows = [arrays::Axis::Is(origins.len()), arrays::Axis::Is(3)];
-        let (directions, _) = arrays::floats(directions, "directions", &rows)?;
+        let origins = arrays_in::points(origins, "origins")?;
+        let rows = [arrays_in::Axis::Is(origins.len()), arrays_in::Axis::Is(3)];
+        let (directions, _) = arrays_in::floats(directions, "directions", &rows)?;
         let index = self.index.clone();
         let hits = run(py, None, move |_| {
             let (directions, _) = directions.as_chunks::<3>();
@@ -115,13 +117,13 @@ impl SurfaceIndex {
         })?;
         let t = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.t)).collect();
         let faces = hits.iter().map(|hit| hit.map_or(-1, |hit| hit.face as i32)).collect();
-        (lend::owned::<f64>(py, t), lend::owned::<i32>(py, faces)).into_pyobject(py)
+        (arrays_out::owned::<f64>(py, t), arrays_out::owned::<i32>(py, faces)).into_pyobject(py)
     }
 
     /// Mesh: the mesh that was indexed.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh { held: self.mesh.clone() }
+        Mesh { inner: self.mesh.clone() }
     }
 }
 
@@ -191,11 +193,12 @@ fn sample<'py>(
     within_memory(py, "n", n, 64)?;
     let mesh = from_any(mesh, "mesh")?;
     let samples = run(py, None, move |_| Ok(draw(&mesh)?))?;
-    let points = samples.iter().flat_map(|s| s.point.to_array()).collect();
-    let normals = samples.iter().flat_map(|s| s.normal.to_array()).collect();
+    let points: Vec<f64> = samples.iter().flat_map(|s| s.point.to_array()).collect();
+    let normals: Vec<f64> = samples.iter().flat_map(|s| s.normal.to_array()).collect();
     let faces: Vec<u32> = samples.iter().map(|s| s.face).collect();
-    let rows = |values: Vec<f64>| lend::owned_rows(py, values, 3);
-    (rows(points)?, rows(normals)?, lend::owned(py, faces)).into_pyobject(py)
+    let points = arrays_out::owned_rows(py, points, 3)?;
+    let normals = arrays_out::owned_rows(py, normals, 3)?;
+    (points, normals, arrays_out::owned(py, faces)).into_pyobject(py)
 }
 
 /// Ids of points, each the farthest from those before it, starting with point 0.
@@ -213,12 +216,12 @@ fn sample<'py>(
 pub fn farthest_points<'py>(points: &Bound<'py, PyAny>, n: usize) -> PyResult<Bound<'py, PyAny>> {
     let py = points.py();
     let (values, _) =
-        arrays::floats(points, "points", &[arrays::Axis::Any("m"), arrays::Axis::Is(3)])?;
+        arrays_in::floats(points, "points", &[arrays_in::Axis::Any("m"), arrays_in::Axis::Is(3)])?;
     let ids = run(py, None, move |_| {
         let points: Vec<DVec3> = values.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
         Ok(sampling::farthest_points(&points, n))
     })?;
-    Ok(lend::owned(py, ids))
+    Ok(arrays_out::owned(py, ids))
 }
 
 /// A sphere of radius 1, from a subdivided icosahedron.
@@ -237,7 +240,7 @@ pub fn icosphere(py: Python<'_>, subdivisions: usize) -> PyResult<Mesh> {
         return Err(errors::invalid(py, "subdivisions", "0 to 7", &subdivisions.to_string()));
     }
     let mesh = run(py, None, move |_| Ok(zoo::icosphere(subdivisions)))?;
-    Ok(Mesh { held: Held::new(mesh) })
+    Ok(Mesh { inner: Shared::new(mesh) })
 }
 
 /// A torus.
@@ -260,5 +263,5 @@ pub fn torus(py: Python<'_>, n_around: usize, n_across: usize) -> PyResult<Mesh>
         }
     }
     let mesh = run(py, None, move |_| Ok(zoo::torus(n_around, n_across)))?;
-    Ok(Mesh { held: Held::new(mesh) })
+    Ok(Mesh { inner: Shared::new(mesh) })
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use semfm::geom::MeshIdentity;
@@ -11,18 +12,18 @@ use semfm_synth::{
 };
 
 use crate::embeddings::Embeddings;
-use crate::held::Held;
+use crate::interruptible::{guard, run};
 use crate::mesh::Mesh;
 use crate::region::Region;
-use crate::work::{guard, run};
-use crate::{errors, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors};
 
 /// A procedural object with everything that is known about it: shape, parts, true grip.
 ///
 /// Made by `demo_object`.
 #[pyclass(frozen, module = "semfm")]
 pub struct DemoObject {
-    held: Held<SynthObject>,
+    inner: Arc<SynthObject>,
 }
 
 /// All names of parts, in one order for all objects.
@@ -36,37 +37,37 @@ impl DemoObject {
     /// Mesh: the surface, bounding-box diagonal 1, in a random upright-ish pose.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh { held: self.held.part(|object| &object.mesh) }
+        Mesh { inner: Shared::part_of(&self.inner, |object| &object.mesh) }
     }
 
     /// Region: the true grip.
     #[getter]
     fn region(&self) -> Region {
-        Region { held: Held::new(semfm::Region::from_mask(&self.held.region)) }
+        Region { inner: Shared::new(semfm::Region::from_mask(&self.inner.region)) }
     }
 
     /// (n,) uint8 array: part of each vertex, an index into `part_names`; a read-only view.
     #[getter]
     fn parts<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |object| object.held.parts.as_slice())
+        arrays_out::vector(slf, |object| object.inner.parts.as_slice())
     }
 
     /// list of str: names of the parts.
     #[getter]
     fn part_names(&self) -> Vec<&'static str> {
-        self.held.part_names.clone()
+        self.inner.part_names.clone()
     }
 
     /// str: hammer, pickaxe, mug …
     #[getter]
     fn kind(&self) -> &'static str {
-        self.held.kind
+        self.inner.kind
     }
 
     /// str: a short name, unique among objects.
     #[getter]
     fn name(&self) -> String {
-        self.held.name()
+        self.inner.name()
     }
 
     /// The parts as one-hot features, one column per part of this object.
@@ -75,7 +76,7 @@ impl DemoObject {
     /// -------
     /// (n, parts) float32 array
     fn part_features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        one_hot(py, &self.held, &self.held.part_names)
+        one_hot(py, &self.inner, &self.inner.part_names)
     }
 
     /// The parts as one-hot features, with the same columns for every object.
@@ -84,7 +85,7 @@ impl DemoObject {
     /// -------
     /// (n, 21) float32 array
     fn shared_features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        one_hot(py, &self.held, &PARTS)
+        one_hot(py, &self.inner, &PARTS)
     }
 
     /// Simulated patch embeddings of the default views.
@@ -107,7 +108,7 @@ impl DemoObject {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Embeddings> {
         let level: Level = guard(py, || level.parse().map_err(raised))?;
-        let object = self.held.clone();
+        let object = self.inner.clone();
         let file = run(py, progress, move |task| {
             let pictures = render_views(&object, task).map_err(raised)?;
             let side = pictures.first().map_or(0, |view| view.camera.width());
@@ -118,7 +119,7 @@ impl DemoObject {
                 views,
             })
         })?;
-        Ok(Embeddings { held: Held::new(file) })
+        Ok(Embeddings { inner: Arc::new(file) })
     }
 
     /// Writes ``NAME.obj``, ``NAME.json`` (the truth) and ``NAME.emb.mcap`` into a folder.
@@ -144,22 +145,18 @@ impl DemoObject {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<BTreeMap<&'static str, String>> {
         let level: Level = guard(py, || level.parse().map_err(raised))?;
-        let object = self.held.clone();
+        let object = self.inner.clone();
         let files = run(py, progress, move |task| {
             write_object(&folder, &object, level, task).map_err(raised)
         })?;
-        let name = |path: &PathBuf| path.display().to_string();
-        Ok([
-            ("mesh", name(&files.mesh)),
-            ("truth", name(&files.truth)),
-            ("embeddings", name(&files.embeddings)),
-        ]
-        .into())
+        let written =
+            [("mesh", files.mesh), ("truth", files.truth), ("embeddings", files.embeddings)];
+        Ok(written.map(|(name, path)| (name, path.display().to_string())).into())
     }
 
     fn __repr__(&self) -> String {
-        let n = self.held.mesh.n_vertices();
-        format!("DemoObject({:?}, a {}, {n} vertices)", self.held.name(), self.held.kind)
+        let n = self.inner.mesh.n_vertices();
+        format!("DemoObject({:?}, a {}, {n} vertices)", self.inner.name(), self.inner.kind)
     }
 }
 
@@ -175,7 +172,7 @@ fn one_hot<'py>(
         let column = columns.iter().position(|&column| column == name).unwrap_or(rest);
         features[vertex * columns.len() + column] = 1.0;
     }
-    lend::owned_rows(py, features, columns.len())
+    arrays_out::owned_rows(py, features, columns.len())
 }
 
 fn about(object: &SynthObject, level: Level, side: u32) -> EmbeddingsMetadata {
@@ -252,7 +249,7 @@ pub fn demo_object(
     let settings = ObjectSettings { n_vertices, holes, floaters, seed };
     let object =
         run(py, None, move |_| make_object(category, instance, &settings).map_err(raised))?;
-    Ok(DemoObject { held: Held::new(object) })
+    Ok(DemoObject { inner: Arc::new(object) })
 }
 
 fn raised(error: semfm_synth::Error) -> semfm::Error {

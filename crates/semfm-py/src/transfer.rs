@@ -1,6 +1,7 @@
-//! `Transfer`: a carried region and everything known about it.
+//! `Transfer`: a transferred region and everything known about it.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -9,23 +10,23 @@ use semfm::fmap;
 use semfm_show::write_transfer;
 use serde_json::{Value, json};
 
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::point_map::PointMap;
 use crate::prepared::PreparedObject;
 use crate::region::Region;
 use crate::settings::TransferSettings;
-use crate::work::run;
-use crate::{errors, json as dicts, lend};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json as dicts};
 
-/// A carried region and everything known about it.
+/// A transferred region and everything known about it.
 ///
 /// Vertices are those of the meshes as given. Made by `transfer` and `Matching.transfer`.
 #[pyclass(frozen, module = "semfm")]
 pub struct Transfer {
-    pub held: Held<semfm::Transfer>,
+    pub inner: Arc<semfm::Transfer>,
     pub source: PreparedObject,
     pub target: PreparedObject,
-    pub region: Held<semfm::Region>,
+    pub region: Shared<semfm::Region>,
 }
 
 #[pymethods]
@@ -33,61 +34,57 @@ impl Transfer {
     /// Region: the region on the target.
     #[getter]
     fn region(&self) -> Region {
-        Region { held: self.held.part(|transfer| &transfer.region) }
+        Region { inner: Shared::part_of(&self.inner, |transfer| &transfer.region) }
     }
 
     /// (n_target,) float64 array: weight of each target vertex, a read-only view.
     #[getter]
     fn weights<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        lend::vector(slf, |transfer| transfer.held.weights())
+        arrays_out::vector(slf, |transfer| transfer.inner.weights())
     }
 
-    /// float: agreement with an independent opinion, in [0, 1].
+    /// float: the probability that the IoU with the true region is at least one half, in [0, 1].
     #[getter]
     fn confidence(&self) -> f64 {
-        self.held.confidence
+        self.inner.confidence
     }
 
     /// str: ``"accept"``, ``"check"`` or ``"refuse"``.
     #[getter]
     fn verdict(&self) -> String {
-        self.held.verdict.to_string()
+        self.inner.verdict.to_string()
     }
 
     /// list of Hypothesis: where the region may belong, by falling probability.
     #[getter]
     fn hypotheses(&self) -> Vec<Hypothesis> {
-        let hypothesis = |h: &fmap::Hypothesis| Hypothesis {
-            region: Held::new(h.region.clone()),
-            probability: h.probability,
-        };
-        self.held.hypotheses.iter().map(hypothesis).collect()
+        self.inner.hypotheses.iter().map(Hypothesis::of).collect()
     }
 
     /// PointMap: one source vertex for each target vertex.
     #[getter]
     fn point_map(&self) -> PointMap {
-        let n_source = self.source.held.object.shape().original().n_vertices();
-        PointMap { held: self.held.part(|transfer| &transfer.point_map), n_source }
+        let n_source = self.source.inner.object.shape().original().n_vertices();
+        PointMap { inner: Shared::part_of(&self.inner, |transfer| &transfer.point_map), n_source }
     }
 
     /// Region, optional: the region under the other rule, where the method computes both (``semfm``).
     #[getter]
     fn other_rule(&self) -> Option<Region> {
-        let region = self.held.other_rule.as_ref()?;
-        Some(Region { held: Held::new(region.clone()) })
+        let region = self.inner.other_rule.as_ref()?;
+        Some(Region { inner: Shared::new(region.clone()) })
     }
 
     /// dict: how the answer came about: settings, stages, anchors, fit, quality of the map.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        dicts::to_python(py, &self.held.report)
+        dicts::to_python(py, &self.inner.report)
     }
 
     /// TransferSettings: the settings it was made with, map sizes clipped to the bases.
     #[getter]
     fn settings(&self) -> TransferSettings {
-        TransferSettings { settings: self.held.report.settings.clone() }
+        TransferSettings { settings: self.inner.report.settings.clone() }
     }
 
     /// PreparedObject: the demonstrated object.
@@ -105,7 +102,7 @@ impl Transfer {
     /// Region: the demonstrated region.
     #[getter]
     fn source_region(&self) -> Region {
-        Region { held: self.region.clone() }
+        Region { inner: self.region.clone() }
     }
 
     /// Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
@@ -137,10 +134,10 @@ impl Transfer {
         if let Some(Value::Object(about)) = about {
             provenance.more = about;
         }
-        let (held, region) = (self.held.clone(), self.region.clone());
-        let (source, target) = (self.source.held.clone(), self.target.held.clone());
+        let (shared, region) = (self.inner.clone(), self.region.clone());
+        let (source, target) = (self.source.inner.clone(), self.target.inner.clone());
         let files = run(py, progress, move |task| {
-            let (source, target, transfer) = (&*source, &*target, &*held);
+            let (source, target, transfer) = (&*source, &*target, &*shared);
             let (region, provenance) = (&*region, &provenance);
             let result = TransferResult { source, target, region, transfer, provenance };
             Ok(write_transfer(&folder, &result, task)?)
@@ -149,8 +146,8 @@ impl Transfer {
     }
 
     fn __repr__(&self) -> String {
-        let (n, of) = (self.held.region.vertices().len(), self.held.region.n_vertices());
-        let (verdict, confidence) = (self.verdict(), self.held.confidence);
+        let (n, of) = (self.inner.region.vertices().len(), self.inner.region.n_vertices());
+        let (verdict, confidence) = (self.verdict(), self.inner.confidence);
         format!("Transfer({verdict}, confidence {confidence:.2}, {n} of {of} vertices)")
     }
 
@@ -160,7 +157,7 @@ impl Transfer {
     ) -> PyResult<(Bound<'py, PyAny>, (PreparedObject, PreparedObject, Region, Bound<'py, PyBytes>))>
     {
         let restore = py.import("semfm._semfm")?.getattr("_restore_transfer")?;
-        let transfer = &*self.held;
+        let transfer = &*self.inner;
         let parts = json!({
             "region": transfer.region,
             "confidence": transfer.confidence,
@@ -209,18 +206,25 @@ pub fn _restore_transfer(
         errors::invalid(source.py(), "pickled transfer", expected, &error.to_string())
     };
     Ok(Transfer {
-        held: Held::new(read().map_err(damaged)?),
+        inner: Arc::new(read().map_err(damaged)?),
         source: source.get().clone(),
         target: target.get().clone(),
-        region: region.get().held.clone(),
+        region: region.get().inner.clone(),
     })
 }
 
 /// One place where the region may belong.
 #[pyclass(frozen, module = "semfm")]
 pub struct Hypothesis {
-    region: Held<semfm::Region>,
+    region: Shared<semfm::Region>,
     probability: f64,
+}
+
+impl Hypothesis {
+    fn of(hypothesis: &fmap::Hypothesis) -> Self {
+        let fmap::Hypothesis { region, probability, .. } = hypothesis;
+        Self { region: Shared::new(region.clone()), probability: *probability }
+    }
 }
 
 #[pymethods]
@@ -228,7 +232,7 @@ impl Hypothesis {
     /// Region: the region there.
     #[getter]
     fn region(&self) -> Region {
-        Region { held: self.region.clone() }
+        Region { inner: self.region.clone() }
     }
 
     /// float: share of the votes that fell there, among the hypotheses returned.

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use semfm::views::{self, RenderSettings, RigSettings, SurfaceColor};
 
-use crate::arrays::{self, Axis};
-use crate::camera::{self, Camera, rows_and_columns};
-use crate::held::Held;
+use crate::arrays_in::{self, Axis};
+use crate::interruptible::run;
 use crate::mesh::{MeshFile, from_any};
-use crate::work::run;
-use crate::{errors, lend};
+use crate::pinhole::{self, Pinhole, rows_and_columns};
+use crate::shared::Shared;
+use crate::{arrays_out, errors};
 
 /// One rendered view of an object.
 ///
@@ -24,30 +24,30 @@ pub struct View {
 
 #[pymethods]
 impl View {
-    /// Camera: the one the picture was taken with.
+    /// Pinhole: the one the picture was taken with.
     #[getter]
-    fn camera(&self) -> Camera {
-        Camera { camera: self.view.camera }
+    fn camera(&self) -> Pinhole {
+        Pinhole { camera: self.view.camera }
     }
 
     /// (height, width, 3) uint8 array: sRGB, a read-only view.
     #[getter]
     fn rgb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.view.rgb.as_slice())?;
+        let flat = arrays_out::vector(slf, |view| view.view.rgb.as_slice())?;
         flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[3])?,))
     }
 
     /// (height, width) float32 array: depth along the camera's axis in mesh units, infinite on the background, a read-only view.
     #[getter]
     fn depth<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.view.depth.as_slice())?;
+        let flat = arrays_out::vector(slf, |view| view.view.depth.as_slice())?;
         flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[])?,))
     }
 
     /// (height, width) int32 array: triangle of each pixel, −1 on the background, a read-only view.
     #[getter]
     fn triangles<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let flat = lend::vector(slf, |view| view.view.triangles.as_slice())?;
+        let flat = arrays_out::vector(slf, |view| view.view.triangles.as_slice())?;
         flat.call_method1("reshape", (rows_and_columns(slf.py(), &slf.get().view.camera, &[])?,))
     }
 
@@ -59,7 +59,7 @@ impl View {
         slf: &Bound<'py, Self>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (Camera, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+        (Pinhole, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
     )> {
         let restore = slf.py().import("semfm._semfm")?.getattr("_restore_view")?;
         let parts = (slf.get().camera(), Self::rgb(slf)?, Self::depth(slf)?, Self::triangles(slf)?);
@@ -78,7 +78,7 @@ impl View {
 /// A view out of a pickle.
 #[pyfunction]
 pub fn _restore_view(
-    camera: &Bound<'_, Camera>,
+    camera: &Bound<'_, Pinhole>,
     rgb: &Bound<'_, PyAny>,
     depth: &Bound<'_, PyAny>,
     triangles: &Bound<'_, PyAny>,
@@ -86,11 +86,11 @@ pub fn _restore_view(
     let camera = camera.get().camera;
     let (height, width) = (Axis::Is(camera.height() as usize), Axis::Is(camera.width() as usize));
     let shifted = triangles.call_method1("__add__", (1,))?; // ids have no −1
-    let triangles = arrays::ids(&shifted, "triangles", &[height, width])?.0;
+    let triangles = arrays_in::ids(&shifted, "triangles", &[height, width])?.0;
     let view = views::View {
         camera,
-        rgb: arrays::bytes(rgb, "rgb", &[height, width, Axis::Is(3)])?.0,
-        depth: arrays::any32(depth, "depth", &[height, width])?.0, // infinite on the background
+        rgb: arrays_in::bytes(rgb, "rgb", &[height, width, Axis::Is(3)])?.0,
+        depth: arrays_in::any32(depth, "depth", &[height, width])?.0, // infinite on the background
         triangles: triangles.into_iter().map(|id| id as i32 - 1).collect(),
     };
     Ok(View { view: Arc::new(view) })
@@ -101,7 +101,7 @@ enum Colors {
     Grey,
     Normals,
     Vertices(Vec<[f32; 3]>),
-    File(Held<semfm::geom::io::MeshFile>),
+    File(Arc<semfm::geom::io::MeshFile>),
 }
 
 /// One picture per camera, with depth and triangle of every pixel.
@@ -110,7 +110,7 @@ enum Colors {
 /// ----------
 /// mesh : mesh_like or MeshFile
 ///     A `MeshFile` is drawn in its own colours.
-/// cameras : list of Camera, optional
+/// cameras : list of Pinhole, optional
 ///     As `rig` makes them where none are given.
 /// colors : (n, 3) array_like, optional
 ///     sRGB of each vertex, 0 to 1.
@@ -151,17 +151,20 @@ pub fn render(
     normals: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<View>> {
-    let (held, mut paint) = match mesh.cast::<MeshFile>() {
+    let (shared, mut paint) = match mesh.cast::<MeshFile>() {
         Ok(file) => {
-            let file = file.get().held.clone();
+            let file = file.get().inner.clone();
             let colored = !file.appearance.is_plain();
-            (file.part(|file| &file.mesh), if colored { Colors::File(file) } else { Colors::Grey })
+            (
+                Shared::part_of(&file, |file| &file.mesh),
+                if colored { Colors::File(file) } else { Colors::Grey },
+            )
         }
         Err(_) => (from_any(mesh, "mesh")?, Colors::Grey),
     };
     if let Some(colors) = colors {
-        let rows = [Axis::Is(held.n_vertices()), Axis::Is(3)];
-        let values = arrays::floats32(colors, "colors", &rows)?.0;
+        let rows = [Axis::Is(shared.n_vertices()), Axis::Is(3)];
+        let values = arrays_in::floats32(colors, "colors", &rows)?.0;
         paint = Colors::Vertices(values.as_chunks::<3>().0.to_vec());
     }
     if normals && colors.is_some() {
@@ -172,22 +175,22 @@ pub fn render(
     }
     let mut settings = RenderSettings { supersampling, occlusion, edges, ..Default::default() };
     if let Some(background) = background {
-        settings.background = arrays::point(background, "background")?.as_vec3().to_array();
+        settings.background = arrays_in::point(background, "background")?.as_vec3().to_array();
     }
-    let cameras = cameras.map(camera::list).transpose()?;
+    let cameras = cameras.map(pinhole::list).transpose()?;
     let rendered = run(mesh.py(), progress, move |task| {
         let cameras = match cameras {
             Some(cameras) => cameras,
-            None => views::rig(&held, &RigSettings::default())?,
+            None => views::rig(&shared, &RigSettings::default())?,
         };
         let draw =
-            |paint: &SurfaceColor<'_>| views::render(&held, paint, &cameras, &settings, task);
+            |paint: &SurfaceColor<'_>| views::render(&shared, paint, &cameras, &settings, task);
         Ok(match &paint {
             Colors::Grey => draw(&SurfaceColor::default()),
             Colors::Normals => draw(&SurfaceColor::Normals),
             Colors::Vertices(colors) => draw(&SurfaceColor::Vertices(colors)),
             Colors::File(file) => draw(&SurfaceColor::Surface(&|face, weights| {
-                let [r, g, b, _] = file.appearance.color_at(face, held.faces()[face], weights);
+                let [r, g, b, _] = file.appearance.color_at(face, shared.faces()[face], weights);
                 [r, g, b].map(|c| f32::from(c) / 255.0)
             })),
         }?)

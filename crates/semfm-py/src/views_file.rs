@@ -5,15 +5,15 @@ use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use semfm::geom::Pinhole;
+use semfm::geom;
 use semfm::views;
 use semfm::views::mcap::{self, ViewsMetadata, find_mesh, write_views};
 
-use crate::camera::Camera;
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::mesh::{Mesh, from_any};
+use crate::pinhole::Pinhole;
+use crate::shared::Shared;
 use crate::view::View;
-use crate::work::run;
 use crate::{errors, json};
 
 /// The rendered views of an object, as a ``NAME.views.mcap`` holds them: for `semfm-embed`, and for
@@ -50,16 +50,16 @@ pub struct ViewsFile {
     pub metadata: ViewsMetadata,
     views: Vec<Arc<views::View>>,
     /// The mesh in the file, read when first asked for; `None` where the file has none.
-    mesh: OnceLock<Option<Held<semfm::Mesh>>>,
+    mesh: OnceLock<Option<Shared<semfm::Mesh>>>,
 }
 
 impl ViewsFile {
     /// The cameras, one for each view.
-    pub fn camera_of_each(&self) -> Vec<Pinhole> {
+    pub fn camera_of_each(&self) -> Vec<geom::Pinhole> {
         self.views.iter().map(|view| view.camera).collect()
     }
 
-    fn shared_mesh(&self, py: Python<'_>) -> PyResult<Option<Held<semfm::Mesh>>> {
+    fn shared_mesh(&self, py: Python<'_>) -> PyResult<Option<Shared<semfm::Mesh>>> {
         if let Some(mesh) = self.mesh.get() {
             return Ok(mesh.clone());
         }
@@ -68,7 +68,7 @@ impl ViewsFile {
         let found = run(py, None, move |_| {
             let Some((mesh, _)) = find_mesh(&path)? else { return Ok(None) };
             metadata.check_mesh(&mesh, &path)?;
-            Ok(Some(Held::new(mesh)))
+            Ok(Some(Shared::new(mesh)))
         })?;
         Ok(self.mesh.get_or_init(|| found).clone())
     }
@@ -137,10 +137,10 @@ impl ViewsFile {
         self.views.iter().map(|view| View { view: Arc::clone(view) }).collect()
     }
 
-    /// list of Camera: one per view.
+    /// list of Pinhole: one per view.
     #[getter]
-    fn cameras(&self) -> Vec<Camera> {
-        self.camera_of_each().into_iter().map(|camera| Camera { camera }).collect()
+    fn cameras(&self) -> Vec<Pinhole> {
+        self.camera_of_each().into_iter().map(|camera| Pinhole { camera }).collect()
     }
 
     /// int: number of views.
@@ -152,7 +152,7 @@ impl ViewsFile {
     /// Mesh, optional: the mesh that the views show, vertex by vertex as it was rendered; None where the file has none.
     #[getter]
     fn mesh(&self, py: Python<'_>) -> PyResult<Option<Mesh>> {
-        Ok(self.shared_mesh(py)?.map(|held| Mesh { held }))
+        Ok(self.shared_mesh(py)?.map(|shared| Mesh { inner: shared }))
     }
 
     /// str: hash of the mesh that the views show.

@@ -8,7 +8,7 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._semfm import Camera, Region, View
+from .._semfm import Pinhole, Region, View
 from ._parts import Part, color_bytes, library, parts_of
 
 
@@ -24,7 +24,7 @@ def to_rerun(
 
     Parameters
     ----------
-    thing : Mesh, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, Camera, View or list
+    thing : Mesh, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, Pinhole, View or list
         A list of cameras or views is numbered.
     path : str, optional
         Entity to log to, below which a transfer has ``source`` and ``target``. Named after the kind
@@ -49,7 +49,7 @@ def to_rerun(
             for number, one in enumerate(thing)
         )
         return [entity for entities in each for entity in entities]
-    if isinstance(thing, (Camera, View)):
+    if isinstance(thing, (Pinhole, View)):
         return view(rerun, thing, path or "view", recording)
     parts = parts_of(thing, region, colors)
     entities = []
@@ -90,10 +90,10 @@ def vertex_normals(
     return normals / np.maximum(lengths, np.finfo(np.float64).tiny)
 
 
-def view(rerun: Any, thing: Union[Camera, View], path: str, recording: Optional[Any]) -> list[str]:
+def view(rerun: Any, thing: Union[Pinhole, View], path: str, recording: Optional[Any]) -> list[str]:
     """A camera where it stands, with the picture that it took."""
     camera = thing.camera if isinstance(thing, View) else thing
-    object_from_camera = np.linalg.inv(camera.camera_from_object)
+    object_from_camera = np.linalg.inv(camera.camera_from_world)
     posed = rerun.Transform3D(
         translation=object_from_camera[:3, 3], mat3x3=object_from_camera[:3, :3]
     )

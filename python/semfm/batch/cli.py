@@ -76,7 +76,7 @@ def _settings(path: str) -> TransferSettings:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m semfm.batch",
-        description="Carry one demonstrated region to every object of a manifest. "
+        description="Transfer one demonstrated region to every object of a manifest. "
         "The same command again goes on where the last one stopped.",
     )
     add = parser.add_argument
@@ -103,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--threads", type=int, metavar="N", help="threads of each worker")
     add("--timeout", dest="timeout_s", type=float, metavar="S", help="seconds for one object")
     add("--attempts", type=int, default=2, help="tries of an object whose worker dies")
-    files = parser.add_argument_group("files and talk")
+    files = parser.add_argument_group("files and messages")
     add = files.add_argument
     cache = files.add_mutually_exclusive_group()
     cache.add_argument(

@@ -1,6 +1,6 @@
 """The journal: the folder of answers, what is in it already, and the records not yet written.
 
-``batch.json`` says what was carried and how; ``records/`` holds the shards. A name stands in one
+``batch.json`` says what was transferred and how; ``records/`` holds the shards. A name stands in one
 shard at most, so that the shards together are one table.
 """
 

@@ -1,4 +1,4 @@
-"""The door: a demonstration, a manifest, and a folder that fills with answers."""
+"""`transfer`: one demonstration, transferred to every object of a manifest, into a folder of answers."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def transfer(
     retry_failed: bool = False,
     progress: Union[None, bool, Callable[[str, int, int], object]] = None,
 ) -> Summary:
-    """Carries one region to every object of a manifest.
+    """Transfers one region to every object of a manifest.
 
     A run that was stopped is taken up again by the same call: rows that have an answer are skipped,
     as long as their files are as they were. An object that fails is recorded and not fatal. The
@@ -125,7 +125,7 @@ def transfer(
     address : str, optional
         Of a Ray cluster.
     attempts : int, default 2
-        How often an object may be tried whose worker dies (of hunger for memory, mostly).
+        How often an object may be tried whose worker dies (mostly for want of memory).
     timeout_s : float, optional
         Seconds allowed for one object.
     shard_size : int, default 256

@@ -77,13 +77,13 @@ def _window(
     # A list hides the reference: Ray Data would otherwise send the object along with every task.
     box = [held]
 
-    def carry(batch: dict[str, Any]) -> dict[str, Any]:
+    def transfer(batch: dict[str, Any]) -> dict[str, Any]:
         return {"record": np.array([_carry(box[0], text, threads) for text in batch["item"]], "O")}
 
     blocks = ray.data.from_items(
         [json.dumps(asdict(row)) for row in rows], override_num_blocks=len(rows)
     ).map_batches(
-        carry,
+        transfer,
         batch_size=None,
         num_cpus=threads,
         concurrency=workers,
@@ -112,7 +112,7 @@ def _carry(held: Any, text: str, threads: int) -> bytes:
         set_num_threads(threads)
         _fetched.clear()
         _fetched[held] = ray.get(held)
-    return pickle.dumps(_fetched[held].carry(Row(**json.loads(text))))
+    return pickle.dumps(_fetched[held].transfer(Row(**json.loads(text))))
 
 
 def _windows(rows: Iterator[Row]) -> Iterator[list[Row]]:

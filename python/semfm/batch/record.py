@@ -46,30 +46,30 @@ def worker_name() -> str:
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
-def answer(row: Row, carried: Transfer, *, point_map: bool, seconds: float) -> Record:
-    """The record of a carried region.
+def answer(row: Row, result: Transfer, *, point_map: bool, seconds: float) -> Record:
+    """The record of a transferred region.
 
     A refused region is an answer: the object was looked at, and the region lands nowhere.
     """
-    weights = np.asarray(carried.region.weights)
+    weights = np.asarray(result.region.weights)
     vertices = np.flatnonzero(weights)
     record = _empty(row, "done", seconds)
     record.update(
-        verdict=carried.verdict,
-        confidence=float(carried.confidence),
+        verdict=result.verdict,
+        confidence=float(result.confidence),
         n_vertices=len(weights),
-        mesh_hash=carried.target.mesh.hash,
+        mesh_hash=result.target.mesh.hash,
         vertices=vertices.tolist(),
         weights=weights[vertices].tolist(),
         hypotheses=[
             {"probability": each.probability, "vertices": each.region.vertices.tolist()}
-            for each in carried.hypotheses
+            for each in result.hypotheses
         ],
-        report=json.dumps(carried.report, sort_keys=True),
-        from_cache=carried.target.from_cache,
+        report=json.dumps(result.report, sort_keys=True),
+        from_cache=result.target.from_cache,
     )
     if point_map:
-        record["point_map"] = np.asarray(carried.point_map.source_of).tolist()
+        record["point_map"] = np.asarray(result.point_map.source_of).tolist()
     return record
 
 

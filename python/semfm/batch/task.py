@@ -1,4 +1,4 @@
-"""The task: one demonstration, carried to one row. It keeps nothing between rows."""
+"""The task: one demonstration, transferred to one row. It keeps nothing between rows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .record import Record, answer, failure
 
 @dataclass(frozen=True)
 class Demonstration:
-    """What is carried, and how; it pickles, and every worker gets it once.
+    """What is transferred, and how; it pickles, and every worker gets it once.
 
     Attributes
     ----------
@@ -74,8 +74,8 @@ class Demonstration:
             "point_maps": self.point_maps,
         }
 
-    def carry(self, row: Row) -> Record:
-        """Carries the region to one target; whatever goes wrong there becomes its record.
+    def transfer(self, row: Row) -> Record:
+        """Transfers the region to one target; whatever goes wrong there becomes its record.
 
         Parameters
         ----------
@@ -93,8 +93,8 @@ class Demonstration:
             matching = Matching(
                 self.source, target, settings=self.settings, seed=self.seed, progress=tick
             )
-            carried = matching.transfer(self.region)
-            return answer(row, carried, point_map=self.point_maps, seconds=time.monotonic() - start)
+            result = matching.transfer(self.region)
+            return answer(row, result, point_map=self.point_maps, seconds=time.monotonic() - start)
         except TimeoutError as error:
             return failure(row, error, seconds=time.monotonic() - start, code="timeout")
         except Cancelled:

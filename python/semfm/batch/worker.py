@@ -157,12 +157,12 @@ def serve() -> None:
     except Exception as error:
         _put(answers, pickle.dumps(f"{type(error).__name__}: {error}"))
         return
-    # The parent may go at any time, and there is nobody to tell then.
+    # The parent may end at any time; nothing reads the answer then.
     with suppress(EOFError, BrokenPipeError):
         _put(answers, pickle.dumps("ready"))
         while True:
             row = pickle.loads(_take(rows))
-            _put(answers, pickle.dumps(demonstration.carry(row)))
+            _put(answers, pickle.dumps(demonstration.transfer(row)))
 
 
 def _put(pipe: IO[bytes], body: bytes) -> None:

@@ -5,8 +5,8 @@ shown in axes of matplotlib, so that titles, legends, colour bars and ``savefig`
 
     import semfm.plot
 
-    figure = semfm.plot.transfer(carried)
-    figure.savefig("carried.png", dpi=150)
+    figure = semfm.plot.transfer(result)
+    figure.savefig("transfer.png", dpi=150)
 
 Functions about one surface draw into the axes they are given and return them; functions about a
 pair make a figure and return it. Nothing is shown on a screen until the caller says so.

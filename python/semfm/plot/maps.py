@@ -1,4 +1,4 @@
-"""Maps and spectra: colours carried by a point map, the matrix of a functional map, eigenvalues."""
+"""Maps and spectra: colours transferred by a point map, the matrix of a functional map, eigenvalues."""
 
 from __future__ import annotations
 

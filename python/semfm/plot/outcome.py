@@ -49,7 +49,12 @@ def transfer(transfer: Transfer, *, size: int = SIDE) -> Figure:
     places = position_colors(transfer.source.mesh.vertices)
     sides = (
         ("demonstrated", transfer.source.mesh, transfer.source_region.weights, places),
-        ("carried", transfer.target.mesh, transfer.weights, transfer.point_map.pull_back(places)),
+        (
+            "transferred",
+            transfer.target.mesh,
+            transfer.weights,
+            transfer.point_map.pull_back(places),
+        ),
     )
     for column, (name, mesh, weights, paint) in enumerate(sides):
         camera = best_camera(mesh, weights, size=size)

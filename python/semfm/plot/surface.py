@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._paint import Colors, colors_of, per_vertex, weight_colors, weights_of
-from .._semfm import Camera, Mesh, MeshFile, PreparedObject, Region, Shape, View, render, rig
+from .._semfm import Pinhole, Mesh, MeshFile, PreparedObject, Region, Shape, View, render, rig
 from ..errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def as_mesh(thing: Any) -> Mesh:
 
 def best_camera(
     mesh: Any, weights: Optional[Union[Region, ArrayLike]] = None, *, size: int = SIDE
-) -> Camera:
+) -> Pinhole:
     """From where a region shows the most pixels, and then the object the most of its surface.
 
     Parameters
@@ -51,7 +51,7 @@ def best_camera(
 
     Returns
     -------
-    Camera
+    Pinhole
     """
     found = as_mesh(mesh)
     faces = np.asarray(found.faces)
@@ -87,7 +87,7 @@ def mesh(
     vmin: Optional[float] = None,
     vmax: Optional[float] = None,
     colorbar: bool = True,
-    camera: Optional[Camera] = None,
+    camera: Optional[Pinhole] = None,
     title: Optional[str] = None,
     ax: Optional[Axes] = None,
     size: int = SIDE,
@@ -110,7 +110,7 @@ def mesh(
         The value at its upper end.
     colorbar : bool, default True
         Whether `values` get a colour bar.
-    camera : Camera, optional
+    camera : Pinhole, optional
         The best view where none is given.
     title : str, optional
     ax : matplotlib.axes.Axes, optional
@@ -144,7 +144,7 @@ def region(
     mesh: Any,
     region: Union[Region, ArrayLike],
     *,
-    camera: Optional[Camera] = None,
+    camera: Optional[Pinhole] = None,
     title: Optional[str] = None,
     ax: Optional[Axes] = None,
     size: int = SIDE,
@@ -156,7 +156,7 @@ def region(
     mesh : mesh_like, Shape or PreparedObject
     region : Region or (n,) array_like
         A region of that mesh, or weights in [0, 1].
-    camera : Camera, optional
+    camera : Pinhole, optional
     title : str, optional
     ax : matplotlib.axes.Axes, optional
     size : int, default 640
@@ -173,7 +173,7 @@ def region(
 
 
 def show(
-    mesh: Mesh, paint: Colors, camera: Camera, *, title: Optional[str], ax: Optional[Axes]
+    mesh: Mesh, paint: Colors, camera: Pinhole, *, title: Optional[str], ax: Optional[Axes]
 ) -> Axes:
     """Renders one view, without the empty margin that its silhouette leaves, into axes."""
     axes = new_axes() if ax is None else ax

@@ -1,10 +1,10 @@
 """From raw tokens to patch embeddings: rolls, outlier tokens, unit length, average.
 
-An encoder's features carry the position in the image besides the meaning, so a long object would
+An encoder's features contain the position in the image besides the content, so a long object would
 match its own mirror image end for end. Showing every picture rolled by quarter turns and averaging
 the grids, rolled back, cancels that.
 
-Some vision transformers put a few tokens of huge norm at places that carry no local meaning
+Some vision transformers put a few tokens of huge norm at places that hold no local information
 (Darcet, Oquab, Mairal & Bojanowski, "Vision Transformers Need Registers", 2024; in the SigLIP
 family at fixed positions, up to 15 times the median norm). They are told by their raw norm, before
 it is divided away.
@@ -42,7 +42,7 @@ class Patches:
 
 
 def embed_pictures(encoder: Encoder, pictures: np.ndarray, rolls: Sequence[int]) -> Patches:
-    """Embed a batch of pictures: steps 2 and 3 of the package's story.
+    """Embed a batch of pictures: steps 2 and 3 of :mod:`semfm.sidecar`.
 
     Parameters
     ----------

@@ -24,9 +24,9 @@ How a pair is done, and where to read about it:
    :mod:`.question` puts them between the words in ``prompts/``;
 3. :mod:`.endpoint` asks, :mod:`.cache` keeps replies, :mod:`.true_masks` answers with the truth to
    measure the ceiling of everything but the model;
-4. :mod:`.answer` reads the reply strictly, and :mod:`.lifting` carries its masks onto vertices by
+4. :mod:`.answer` reads the reply strictly, and :mod:`.lifting` lifts its masks onto vertices by
    visibility and vote;
-5. :mod:`.baseline` is the road of one pair, :mod:`.run` that of many, :mod:`.rows` their file.
+5. :mod:`.baseline` does one pair, :mod:`.run` many, :mod:`.rows` is their file.
 
 The base install does not need the ``openai`` client: it is imported when an endpoint is opened.
 """

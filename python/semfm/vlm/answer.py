@@ -1,6 +1,6 @@
 """Reads a model's answer, strictly: one JSON object in the form that the prompt gives.
 
-A model may write anything. What is not the form asked for makes the pair a failure that carries
+A model may write anything. What is not the form asked for makes the pair a failure that keeps
 the reply, and never stops the program. One liberty is taken: a code fence around the whole object,
 which many models add whatever they are told, is taken off.
 """

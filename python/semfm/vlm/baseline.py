@@ -1,4 +1,4 @@
-"""The road of one pair: views of both objects, one question, and the answer lifted and fused."""
+"""One pair: views of both objects, one question, and the answer lifted and fused."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def transfer(
     endpoint: Endpoint,
     settings: BaselineSettings = BaselineSettings(),
 ) -> Outcome:
-    """Carry a region from source to target by asking a model.
+    """Transfer a region from source to target by asking a model.
 
     Parameters
     ----------

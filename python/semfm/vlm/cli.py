@@ -44,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
     """The command's arguments."""
     p = argparse.ArgumentParser(
         prog="semfm-vlm",
-        description="Carry a region from one object to another by asking a vision-language model.",
+        description="Transfer a region from one object to another by asking a vision-language model.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -55,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--region", metavar="R.json", help="the region on the source")
     p.add_argument("-o", "--output", metavar="FILE", required=True, help="region.json or rows.json")
     p.add_argument(
-        "--truth", metavar="R.json", help="ask nobody: answer with this region of the target"
+        "--truth", metavar="R.json", help="ask no model: answer with this region of the target"
     )
     many = p.add_argument_group("many pairs")
     many.add_argument(
@@ -68,7 +68,7 @@ def parser() -> argparse.ArgumentParser:
         "--jobs", type=int, default=1, metavar="N", help="questions at once (%(default)s)"
     )
     many.add_argument(
-        "--true-masks", action="store_true", help="ask nobody: answer with the targets' labels"
+        "--true-masks", action="store_true", help="ask no model: answer with the targets' labels"
     )
     _add_question(p)
     _add_endpoint(p)

@@ -106,19 +106,19 @@ def _draw_ruler(picture: Image.Image) -> Image.Image:
 
 
 def _draw_numbers(picture: Image.Image, segments: np.ndarray, factor: int) -> None:
-    """A number in the middle of every piece that has room for one; large pieces choose first."""
+    """A number in the middle of every piece that is large enough; large pieces choose first."""
     draw = ImageDraw.Draw(picture)
     font = _font(max(12, max(picture.size) // 40))
     parts, depth = components(segments), depth_inside(segments)
     sizes = np.bincount(parts.ravel())
-    room = FRAGMENT * (segments > 0).sum()
+    least = FRAGMENT * (segments > 0).sum()
     largest = {int(n): sizes[parts[segments == n]].max() for n in np.unique(segments[segments > 0])}
     taken: list[tuple[float, float, float, float]] = []
     for part in np.argsort(-sizes, kind="stable").tolist():
         inside = parts == part
         number = int(segments[inside][0])
         # Of a patch in small pieces the largest still gets its number.
-        if not number or sizes[part] < min(room, largest[number]):
+        if not number or sizes[part] < min(least, largest[number]):
             continue
         for row, col in _places(inside, depth):
             place = ((col + 0.5) * factor, (row + 0.5) * factor)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import Camera, Mesh, View, ViewsFile
+from .. import Pinhole, Mesh, View, ViewsFile
 from ..sidecar.errors import expected
 
 #: Pixels whose triangle does not lie behind them, at most this share of the object's: rounding of
@@ -52,7 +52,7 @@ class ObjectView:
     name: str
     rgb: np.ndarray
     on_object: np.ndarray  # (height × width) bool
-    camera: Camera
+    camera: Pinhole
     surface: Surface
 
     def image(self, values: np.ndarray, fill: Any = 0) -> np.ndarray:
@@ -130,7 +130,7 @@ def _view(
 
 
 def _surface(
-    camera: Camera, ids: np.ndarray, vertices: np.ndarray, triangles: np.ndarray
+    camera: Pinhole, ids: np.ndarray, vertices: np.ndarray, triangles: np.ndarray
 ) -> Surface:
     """Intersect each pixel's ray with the plane of the triangle that it shows.
 
@@ -139,7 +139,7 @@ def _surface(
     """
     rows, cols = np.nonzero(ids >= 0)
     corners = triangles[ids[rows, cols]]
-    rotation, translation = camera.camera_from_object[:3, :3], camera.camera_from_object[:3, 3]
+    rotation, translation = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
     a, b, c = (vertices[corners[:, i]] @ rotation.T + translation for i in range(3))
     x, y = (cols + 0.5 - camera.cx) / camera.fx, (rows + 0.5 - camera.cy) / camera.fy
     rays = np.stack([x, y, np.ones(len(rows))], 1)

@@ -77,7 +77,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Drawing:
-    """How pictures are made: their side in pixels, and whether the target's carry a ruler."""
+    """How pictures are made: their side in pixels, and whether the target's have a ruler."""
 
     side: int = 768
     ruler: bool = True

@@ -1,8 +1,8 @@
 """Answers with the truth instead of asking a model: the ceiling of everything but the model.
 
 The region that is known is drawn into the target's views and handed over in the form that a model
-would use, so that it takes the whole road: JSON, polygons or marks, lifting and vote. What is lost
-on the way, no model can win back.
+would use, so that it goes through every step: JSON, polygons or marks, lifting and vote. What is
+lost there, no model can win back.
 """
 
 from __future__ import annotations

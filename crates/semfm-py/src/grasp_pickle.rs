@@ -6,16 +6,16 @@ use semfm::grasp::{Grasp, Grasps, Miss, Pose, Reason};
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
-pub struct PlainGrasps {
-    grasps: Vec<PlainGrasp>,
+pub struct PickledGrasps {
+    grasps: Vec<PickledGrasp>,
     rejected: Vec<(String, usize)>,
-    nearest_miss: Option<(String, f64, PlainGrasp)>,
+    nearest_miss: Option<(String, f64, PickledGrasp)>,
     n_candidates: usize,
     n_survivors: usize,
 }
 
 #[derive(Serialize, Deserialize)]
-struct PlainGrasp {
+struct PickledGrasp {
     position: [f64; 3],
     rotation: [f64; 4],
     width: f64,
@@ -27,33 +27,34 @@ struct PlainGrasp {
     terms: Vec<(String, f64)>,
 }
 
-impl PlainGrasps {
+impl PickledGrasps {
     pub fn of(found: &Grasps) -> Self {
-        let name = |reason: Reason| reason.name().to_owned();
         Self {
-            grasps: found.grasps.iter().map(PlainGrasp::of).collect(),
-            rejected: found.rejected.iter().map(|(reason, n)| (name(reason), n)).collect(),
-            nearest_miss: found
-                .nearest_miss
-                .as_ref()
-                .map(|miss| (name(miss.reason), miss.by, PlainGrasp::of(&miss.grasp))),
+            grasps: found.grasps.iter().map(PickledGrasp::of).collect(),
+            rejected: found
+                .rejected
+                .iter()
+                .map(|(reason, n)| (reason.name().to_owned(), n))
+                .collect(),
+            nearest_miss: found.nearest_miss.as_ref().map(|miss| {
+                (miss.reason.name().to_owned(), miss.by, PickledGrasp::of(&miss.grasp))
+            }),
             n_candidates: found.n_candidates,
             n_survivors: found.n_survivors,
         }
     }
 
-    /// The grasps again, without the times that they took. Names that nobody knows are left out.
+    /// The grasps again, without the times that they took. Names that this version does not know are left out.
     pub fn restore(self) -> Grasps {
-        let reason = |name: &str| Reason::ALL.into_iter().find(|reason| reason.name() == name);
         Grasps {
-            grasps: self.grasps.into_iter().map(PlainGrasp::restore).collect(),
+            grasps: self.grasps.into_iter().map(PickledGrasp::restore).collect(),
             rejected: self
                 .rejected
                 .iter()
-                .filter_map(|(name, count)| Some((reason(name)?, *count)))
+                .filter_map(|(name, count)| Some((reason_named(name)?, *count)))
                 .collect(),
             nearest_miss: self.nearest_miss.and_then(|(name, by, grasp)| {
-                Some(Miss { reason: reason(&name)?, by, grasp: grasp.restore() })
+                Some(Miss { reason: reason_named(&name)?, by, grasp: grasp.restore() })
             }),
             n_candidates: self.n_candidates,
             n_survivors: self.n_survivors,
@@ -62,7 +63,7 @@ impl PlainGrasps {
     }
 }
 
-impl PlainGrasp {
+impl PickledGrasp {
     fn of(grasp: &Grasp) -> Self {
         Self {
             position: grasp.object_from_tcp.translation.to_array(),
@@ -79,7 +80,6 @@ impl PlainGrasp {
 
     fn restore(self) -> Grasp {
         let rotation = DQuat::from_array(self.rotation);
-        let known = |name: &str| TERMS.into_iter().find(|term| *term == name);
         Grasp {
             object_from_tcp: Pose::from_parts(DVec3::from_array(self.position), rotation),
             width: self.width,
@@ -88,7 +88,19 @@ impl PlainGrasp {
             normals: self.normals.map(DVec3::from_array),
             epsilon: self.epsilon,
             score: self.score,
-            terms: self.terms.iter().filter_map(|(name, x)| Some((known(name)?, *x))).collect(),
+            terms: self
+                .terms
+                .iter()
+                .filter_map(|(name, x)| Some((term_named(name)?, *x)))
+                .collect(),
         }
     }
+}
+
+fn reason_named(name: &str) -> Option<Reason> {
+    Reason::ALL.into_iter().find(|reason| reason.name() == name)
+}
+
+fn term_named(name: &str) -> Option<&'static str> {
+    TERMS.into_iter().find(|term| *term == name)
 }

@@ -1,4 +1,4 @@
-"""One demonstration, one new object: the easy door, then the pieces behind it."""
+"""One demonstration, one new object: the short call, then the pieces it is made of."""
 
 import numpy as np
 
@@ -10,27 +10,27 @@ def main() -> None:
     # real object takes `semfm.Mesh.read("mug.obj")` and the file that `semfm-embed` wrote.
     hammer = semfm.demo_object("tools", instance=0, n_vertices=1500)
     pickaxe = semfm.demo_object("tools", instance=1, n_vertices=1500)
-    carried = semfm.transfer(
+    result = semfm.transfer(
         hammer.mesh,
         pickaxe.mesh,
         hammer.region,
         source_embeddings=hammer.embeddings("easy"),
         target_embeddings=pickaxe.embeddings("easy"),
     )
-    print(f"{carried.verdict} with confidence {carried.confidence:.2f}")
-    print(f"IoU with the true grip: {carried.region.iou(pickaxe.region):.2f}")
+    print(f"{result.verdict} with confidence {result.confidence:.2f}")
+    print(f"IoU with the true grip: {result.region.iou(pickaxe.region):.2f}")
 
     # Where on the target? The region's weighted centre, in the target's own frame.
-    weights = carried.weights
-    centre = weights @ carried.target.mesh.vertices / weights.sum()
+    weights = result.weights
+    centre = weights @ result.target.mesh.vertices / weights.sum()
     print(f"reach for {np.round(centre, 3)}")
 
     # How it came about: which parts were paired, and which source vertex each vertex stands for.
-    for anchor in carried.report["anchors"]:
+    for anchor in result.report["anchors"]:
         print(f"part {anchor['source']} ~ part {anchor['target']}: cosine {anchor['cosine']:.2f}")
-    height = np.asarray(carried.source.mesh.vertices)[:, 2]
-    print(f"pulled back: {carried.point_map.pull_back(height).shape}")
-    for path in carried.write("carried"):
+    height = np.asarray(result.source.mesh.vertices)[:, 2]
+    print(f"pulled back: {result.point_map.pull_back(height).shape}")
+    for path in result.write("transfer"):
         print(path)
 
 

@@ -38,12 +38,12 @@ pub fn run<T: Send + 'static>(
     let listener = Listener::new(py, progress)?;
     let (tell, mut news) = channel();
     let task = match &listener {
-        Listener::Nobody => Task::default(),
+        Listener::Silent => Task::default(),
         _ => {
             let tell = Mutex::new(tell.clone());
             Task::with_progress(move |step| {
                 let event = News::Progress(step.stage.to_owned(), step.done, step.total);
-                // Nobody listens any more where the work was left alone.
+                // Nothing receives any more where the work was left alone.
                 let _ = tell.lock().unwrap_or_else(PoisonError::into_inner).send(event);
             })
         }
@@ -93,7 +93,7 @@ pub fn guard<T>(py: Python<'_>, work: impl FnOnce() -> semfm::Result<T>) -> PyRe
 
 /// Who hears of progress.
 enum Listener<'py> {
-    Nobody,
+    Silent,
     Callable(Bound<'py, PyAny>),
     Bar(Bound<'py, PyAny>),
 }
@@ -101,11 +101,13 @@ enum Listener<'py> {
 impl<'py> Listener<'py> {
     fn new(py: Python<'py>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Self> {
         let Some(progress) = progress.filter(|progress| !progress.is_none()) else {
-            return Ok(Self::Nobody);
+            return Ok(Self::Silent);
         };
         if let Ok(wanted) = progress.extract::<bool>() {
-            let bar = || py.import("semfm._progress")?.getattr("Bar")?.call0();
-            return if wanted { Ok(Self::Bar(bar()?)) } else { Ok(Self::Nobody) };
+            if !wanted {
+                return Ok(Self::Silent);
+            }
+            return Ok(Self::Bar(py.import("semfm._progress")?.getattr("Bar")?.call0()?));
         }
         if progress.is_callable() {
             return Ok(Self::Callable(progress.clone()));
@@ -115,7 +117,7 @@ impl<'py> Listener<'py> {
 
     fn tell(&self, stage: &str, done: usize, total: usize) -> PyResult<()> {
         match self {
-            Self::Nobody => Ok(()),
+            Self::Silent => Ok(()),
             Self::Callable(listener) | Self::Bar(listener) => {
                 listener.call1((stage, done, total)).map(drop)
             }
@@ -146,7 +148,7 @@ fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
         _ => {
             let threads = build(py, 0)?;
             let fresh = Pool { process, threads: Arc::clone(&threads) };
-            // The parent's pool is not dropped: its locks may be held by threads that are not here.
+            // The parent's pool is not dropped: its locks may be taken by threads that are not here.
             std::mem::forget(pool.replace(fresh));
             Ok(threads)
         }

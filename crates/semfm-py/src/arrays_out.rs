@@ -14,7 +14,7 @@ pub fn vector<'py, C: PyClass<Frozen = True> + Sync, T: Element>(
     pick: impl for<'a> FnOnce(&'a C) -> &'a [T],
 ) -> PyResult<Bound<'py, PyAny>> {
     let view = ArrayView1::from(pick(owner.get()));
-    // SAFETY: `pick` borrows from the owner, which is frozen (nobody can change or move the
+    // SAFETY: `pick` borrows from the owner, which is frozen (nothing can change or move the
     // numbers) and becomes the array's base (so it outlives the array).
     let array = unsafe { PyArray1::borrow_from_array(&view, owner.clone().into_any()) };
     read_only(array.into_any())

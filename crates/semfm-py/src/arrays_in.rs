@@ -1,7 +1,7 @@
 //! Arrays of any dtype, order and stride in; checked rows of numbers out.
 //!
-//! Every door names the argument, the array it wants and the array it found: a TypeError for kinds
-//! of numbers, `semfm.InvalidInput` (a ValueError) for shapes and values.
+//! Every function names the argument, the array it wants and the array it found: `semfm.InvalidType`
+//! (a TypeError) for kinds of numbers, `semfm.InvalidInput` (a ValueError) for shapes and values.
 
 use faer::{Mat, MatRef};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
@@ -97,9 +97,7 @@ impl Laid {
 /// As [`matrix`], without turning over what lies column by column, as our own functions do.
 pub fn laid(value: &Bound<'_, PyAny>, name: &str, axes: [Axis; 2]) -> PyResult<Laid> {
     let array = checked(value, name, REAL, &axes)?;
-    let flags = array.getattr("flags")?;
-    let flag = |name| flags.get_item(name)?.extract::<bool>();
-    let by_columns = flag("F_CONTIGUOUS")? && !flag("C_CONTIGUOUS")?;
+    let by_columns = has_flag(&array, "F_CONTIGUOUS")? && !has_flag(&array, "C_CONTIGUOUS")?;
     if by_columns {
         let (values, shape) = contiguous::<f64>(&array.getattr("T")?, name)?;
         if values.iter().all(|x| x.is_finite()) {
@@ -110,7 +108,12 @@ pub fn laid(value: &Bound<'_, PyAny>, name: &str, axes: [Axis; 2]) -> PyResult<L
     Ok(Laid { values, shape: [shape[0], shape[1]], by_columns: false })
 }
 
-/// Points (n × 3). Numbers that are not finite are left to the constructor behind the door, which
+/// One of NumPy's flags of an array.
+fn has_flag(array: &Bound<'_, PyAny>, flag: &str) -> PyResult<bool> {
+    array.getattr("flags")?.get_item(flag)?.extract()
+}
+
+/// Points (n × 3). Numbers that are not finite are left to the constructor that takes them, which
 /// names the vertex.
 pub fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<DVec3>> {
     let (values, _) = values::<f64>(value, name, REAL, &[Any("n"), Is(3)])?;
@@ -192,17 +195,21 @@ fn checked<'py>(
     axes: &[Axis],
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
-    let wanted = || format!("an array of {}, shape {}", kind.name, wanted_shape(axes));
     let numpy = py.import("numpy")?;
     let array = numpy
         .call_method1("asarray", (value,))
-        .map_err(|_| errors::wrong_type(name, &wanted(), value))?;
+        .map_err(|_| errors::wrong_type(name, &wanted_array(kind, axes), value))?;
     let untyped = array.cast::<PyUntypedArray>()?;
     let dtype = array.getattr("dtype")?;
     let letter: String = dtype.getattr("kind")?.extract()?;
     let width: usize = dtype.getattr("itemsize")?.extract()?;
     if !kind.letters.contains(letter.as_str()) || width > 8 {
-        return Err(errors::invalid_type(py, name, &wanted(), &format!("dtype {dtype}")));
+        return Err(errors::invalid_type(
+            py,
+            name,
+            &wanted_array(kind, axes),
+            &format!("dtype {dtype}"),
+        ));
     }
     let shape = untyped.shape();
     let fits = shape.len() == axes.len()
@@ -211,7 +218,8 @@ fn checked<'py>(
             Is(wanted) => n == *wanted,
         });
     if !fits {
-        return Err(errors::invalid(py, name, &wanted(), &format!("shape {}", tuple(shape))));
+        let found = format!("shape {}", tuple(shape));
+        return Err(errors::invalid(py, name, &wanted_array(kind, axes), &found));
     }
     Ok(array)
 }
@@ -245,6 +253,10 @@ fn finite<T: Copy + std::fmt::Display>(
     }
     let found = format!("{found} at {place:?}").to_lowercase();
     Err(errors::invalid(py, name, "finite numbers", &found))
+}
+
+fn wanted_array(kind: Kind, axes: &[Axis]) -> String {
+    format!("an array of {}, shape {}", kind.name, wanted_shape(axes))
 }
 
 fn wanted_shape(axes: &[Axis]) -> String {

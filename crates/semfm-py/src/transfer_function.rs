@@ -1,24 +1,24 @@
-//! The one-call door: two objects and a region in, a carried region out.
+//! `transfer`, the short call: two objects and a region in, a transferred region out.
 
 use pyo3::prelude::*;
 use semfm::PipelineSettings;
 
 use crate::cloud::SemanticCloud;
 use crate::errors;
-use crate::held::Held;
+use crate::interruptible::run;
 use crate::matching::Matching;
 use crate::mesh::from_any;
 use crate::prepared::{OwnedMeaning, PreparedObject};
 use crate::region::region_of;
 use crate::settings::{Options, TransferSettings};
 use crate::shape::check_shape_size;
+use crate::shared::Shared;
 use crate::transfer::Transfer;
-use crate::work::run;
 
 /// One of the two objects, prepared or to be prepared.
 enum Side {
     Ready(PreparedObject),
-    Raw(Held<semfm::Mesh>, OwnedMeaning),
+    Raw(Shared<semfm::Mesh>, OwnedMeaning),
 }
 
 impl Side {
@@ -46,9 +46,9 @@ impl Side {
         Ok(Self::Raw(mesh, meaning))
     }
 
-    fn mesh(&self) -> Held<semfm::Mesh> {
+    fn mesh(&self) -> Shared<semfm::Mesh> {
         match self {
-            Self::Ready(object) => object.held.part(|object| object.object.shape().original()),
+            Self::Ready(object) => object.mesh_inner(),
             Self::Raw(mesh, _) => mesh.clone(),
         }
     }
@@ -65,7 +65,7 @@ impl Side {
     }
 }
 
-/// Carries a demonstrated region from one object to another.
+/// Transfers a demonstrated region from one object to another.
 ///
 /// Parameters
 /// ----------
@@ -76,7 +76,7 @@ impl Side {
 /// region : Region or path
 ///     Where the demonstration touched the source.
 /// source_features : (n_source, d) array_like, optional
-///     A feature vector per vertex, from anybody's network.
+///     A feature vector per vertex, from any network.
 /// target_features : (n_target, d) array_like, optional
 /// source_embeddings : Embeddings or path, optional
 ///     Patch embeddings of rendered views.
@@ -88,9 +88,12 @@ impl Side {
 ///     ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
 ///     ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
 /// rule : str, optional
-///     How a map carries the region: ``preimage`` (where none is given) or ``image``.
+///     How a map transfers the region: ``preimage`` (where none is given) or ``image``.
 /// seed : int, optional
 ///     Of everything drawn by chance; 0 where none is given.
+/// second_opinion : bool, optional
+///     Whether an independent method judges the result, too; the method's own default where none is
+///     given: True where its confidence is the agreement of the two.
 /// settings : TransferSettings, optional
 ///     Everything that can be set, in place of `method` and `rule`.
 /// k : int, optional
@@ -110,16 +113,16 @@ impl Side {
 /// --------
 /// >>> import semfm
 /// >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in (0, 1))
-/// >>> carried = semfm.transfer(
+/// >>> result = semfm.transfer(
 /// ...     mug.mesh, kettle.mesh, mug.region,
 /// ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
-/// >>> carried.region.n_vertices == kettle.mesh.n_vertices
+/// >>> result.region.n_vertices == kettle.mesh.n_vertices
 /// True
 #[pyfunction]
 #[pyo3(signature = (
     source, target, region, *, source_features=None, target_features=None, source_embeddings=None,
     target_embeddings=None, source_cloud=None, target_cloud=None, method=None, rule=None, seed=None,
-    settings=None, k=None, working_vertices=None, cache=None, progress=None
+    second_opinion=None, settings=None, k=None, working_vertices=None, cache=None, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
 pub fn transfer(
@@ -135,6 +138,7 @@ pub fn transfer(
     method: Option<&str>,
     rule: Option<&str>,
     seed: Option<u64>,
+    second_opinion: Option<bool>,
     settings: Option<&Bound<'_, TransferSettings>>,
     k: Option<usize>,
     working_vertices: Option<usize>,
@@ -142,7 +146,8 @@ pub fn transfer(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Transfer> {
     let py = source.py();
-    let options = Options { method, rule, seed, settings, k, working_vertices, cache };
+    let options =
+        Options { method, rule, seed, second_opinion, settings, k, working_vertices, cache };
     let settings = options.pipeline(py)?;
     let source =
         Side::of(source, "source", source_features, source_embeddings, source_cloud, &settings)?;
@@ -157,6 +162,6 @@ pub fn transfer(
     run(py, progress, move |task| {
         let prepare = |side: Side| side.prepare(&settings, task);
         let (source, target) = rayon::join(|| prepare(source), || prepare(target));
-        Matching::of(source?, target?, &settings.transfer, task)?.carry(region)
+        Matching::of(source?, target?, &settings.transfer, task)?.transferred(region)
     })
 }

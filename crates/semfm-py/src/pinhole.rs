@@ -1,0 +1,339 @@
+//! `Pinhole`, a camera, and the rig around an object.
+
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use semfm::geom::math::{DAffine3, DMat3, DVec3};
+use semfm::geom::{self, Intrinsics, PixelDepth};
+use semfm::views::{self, RigSettings};
+
+use crate::arrays_in::{self, Axis};
+use crate::arrays_out;
+use crate::interruptible::{guard, run};
+use crate::mesh::from_any;
+
+/// A pinhole camera without distortion: x right, y down, z forward, in the units of the world.
+///
+/// A point (x, y, z) of the camera's frame projects to ``u = fx x / z + cx``, ``v = fy y / z + cy``
+/// in pixels, where the centre of pixel (0, 0) is at (½, ½). The world is the frame that the camera
+/// stands in: an object's in rendered views. The two constructors differ in how the numbers that
+/// they are given count pixels.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import semfm
+/// >>> camera = semfm.Pinhole.with_pixel_centres_at_half(64, 48, 70, 70, 32, 24, np.eye(4))
+/// >>> camera.project([[0, 0, 2]]).tolist()
+/// [[32.0, 24.0, 2.0]]
+/// >>> camera == semfm.Pinhole.with_pixel_centres_at_integers(
+/// ...     64, 48, 70, 70, 31.5, 23.5, np.eye(4))
+/// True
+#[pyclass(frozen, module = "semfm")]
+#[derive(Clone, Copy)]
+pub struct Pinhole {
+    pub camera: geom::Pinhole,
+}
+
+#[pymethods]
+impl Pinhole {
+    /// A camera whose numbers count as ours do: the centre of pixel (0, 0) is at (½, ½).
+    ///
+    /// Parameters
+    /// ----------
+    /// width : int
+    ///     Pixels.
+    /// height : int
+    ///     Pixels.
+    /// fx : float
+    ///     Focal length along x, in pixels.
+    /// fy : float
+    ///     Focal length along y, in pixels.
+    /// cx : float
+    ///     Principal point, x, in pixels.
+    /// cy : float
+    ///     Principal point, y, in pixels.
+    /// camera_from_world : (4, 4) array_like
+    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+    ///
+    /// Returns
+    /// -------
+    /// Pinhole
+    #[staticmethod]
+    fn with_pixel_centres_at_half(
+        width: u32,
+        height: u32,
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        camera_from_world: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+        let pose = rigid_matrix(camera_from_world, "camera_from_world")?;
+        let camera = guard(camera_from_world.py(), || {
+            Ok(geom::Pinhole::with_pixel_centres_at_half(intrinsics, pose)?)
+        })?;
+        Ok(Self { camera })
+    }
+
+    /// A camera whose numbers come from a calibration (OpenCV, ROS `CameraInfo`), in which the centre
+    /// of pixel (0, 0) is at (0, 0): half a pixel is added to its principal point.
+    ///
+    /// Parameters
+    /// ----------
+    /// width : int
+    ///     Pixels.
+    /// height : int
+    ///     Pixels.
+    /// fx : float
+    ///     Focal length along x, in pixels.
+    /// fy : float
+    ///     Focal length along y, in pixels.
+    /// cx : float
+    ///     Principal point, x, in pixels.
+    /// cy : float
+    ///     Principal point, y, in pixels.
+    /// camera_from_world : (4, 4) array_like
+    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+    ///
+    /// Returns
+    /// -------
+    /// Pinhole
+    #[staticmethod]
+    fn with_pixel_centres_at_integers(
+        width: u32,
+        height: u32,
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        camera_from_world: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+        let pose = rigid_matrix(camera_from_world, "camera_from_world")?;
+        let camera = guard(camera_from_world.py(), || {
+            Ok(geom::Pinhole::with_pixel_centres_at_integers(intrinsics, pose)?)
+        })?;
+        Ok(Self { camera })
+    }
+
+    /// int: pixels.
+    #[getter]
+    fn width(&self) -> u32 {
+        self.camera.width()
+    }
+
+    /// int: pixels.
+    #[getter]
+    fn height(&self) -> u32 {
+        self.camera.height()
+    }
+
+    /// float: focal length along x, in pixels.
+    #[getter]
+    fn fx(&self) -> f64 {
+        self.camera.fx()
+    }
+
+    /// float: focal length along y, in pixels.
+    #[getter]
+    fn fy(&self) -> f64 {
+        self.camera.fy()
+    }
+
+    /// float: principal point, x, in pixels.
+    #[getter]
+    fn cx(&self) -> f64 {
+        self.camera.cx()
+    }
+
+    /// float: principal point, y, in pixels.
+    #[getter]
+    fn cy(&self) -> f64 {
+        self.camera.cy()
+    }
+
+    /// (4, 4) float64 array: rigid motion from the world's frame to the camera's.
+    #[getter]
+    fn camera_from_world<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let DAffine3 { matrix3, translation, .. } = self.camera.camera_from_world();
+        let mut rows = Vec::with_capacity(16);
+        for i in 0..3 {
+            rows.extend(matrix3.row(i).to_array());
+            rows.push(translation[i]);
+        }
+        rows.extend([0.0, 0.0, 0.0, 1.0]);
+        arrays_out::owned_rows(py, rows, 4)
+    }
+
+    /// (3,) float64 array: where the camera stands, in the world's frame.
+    #[getter]
+    fn eye<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        arrays_out::owned(py, self.camera.eye().to_array().to_vec())
+    }
+
+    /// Pixel position and depth of points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : (n, 3) array_like
+    ///     In the world's frame.
+    ///
+    /// Returns
+    /// -------
+    /// (n, 3) float64 array
+    ///     u, v, and depth z; u and v mean nothing where z ≤ 0.
+    fn project<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let projected = arrays_in::points(points, "points")?;
+        let projected = projected.into_iter().flat_map(|p| {
+            let PixelDepth { u, v, z } = self.camera.project(p);
+            [u, v, z]
+        });
+        arrays_out::owned_rows(points.py(), projected.collect(), 3)
+    }
+
+    fn __repr__(&self) -> String {
+        let Intrinsics { width, height, fx, .. } = self.camera.intrinsics();
+        format!("Pinhole({width} × {height}, focal length {fx:.1} px)")
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| other.get().camera == self.camera)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let Intrinsics { width, height, fx, fy, cx, cy } = slf.get().camera.intrinsics();
+        let pose = slf.get().camera_from_world(py)?;
+        let parts = (width, height, fx, fy, cx, cy, pose).into_pyobject(py)?.into_any();
+        Ok((slf.get_type().getattr("with_pixel_centres_at_half")?, parts))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+}
+
+/// Cameras all around an object, each zoomed and centred on its silhouette.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+/// count : int, default 14
+///     Number of views.
+/// size : int, default 224
+///     Side of the square images, in pixels.
+/// field_of_view : float, default 0.5235987755982988
+///     Full angle that the bounding sphere would fill, in radians.
+/// fill : float, default 0.8
+///     Share of the image's side that the silhouette fills.
+/// max_zoom : float, default 1.5
+///     Largest zoom beyond the fit of the bounding sphere.
+/// principal_frame : bool, default True
+///     Pose the cameras in the object's principal frame, else in the file's with z up.
+/// close_ups : int, default 0
+///     Close-ups beside each view, along the silhouette's longer side.
+///
+/// Returns
+/// -------
+/// list of Pinhole
+#[pyfunction]
+#[pyo3(signature = (
+    mesh, *, count=14, size=224, field_of_view=std::f64::consts::FRAC_PI_6, fill=0.8, max_zoom=1.5,
+    principal_frame=true, close_ups=0
+))]
+#[pyo3(
+    text_signature = "(mesh, *, count=14, size=224, field_of_view=0.5235987755982988, fill=0.8, max_zoom=1.5, principal_frame=True, close_ups=0)"
+)]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub fn rig(
+    mesh: &Bound<'_, PyAny>,
+    count: usize,
+    size: u32,
+    field_of_view: f64,
+    fill: f64,
+    max_zoom: f64,
+    principal_frame: bool,
+    close_ups: usize,
+) -> PyResult<Vec<Pinhole>> {
+    let settings =
+        RigSettings { count, size, field_of_view, fill, max_zoom, principal_frame, close_ups };
+    let shared = from_any(mesh, "mesh")?;
+    let cameras = run(mesh.py(), None, move |_| Ok(views::rig(&shared, &settings)?))?;
+    Ok(cameras.into_iter().map(|camera| Pinhole { camera }).collect())
+}
+
+/// One camera that looks along ``-direction`` at the whole object: for pictures of results.
+///
+/// Parameters
+/// ----------
+/// mesh : mesh_like
+/// direction : (3,) array_like
+///     From the object towards the camera, in the mesh's frame.
+/// up : (3,) array_like
+///     Upwards in the image, in the mesh's frame.
+/// size : int, default 224
+///     Side of the square image, in pixels.
+/// fill : float, default 0.8
+///     Share of the image's side that the silhouette fills.
+///
+/// Returns
+/// -------
+/// Pinhole
+#[pyfunction]
+#[pyo3(signature = (mesh, direction, up, *, size=224, fill=0.8))]
+pub fn camera_towards(
+    mesh: &Bound<'_, PyAny>,
+    direction: &Bound<'_, PyAny>,
+    up: &Bound<'_, PyAny>,
+    size: u32,
+    fill: f64,
+) -> PyResult<Pinhole> {
+    let settings = RigSettings { size, fill, ..Default::default() };
+    let (direction, up) = (arrays_in::point(direction, "direction")?, arrays_in::point(up, "up")?);
+    let shared = from_any(mesh, "mesh")?;
+    let camera = run(mesh.py(), None, move |_| {
+        Ok(views::camera_towards(&shared, direction, up, &settings)?)
+    })?;
+    Ok(Pinhole { camera })
+}
+
+/// The cameras of a list.
+pub fn list(cameras: &Bound<'_, PyAny>) -> PyResult<Vec<geom::Pinhole>> {
+    let mut out = Vec::new();
+    for camera in cameras.try_iter()? {
+        let camera = camera?;
+        let camera = camera
+            .cast::<Pinhole>()
+            .map_err(|_| crate::errors::wrong_type("cameras", "Pinhole objects", &camera))?;
+        out.push(camera.get().camera);
+    }
+    Ok(out)
+}
+
+/// A tuple of a width and a height, as NumPy has them: rows first.
+pub fn rows_and_columns<'py>(
+    py: Python<'py>,
+    camera: &geom::Pinhole,
+    depth: &[usize],
+) -> PyResult<Bound<'py, PyTuple>> {
+    let mut shape = vec![camera.height() as usize, camera.width() as usize];
+    shape.extend(depth);
+    PyTuple::new(py, shape)
+}
+
+/// A rigid motion given as a homogeneous matrix (4 × 4).
+fn rigid_matrix(value: &Bound<'_, PyAny>, name: &str) -> PyResult<DAffine3> {
+    let (m, _) = arrays_in::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        let found = format!("{:?}", &m[12..]);
+        return Err(crate::errors::invalid(value.py(), name, "the last row 0, 0, 0, 1", &found));
+    }
+    let rows = [0, 4, 8].map(|at| DVec3::new(m[at], m[at + 1], m[at + 2]));
+    let rotation = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+    Ok(DAffine3::from_mat3_translation(rotation, DVec3::new(m[3], m[7], m[11])))
+}
