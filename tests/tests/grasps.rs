@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use semfm::Region;
 use semfm::align::Sim3;
+use semfm::files::write_region;
 use semfm::geom::io::write_mesh;
 use semfm::geom::math::{DQuat, DVec3};
-use semfm::files::write_region;
 use semfm::views::mcap::{POSES_TOPIC, inspect};
 use semfm_synth::{Category, ObjectSettings, make_object};
 use semfm_tests::shell::{Answer, json as json_file, run};

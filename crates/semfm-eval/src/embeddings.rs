@@ -73,8 +73,7 @@ impl Encoder for CommandEncoder {
 impl CommandEncoder {
     fn encode(&self, file: &MeshFile, rolls: u32) -> semfm::Result<EncodedObject> {
         let Self { ref model, keep, threads } = *self;
-        let settings =
-            EncoderSettings { model: model.clone(), rolls, keep, threads, quiet: true };
+        let settings = EncoderSettings { model: model.clone(), rolls, keep, threads, quiet: true };
         // All objects are shown in grey: colour on one side of a pair misleads.
         EncoderCommand::new(settings)?.embed(file, Coloring::Grey, &Task::default())
     }

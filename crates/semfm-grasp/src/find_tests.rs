@@ -7,11 +7,11 @@ use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, Task, zoo};
 
 use crate::find::{Grasps, PoseToExamine, examine_poses, find_grasps_with};
+use crate::grasp_distance::GraspDistance;
 use crate::gripper_geometry::{BoxGripper, GripperGeometry};
 use crate::object::GraspObject;
 use crate::rejection::Reason;
 use crate::scene::Scene;
-use crate::grasp_distance::GraspDistance;
 use crate::settings::{ApproachCone, GraspSettings};
 use crate::test_meshes::{cuboid, cylinder, joined, moved};
 

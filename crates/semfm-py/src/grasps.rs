@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use semfm::geom::math::{DMat4, DVec3};
-use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
 use semfm::GraspResult;
 use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
+use semfm::geom::math::{DMat4, DVec3};
+use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
 
 use crate::arrays_in::{self, Axis};
 use crate::grasp_pickle::PickledGrasps;

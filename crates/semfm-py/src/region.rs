@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use semfm::fmap::metrics;
 use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
 use semfm::files::{RegionFile, read_region, write_region};
+use semfm::fmap::metrics;
 
 use crate::arrays_in::{self, Axis};
 use crate::interruptible::{guard, run};

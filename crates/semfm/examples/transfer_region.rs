@@ -13,9 +13,9 @@
 use std::error::Error;
 use std::path::Path;
 
+use semfm::files::{Provenance, TransferResult, read_region, write_transfer};
 use semfm::geom::io::read_mesh;
 use semfm::geom::zoo::icosphere;
-use semfm::files::{Provenance, TransferResult, read_region, write_transfer};
 use semfm::{FeatureSource, Mesh, PipelineSettings, Region, Task, Verdict, prepare, transfer};
 
 /// An object as it is given.

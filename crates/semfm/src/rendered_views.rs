@@ -114,7 +114,9 @@ pub fn write_rendered_views(
     };
     let own = &file.appearance.vertex_colors;
     let vertex_colors: Option<Vec<[u8; 3]>> = match (coloring, own) {
-        (Coloring::Own, Some(colors)) => Some(colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect()),
+        (Coloring::Own, Some(colors)) => {
+            Some(colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect())
+        }
         _ => None,
     };
     write_views(path, &views, &file.mesh, vertex_colors.as_deref(), &metadata)?;

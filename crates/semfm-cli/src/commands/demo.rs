@@ -98,16 +98,17 @@ impl DemoCommand {
         let object = make_object(self.category, instance, &settings)?;
         if !common.quiet && !common.json {
             let (n, category) = (object.mesh.n_vertices(), self.category);
-            console::data(format_args!(
-                "made        a {} ({category}, {n} vertices)",
-                object.kind
-            ));
+            console::data(format_args!("made        a {} ({category}, {n} vertices)", object.kind));
         }
         Ok(write_object(&self.output, &object, self.level, task)?)
     }
 }
 
-fn prepare_files(files: &ObjectFiles, settings: &PipelineSettings, task: &Task) -> Result<Prepared> {
+fn prepare_files(
+    files: &ObjectFiles,
+    settings: &PipelineSettings,
+    task: &Task,
+) -> Result<Prepared> {
     let mesh = read_mesh(&files.mesh)?.mesh;
     let embeddings = read_embeddings(&files.embeddings, &mesh)?;
     Ok(prepare(mesh, FeatureSource::Views(&embeddings.views), settings, task)?)

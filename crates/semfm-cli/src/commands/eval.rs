@@ -264,7 +264,12 @@ impl std::str::FromStr for Seeds {
     }
 }
 
-fn print_results(results: &Results, comparison: Option<&Comparison>, files: &[PathBuf], common: &Common) {
+fn print_results(
+    results: &Results,
+    comparison: Option<&Comparison>,
+    files: &[PathBuf],
+    common: &Common,
+) {
     if common.json {
         console::data(json!({
             "n_rows": results.rows.len(),

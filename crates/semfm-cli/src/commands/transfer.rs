@@ -127,10 +127,8 @@ impl MatchingOptions {
 
 /// The methods with what each does.
 fn method_help() -> String {
-    let methods: Vec<String> = Method::ALL
-        .iter()
-        .map(|method| format!("{method}: {}", method.info().summary))
-        .collect();
+    let methods: Vec<String> =
+        Method::ALL.iter().map(|method| format!("{method}: {}", method.info().summary)).collect();
     methods.join("; ")
 }
 

@@ -8,8 +8,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::{MeshFormat, read_mesh};
 use semfm::files::read_region;
+use semfm::geom::io::{MeshFormat, read_mesh};
 use serde::Deserialize;
 use serde_json::json;
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::{FormatError, MeshFormat, read_json};
 use semfm::files::{GRASPS_FORMAT, REGION_FORMAT};
+use semfm::geom::io::{FormatError, MeshFormat, read_json};
 use semfm::{Region, Task};
 use serde_json::Value;
 

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use semfm::files::{
-    HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile,
-};
+use semfm::files::{HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile};
 use semfm::geom::MeshHash;
 use semfm::geom::io::{FormatError, read_mesh};
 use semfm::weight_colors::{MARKED, PLAIN, color_bytes};

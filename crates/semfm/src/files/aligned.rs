@@ -148,9 +148,7 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<AlignedPose> {
         return Err(FormatError::new(path, "format", FORMAT, format).into());
     }
     if let (Some(identity), Some(mesh)) = (&file.mesh, mesh) {
-        identity
-            .check(mesh)
-            .map_err(|error| error.in_file(path))?;
+        identity.check(mesh).map_err(|error| error.in_file(path))?;
     }
     let camera_from_object = similarity(path, "camera_from_object", file.camera_from_object)?;
     let scale = camera_from_object.scale;

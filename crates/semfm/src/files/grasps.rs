@@ -193,9 +193,7 @@ impl GraspsFile {
     /// [`Error::Format`](crate::Error::Format) for another mesh or a scale that is not positive.
     pub fn read(path: &Path, mesh: &Mesh) -> Result<Self> {
         let file: Self = read_json(path)?;
-        file.mesh
-            .check(mesh)
-            .map_err(|error| error.in_file(path))?;
+        file.mesh.check(mesh).map_err(|error| error.in_file(path))?;
         if !(file.object_scale > 0.0 && file.object_scale.is_finite()) {
             let found = file.object_scale.to_string();
             return Err(FormatError::new(path, "object_scale", "a positive number", found).into());

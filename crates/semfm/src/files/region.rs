@@ -75,9 +75,7 @@ impl RegionFile {
     /// the mesh, weights that are missing or out of range, a region in which no vertex counts.
     pub fn region(&self, path: &Path, mesh: &Mesh) -> Result<Region> {
         if let Some(identity) = &self.mesh {
-            identity
-                .check(mesh)
-                .map_err(|error| error.in_file(path))?;
+            identity.check(mesh).map_err(|error| error.in_file(path))?;
         }
         let n = mesh.n_vertices();
         if self.vertices.is_empty() {

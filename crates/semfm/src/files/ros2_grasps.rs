@@ -15,9 +15,8 @@ use crate::grasp_result::{GraspResult, position_and_rotation};
 /// [`semfm_views::Error::Io`] where the file cannot be written.
 pub fn write_ros2_grasps(path: &Path, result: &GraspResult<'_>) -> Result<()> {
     let grasps = result.found.grasps.iter();
-    let poses: Vec<_> = grasps
-        .map(|grasp| position_and_rotation(result.in_frame(grasp.object_from_tcp)))
-        .collect();
+    let poses: Vec<_> =
+        grasps.map(|grasp| position_and_rotation(result.in_frame(grasp.object_from_tcp))).collect();
     let metadata = GraspsFile::new(result).to_json();
     Ok(write_pose_array(path, result.frame().name(), &poses, FORMAT, &metadata)?)
 }
