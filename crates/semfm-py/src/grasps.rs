@@ -1,4 +1,4 @@
-//! `Grasps`: ranked, collision-free hand poses in a region.
+//! `Grasps`: ranked, collision-free gripper poses in a region.
 
 use std::f64::consts::FRAC_PI_4;
 use std::path::PathBuf;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use semfm::GraspResult;
 use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
 use semfm::geom::math::{DMat4, DVec3};
-use semfm::grasp::{self, ApproachCone, GraspObject, GraspSettings, Pose, Scene};
+use semfm::grasp::{self, ApproachCone, GraspSettings, Pose};
+use semfm::{GraspRequest, GraspResult, Obstacle, Table};
 
 use crate::arrays_in::{self, Axis};
 use crate::grasp_pickle::PickledGrasps;
@@ -29,7 +29,7 @@ pub struct Grasp {
 
 #[pymethods]
 impl Grasp {
-    /// (4, 4) float64 array: the hand's TCP frame in the object's frame.
+    /// (4, 4) float64 array: the gripper's TCP frame in the object's frame.
     #[getter]
     fn object_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         matrix(py, self.grasp.object_from_tcp)
@@ -103,7 +103,7 @@ pub struct Grasps {
 }
 
 impl Grasps {
-    /// Runs `write` with all that gives the grasps meaning, away from the interpreter.
+    /// Runs `write` with all that a file of grasps tells, away from the interpreter.
     fn with_answer<T: Send + 'static>(
         &self,
         py: Python<'_>,
@@ -134,7 +134,7 @@ impl Grasps {
             .ok_or_else(|| errors::index_out_of_range(py, &format!("grasp {index} of {n}")))
     }
 
-    /// (g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres.
+    /// (g, 4, 4) float64 array: the gripper's TCP frames in the object's frame, metres.
     #[getter]
     fn object_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         stack(py, self.found.grasps.iter().map(|grasp| grasp.object_from_tcp))
@@ -161,13 +161,13 @@ impl Grasps {
         arrays_out::owned(py, self.found.grasps.iter().map(|grasp| grasp.width).collect())
     }
 
-    /// Gripper: the hand.
+    /// Gripper: the gripper.
     #[getter]
     fn gripper(&self, py: Python<'_>) -> Py<Gripper> {
         self.gripper.clone_ref(py)
     }
 
-    /// int: hand poses examined.
+    /// int: gripper poses examined.
     #[getter]
     fn n_candidates(&self) -> usize {
         self.found.n_candidates
@@ -275,7 +275,7 @@ pub fn _restore_grasps(
 
 /// Parallel-jaw grasps whose pads close inside a region.
 ///
-/// Every grasp that comes back was checked: the open hand on its way in and where it closes meets
+/// Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
 /// neither object nor scene, the contacts are in force closure, and the pads lie in the region.
 /// Nothing found is an answer: see `Grasps.rejected` and `Grasps.nearest_miss`.
 ///
@@ -286,7 +286,7 @@ pub fn _restore_grasps(
 /// region : Region
 ///     Where the pads shall close; of the mesh.
 /// gripper : Gripper or path
-///     A hand, or what `Gripper` takes.
+///     A gripper, or what `Gripper` takes.
 /// scale : float
 ///     Metres per unit of the mesh; 1 for a mesh in metres.
 /// camera_from_object : (4, 4) array_like, optional
@@ -295,7 +295,7 @@ pub fn _restore_grasps(
 /// table : object, optional
 ///     A table top as a pair: a point of it, and its normal, away from the table.
 /// scene_meshes : list of mesh_like, optional
-///     What the hand must not touch, metres.
+///     What the gripper must not touch, metres.
 /// scene_points : (p, 3) array_like, optional
 ///     Points that it must keep `scene_margin` away from, metres.
 /// scene_margin : float, optional
@@ -314,7 +314,7 @@ pub fn _restore_grasps(
 /// demonstrated_approach : (3,) array_like, optional
 ///     The direction in which the demonstrator's hand came; agreement raises the score.
 /// clearance : float, optional
-///     Least distance of the open hand to everything, metres.
+///     Least distance of the open gripper to everything, metres.
 /// pad_in_region : float, optional
 ///     Share of each pad's contact that must lie in the region.
 /// seed : int, optional
@@ -367,52 +367,42 @@ pub fn find_grasps(
         Ok(gripper) => gripper.clone().unbind(),
         Err(_) => py.get_type::<Gripper>().call1((gripper,))?.cast_into::<Gripper>()?.unbind(),
     };
-    let camera_from_object = camera_from_object.map(|pose| rigid(pose)).transpose()?;
-    let object_from_answer = camera_from_object.map_or(Pose::IDENTITY, |pose| pose.inverse());
-    let direction = |value: Option<&Bound<'_, PyAny>>, name: &str| -> PyResult<Option<DVec3>> {
-        let vector = value.map(|value| arrays_in::point(value, name)).transpose()?;
-        Ok(vector.map(|vector| object_from_answer.rotation * vector))
-    };
-    let mut settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
-    settings.demonstrated_approach = direction(demonstrated_approach, "demonstrated_approach")?;
-    settings.limits.approach = direction(approach, "approach")?
+    let mut request = GraspRequest::new(scale);
+    request.camera_from_object = camera_from_object.map(rigid).transpose()?;
+    let settings = &mut request.settings;
+    *settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
+    settings.demonstrated_approach = vector(demonstrated_approach, "demonstrated_approach")?;
+    settings.limits.approach = vector(approach, "approach")?
         .map(|axis| ApproachCone { axis, half_angle: approach_cone.unwrap_or(FRAC_PI_4) });
     settings.limits.width = width_range.map(|(least, most)| least..=most);
     settings.limits.clearance = clearance;
     settings.limits.pad_in_region = pad_in_region;
-    let table = match &table {
-        Some((point, normal)) => {
-            let normal = direction(Some(normal), "normal of the table")?.unwrap_or_default();
-            Some((object_from_answer * arrays_in::point(point, "point of the table")?, normal))
-        }
-        None => None,
-    };
-    let mut meshes = Vec::new();
-    for item in scene_meshes.into_iter().flatten() {
-        meshes.push(from_any(&item, "scene_meshes")?);
+    if let Some((point, normal)) = &table {
+        let normal = arrays_in::point(normal, "normal of the table")?;
+        let point = arrays_in::point(point, "point of the table")?;
+        request.table = Some(Table { point, normal });
     }
-    let points = match scene_points {
-        Some(points) => arrays_in::points(points, "scene_points")?,
-        None => Vec::new(),
-    };
+    request.point_margin = scene_margin;
+    for item in scene_meshes.into_iter().flatten() {
+        let obstacle = from_any(&item, "scene_meshes")?;
+        request.obstacles.push(Obstacle::Mesh((*obstacle).clone()));
+    }
+    let points =
+        scene_points.map(|points| arrays_in::points(points, "scene_points")).transpose()?;
+    request.obstacles.push(Obstacle::Points(points.unwrap_or_default()));
+    let camera_from_object = request.camera_from_object;
     let (weights, object) = (region.get().inner.clone(), mesh.clone());
-    let hand = gripper.get().inner.clone();
+    let fingers = gripper.get().inner.clone();
     let found = run(py, progress, move |task| {
-        let placed = |p: &DVec3| object_from_answer * *p;
-        let mut scene = Scene::new();
-        if let Some((point, normal)) = table {
-            scene = scene.with_table(point, normal)?;
-        }
-        for mesh in &meshes {
-            let vertices = mesh.vertices().iter().map(placed).collect();
-            scene = scene.with_mesh(&semfm::Mesh::new(vertices, mesh.faces().to_vec())?);
-        }
-        let points: Vec<DVec3> = points.iter().map(placed).collect();
-        scene = scene.with_cloud(&points, scene_margin)?;
-        let object = GraspObject::from_mesh(&object, scale)?;
-        Ok(grasp::find_grasps(&object, weights.weights(), &hand, &scene, &settings, task)?)
+        let problem = request.prepare(Arc::new((*object).clone()), (*fingers).clone())?;
+        problem.find(weights.weights(), task)
     })?;
     Ok(Grasps { found: Arc::new(found), mesh, gripper, scale, camera_from_object })
+}
+
+/// A vector (3), where there is one.
+fn vector(value: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<Option<DVec3>> {
+    value.map(|value| arrays_in::point(value, name)).transpose()
 }
 
 /// A rigid motion from a homogeneous matrix.

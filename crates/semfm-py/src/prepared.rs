@@ -1,4 +1,4 @@
-//! `PreparedObject`: shape and meaning of one object, made once.
+//! `PreparedObject`: shape and semantic cloud of one object, made once.
 
 use std::sync::Arc;
 
@@ -128,14 +128,14 @@ pub fn _restore_prepared(
 }
 
 /// Where an object's features come from, owned.
-pub enum OwnedMeaning {
+pub enum OwnedFeatures {
     Views(Arc<EmbeddingsFile>),
     PerVertex(Vec<f32>),
     Cloud(Arc<Cloud>),
 }
 
-impl OwnedMeaning {
-    /// The one meaning that was given, of three arguments whose names begin with `side`.
+impl OwnedFeatures {
+    /// The one source of features that was given, of three arguments whose names begin with `side`.
     pub fn of(
         py: Python<'_>,
         side: &str,
@@ -181,7 +181,7 @@ impl OwnedMeaning {
         let source = match self {
             Self::Views(file) => FeatureSource::Views(&file.views),
             Self::PerVertex(features) => FeatureSource::PerVertex(features),
-            Self::Cloud(cloud) => FeatureSource::Cloud(Arc::new((**cloud).clone())),
+            Self::Cloud(cloud) => FeatureSource::Cloud(Arc::clone(cloud)),
         };
         let prepared = semfm::prepare(mesh.clone(), source, settings, task)?;
         Ok(PreparedObject::new(prepared))
@@ -264,6 +264,6 @@ pub fn prepare(
     }
     let mesh = from_any(mesh, "mesh")?;
     check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-    let meaning = OwnedMeaning::of(py, "", &mesh, features, embeddings, cloud)?;
-    run(py, progress, move |task| meaning.prepare(&mesh, &settings, task))
+    let features = OwnedFeatures::of(py, "", &mesh, features, embeddings, cloud)?;
+    run(py, progress, move |task| features.prepare(&mesh, &settings, task))
 }

@@ -8,7 +8,7 @@ use crate::errors;
 use crate::interruptible::run;
 use crate::matching::Matching;
 use crate::mesh::from_any;
-use crate::prepared::{OwnedMeaning, PreparedObject};
+use crate::prepared::{OwnedFeatures, PreparedObject};
 use crate::region::region_of;
 use crate::settings::{Options, TransferSettings};
 use crate::shape::check_shape_size;
@@ -18,7 +18,7 @@ use crate::transfer::Transfer;
 /// One of the two objects, prepared or to be prepared.
 enum Side {
     Ready(PreparedObject),
-    Raw(Shared<semfm::Mesh>, OwnedMeaning),
+    Raw(Shared<semfm::Mesh>, OwnedFeatures),
 }
 
 impl Side {
@@ -41,9 +41,9 @@ impl Side {
         }
         let mesh = from_any(value, name)?;
         check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-        let meaning =
-            OwnedMeaning::of(py, &format!("{name}_"), &mesh, features, embeddings, cloud)?;
-        Ok(Self::Raw(mesh, meaning))
+        let features =
+            OwnedFeatures::of(py, &format!("{name}_"), &mesh, features, embeddings, cloud)?;
+        Ok(Self::Raw(mesh, features))
     }
 
     fn mesh(&self) -> Shared<semfm::Mesh> {
@@ -60,7 +60,7 @@ impl Side {
     ) -> semfm::Result<PreparedObject> {
         match self {
             Self::Ready(object) => Ok(object),
-            Self::Raw(mesh, meaning) => meaning.prepare(&mesh, settings, task),
+            Self::Raw(mesh, features) => features.prepare(&mesh, settings, task),
         }
     }
 }
