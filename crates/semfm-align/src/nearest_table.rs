@@ -135,7 +135,7 @@ impl NearestTable {
 
 /// Whether a normal leans towards direction `way` of +x, −x, +y, −y, +z, −z.
 fn leans(normal: DVec3, way: usize, both_sides: bool) -> bool {
-    let sign = if way % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if way.is_multiple_of(2) { 1.0 } else { -1.0 };
     let cosine = sign * normal[way / 2];
     if both_sides { cosine.abs() >= LEAN } else { cosine >= LEAN }
 }

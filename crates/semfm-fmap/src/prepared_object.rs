@@ -71,11 +71,14 @@ struct Derived {
     point_of_original_vertex: OnceLock<Vec<u32>>,
 }
 
+/// Clusters and the settings that they were cut by.
+type KeptClusters = (ClusterSettings, Arc<Clusters>);
+
 /// Where an object's clusters come from.
 #[derive(Clone, Debug)]
 enum ClusterSource {
     /// Cut from the cloud's features; one entry for each of the settings that were asked for.
-    Spectral(Arc<Mutex<Vec<(ClusterSettings, Arc<Clusters>)>>>),
+    Spectral(Arc<Mutex<Vec<KeptClusters>>>),
     /// Labels that the caller gave.
     Given(Arc<Clusters>),
 }

@@ -130,7 +130,7 @@ impl Shape {
         };
         task.step("working mesh", 0, 3)?;
         let PreparedWorkingMesh { working, cleaning, simplification } =
-            WorkingMesh::new(&original, &settings.cleaning, &simplification, task)?;
+            WorkingMesh::prepare(&original, &settings.cleaning, &simplification, task)?;
         let (k, clipped) = number_of_pairs(settings, working.mesh.n_vertices())?;
         let mut stages_ms = ShapeTimes { working_mesh: clock.lap(), ..ShapeTimes::default() };
 

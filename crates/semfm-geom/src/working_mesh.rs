@@ -81,7 +81,7 @@ impl WorkingMesh {
     ///
     /// # Errors
     /// [`NoArea`](crate::Error::NoArea), [`Cancelled`](crate::Error::Cancelled).
-    pub fn new(
+    pub fn prepare(
         original: &Mesh,
         cleaning: &CleanSettings,
         simplification: &SimplifySettings,
@@ -161,7 +161,7 @@ mod tests {
 
     fn working(mesh: &Mesh, target_vertices: usize) -> WorkingMesh {
         let simplification = SimplifySettings { target_vertices, most_distance: 0.2 };
-        WorkingMesh::new(mesh, &CleanSettings::default(), &simplification, &Task::default())
+        WorkingMesh::prepare(mesh, &CleanSettings::default(), &simplification, &Task::default())
             .unwrap()
             .working
     }

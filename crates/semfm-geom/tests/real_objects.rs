@@ -40,7 +40,7 @@ fn working(name: &str, mesh: &Mesh, target_vertices: usize) -> (WorkingMesh, Sim
     let settings = SimplifySettings { target_vertices, ..SimplifySettings::default() };
     let start = Instant::now();
     let PreparedWorkingMesh { working, cleaning, simplification } =
-        WorkingMesh::new(mesh, &CleanSettings::default(), &settings, &Task::default()).unwrap();
+        WorkingMesh::prepare(mesh, &CleanSettings::default(), &settings, &Task::default()).unwrap();
     let report = simplification.expect("these objects are larger than the target");
     eprintln!(
         "{name}: {cleaning}; simplified to {} vertices within {:.4} of the diagonal in {} ms, \

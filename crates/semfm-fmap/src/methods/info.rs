@@ -29,8 +29,10 @@ pub struct MethodInfo {
     /// What it finds out about a pair.
     pub(crate) matched: fn(&Pair, &TransferSettings, &mut Stages, &Task) -> Result<Matched>,
     /// Vote on the target's working vertices for a region on the source's (`inside`, n_source).
-    pub(crate) votes: fn(&Pair, &TransferSettings, &Matched, &[bool]) -> Result<Vec<f64>>,
+    pub(crate) votes: VoteFunction,
 }
+
+type VoteFunction = fn(&Pair, &TransferSettings, &Matched, &[bool]) -> Result<Vec<f64>>;
 
 /// How the embeddings of views become the features that a method reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -82,7 +82,7 @@ impl Appearance {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"semfm.appearance/1\n");
         let colors = self.vertex_colors.as_deref().unwrap_or_default();
-        hash_array(&mut hasher, colors.as_flattened().iter().copied().collect());
+        hash_array(&mut hasher, colors.as_flattened().to_vec());
         let uvs = self.corner_uvs.as_deref().unwrap_or_default().as_flattened().as_flattened();
         hash_array(&mut hasher, uvs.iter().flat_map(|x| x.to_le_bytes()).collect());
         let material_of = self.material_of.as_deref().unwrap_or_default();

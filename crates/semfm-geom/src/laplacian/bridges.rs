@@ -117,10 +117,9 @@ fn links(mesh: &Mesh, labels: Vec<u32>, reach: f64) -> Vec<[u32; 2]> {
         // far as the limit lets most vertices stop at the root.
         index.relabel(&groups.labels);
         let mut best = vec![Link::limit(f64::INFINITY); groups.n_labels];
-        for i in 0..points.len() {
-            let label = groups.labels[i];
+        for ((i, &point), &label) in (0u32..).zip(points).zip(&groups.labels) {
             let best = &mut best[label as usize];
-            *best = index.nearest(i as u32, points[i], label, *best);
+            *best = index.nearest(i, point, label, *best);
         }
         chosen = best.into_iter().filter(Link::is_found).collect();
         bridges.extend(&chosen);

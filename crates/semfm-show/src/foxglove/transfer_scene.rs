@@ -78,7 +78,7 @@ pub(crate) fn write_transfer_scene(
     scene.labels.extend(anchor_labels(figure));
     scene.links = matches(figure, &target.places);
     scene.log = Some(log(figure));
-    Ok(scene.write(path, "semfm.transfer/1", report)?)
+    scene.write(path, "semfm.transfer/1", report)
 }
 
 /// One object as the scene wants it.
