@@ -1,6 +1,6 @@
 //! The mesh zoo: small meshes, each with one kind of trouble, for tests that must hold on all.
 //!
-//! Every animal is made by a formula, so a test elsewhere (or in another language) can rebuild it.
+//! Every mesh is made by a formula, so a test elsewhere (or in another language) can rebuild it.
 //! Compiled for this crate's own tests, and for others under the feature `zoo`.
 
 use std::collections::HashMap;
@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use crate::Mesh;
 use crate::math::DVec3;
 
-/// Every animal with its name, in a fixed order.
+/// Every mesh with its name, in a fixed order.
 pub fn all() -> Vec<(&'static str, Mesh)> {
     vec![
         ("tetrahedron", tetrahedron()),

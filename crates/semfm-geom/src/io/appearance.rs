@@ -34,7 +34,7 @@ pub struct Material {
     pub texture: Option<Texture>,
 }
 
-/// The colour of a surface about which the file says nothing: a light grey that leaves room for
+/// The colour of a surface about which the file says nothing: a light grey that allows for
 /// both highlights and shadows.
 pub const DEFAULT_COLOR: [u8; 4] = [200, 200, 200, 255];
 
