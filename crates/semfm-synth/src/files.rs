@@ -89,7 +89,7 @@ fn metadata(object: &SynthObject, level: Level) -> EmbeddingsMetadata {
             mesh: MeshIdentity::of(&object.mesh),
             width: rig.size,
             height: rig.size,
-            rig: format!("{rig:?}"),
+            rig: rig.to_string(),
             background: "white".into(),
             seed: object.seed,
             more: BTreeMap::new(),
