@@ -102,14 +102,7 @@ class Anchors:
         """(a,) float64 array: cosine of the two mean features of each pair."""
         ...
     @staticmethod
-    def select(
-        source_cloud: SemanticCloud,
-        source_clusters: Clusters,
-        target_cloud: SemanticCloud,
-        target_clusters: Clusters,
-        *,
-        alpha: int = 2,
-    ) -> Anchors:
+    def select(source_cloud: SemanticCloud, source_clusters: Clusters, target_cloud: SemanticCloud, target_clusters: Clusters, *, alpha: int = 2) -> Anchors:
         """The one-to-one pairs of clusters with the largest total cosine between mean features.
 
         Parameters
@@ -154,9 +147,7 @@ class DemoObject:
 
     Made by `demo_object`.
     """
-    def embeddings(
-        self, level: str = "medium", *, progress: Optional[_Progress] = None
-    ) -> Embeddings:
+    def embeddings(self, level: str = 'medium', *, progress: Optional[_Progress] = None) -> Embeddings:
         """Simulated patch embeddings of the default views.
 
         Parameters
@@ -211,9 +202,7 @@ class DemoObject:
         (n, 21) float32 array
         """
         ...
-    def write(
-        self, folder: _Path, level: str = "medium", *, progress: Optional[_Progress] = None
-    ) -> dict[str, Any]:
+    def write(self, folder: _Path, level: str = 'medium', *, progress: Optional[_Progress] = None) -> dict[str, Any]:
         """Writes ``NAME.obj``, ``NAME.json`` (the truth) and ``NAME.emb.mcap`` into a folder.
 
         Parameters
@@ -250,13 +239,7 @@ class Eigenbasis:
     eigenbasis : computes one from a Laplacian.
     Shape.basis : the one of a prepared mesh.
     """
-    def __init__(
-        self,
-        values: ArrayLike,
-        functions: ArrayLike,
-        mass: ArrayLike,
-        residuals: Optional[ArrayLike] = None,
-    ) -> None: ...
+    def __init__(self, values: ArrayLike, functions: ArrayLike, mass: ArrayLike, residuals: Optional[ArrayLike] = None) -> None: ...
     def diffuse(self, functions: ArrayLike, t: float) -> NDArray[numpy.float64]:
         """Heat diffusion exp(−tΔ)F on the truncated basis.
 
@@ -375,14 +358,7 @@ class Embeddings:
     encoder : str, default "unnamed"
         Name of the encoder, for the file.
     """
-    def __init__(
-        self,
-        mesh: _MeshLike,
-        cameras: Iterable[Pinhole],
-        patches: Iterable[PatchEmbeddings],
-        *,
-        encoder: str = "unnamed",
-    ) -> None: ...
+    def __init__(self, mesh: _MeshLike, cameras: Iterable[Pinhole], patches: Iterable[PatchEmbeddings], *, encoder: str = 'unnamed') -> None: ...
     def __len__(self) -> int: ...
     @property
     def cameras(self) -> list[Pinhole]:
@@ -409,17 +385,7 @@ class Embeddings:
         """int: number of views."""
         ...
     @staticmethod
-    def of_views(
-        views: ViewsFile,
-        patches: Iterable[PatchEmbeddings],
-        *,
-        encoder: str,
-        revision: str = "unknown",
-        preprocessing: str = "unknown",
-        rolls: int = 1,
-        outliers: str = "unknown",
-        more: Optional[Mapping[str, Any]] = None,
-    ) -> Embeddings:
+    def of_views(views: ViewsFile, patches: Iterable[PatchEmbeddings], *, encoder: str, revision: str = 'unknown', preprocessing: str = 'unknown', rolls: int = 1, outliers: str = 'unknown', more: Optional[Mapping[str, Any]] = None) -> Embeddings:
         """What an encoder made of the views of a file; `semfm-embed` calls this.
 
         Parameters
@@ -467,7 +433,7 @@ class Embeddings:
     def simulated(self) -> bool:
         """bool: True where the embeddings were made up, without a network."""
         ...
-    def write(self, path: _Path, *, dtype: str = "f16") -> None:
+    def write(self, path: _Path, *, dtype: str = 'f16') -> None:
         """Writes a ``NAME.emb.mcap``, whole or not at all.
 
         Parameters
@@ -505,22 +471,7 @@ class FunctionalMap:
         """
         ...
     @staticmethod
-    def fit(
-        source: Eigenbasis,
-        target: Eigenbasis,
-        source_descriptors: ArrayLike,
-        target_descriptors: ArrayLike,
-        *,
-        k: Optional[int] = None,
-        laplacian: float = 0.0,
-        descriptors: float = 0.0,
-        orientation: float = 0.0,
-        reversing: bool = False,
-        source_mesh: Optional[_MeshLike] = None,
-        target_mesh: Optional[_MeshLike] = None,
-        coefficients: bool = False,
-        progress: Optional[_Progress] = None,
-    ) -> FunctionalMap:
+    def fit(source: Eigenbasis, target: Eigenbasis, source_descriptors: ArrayLike, target_descriptors: ArrayLike, *, k: Optional[int] = None, laplacian: float = 0.0, descriptors: float = 0.0, orientation: float = 0.0, reversing: bool = False, source_mesh: Optional[_MeshLike] = None, target_mesh: Optional[_MeshLike] = None, coefficients: bool = False, progress: Optional[_Progress] = None) -> FunctionalMap:
         """The map of least ``‖C A − B‖²`` for descriptors A of the source and B of the target.
 
         Without regularisers and with fewer descriptors than eigenfunctions the minimum-norm one.
@@ -582,9 +533,7 @@ class FunctionalMap:
         """
         ...
     @staticmethod
-    def from_point_map(
-        map: PointMap, source: Eigenbasis, target: Eigenbasis, *, k: Optional[int] = None
-    ) -> FunctionalMap:
+    def from_point_map(map: PointMap, source: Eigenbasis, target: Eigenbasis, *, k: Optional[int] = None) -> FunctionalMap:
         """C f = f ∘ T in the two bases: ``Φ_targetᵀ M_target Φ_source[T]``.
 
         Parameters
@@ -629,16 +578,7 @@ class FunctionalMap:
         path : path
         """
         ...
-    def to_point_map(
-        self,
-        source: Eigenbasis,
-        target: Eigenbasis,
-        *,
-        adjoint: bool = False,
-        source_features: Optional[ArrayLike] = None,
-        target_features: Optional[ArrayLike] = None,
-        feature_weight: float = 0.0,
-    ) -> PointMap:
+    def to_point_map(self, source: Eigenbasis, target: Eigenbasis, *, adjoint: bool = False, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0) -> PointMap:
         """The point map target → source: each target vertex takes the source vertex whose delta
         function, sent through C, comes nearest to its own.
 
@@ -659,19 +599,7 @@ class FunctionalMap:
         PointMap
         """
         ...
-    def zoomout(
-        self,
-        source: Eigenbasis,
-        target: Eigenbasis,
-        *,
-        k_final: int = 50,
-        step: int = 5,
-        source_features: Optional[ArrayLike] = None,
-        target_features: Optional[ArrayLike] = None,
-        feature_weight: float = 0.0,
-        target_samples: Optional[ArrayLike] = None,
-        progress: Optional[_Progress] = None,
-    ) -> FunctionalMap:
+    def zoomout(self, source: Eigenbasis, target: Eigenbasis, *, k_final: int = 50, step: int = 5, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0, target_samples: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> FunctionalMap:
         """ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
 
         Parameters
@@ -713,7 +641,7 @@ class Grasp:
         ...
     @property
     def object_from_tcp(self) -> NDArray[numpy.float64]:
-        """(4, 4) float64 array: the hand's TCP frame in the object's frame."""
+        """(4, 4) float64 array: the gripper's TCP frame in the object's frame."""
         ...
     @property
     def opening(self) -> float:
@@ -744,11 +672,11 @@ class Grasps:
         ...
     @property
     def gripper(self) -> Gripper:
-        """Gripper: the hand."""
+        """Gripper: the gripper."""
         ...
     @property
     def n_candidates(self) -> int:
-        """int: hand poses examined."""
+        """int: gripper poses examined."""
         ...
     @property
     def nearest_miss(self) -> Optional[Any]:
@@ -758,7 +686,7 @@ class Grasps:
         ...
     @property
     def object_from_tcp(self) -> NDArray[numpy.float64]:
-        """(g, 4, 4) float64 array: the hand's TCP frames in the object's frame, metres."""
+        """(g, 4, 4) float64 array: the gripper's TCP frames in the object's frame, metres."""
         ...
     @property
     def rejected(self) -> dict[str, Any]:
@@ -780,7 +708,7 @@ class Grasps:
     def widths(self) -> NDArray[numpy.float64]:
         """(g,) float64 array: distances between the closed pads, metres."""
         ...
-    def write(self, path: _Path, *, format: Optional[str] = "json") -> None:
+    def write(self, path: _Path, *, format: Optional[str] = 'json') -> None:
         """Writes the grasps, whole or not at all.
 
         Parameters
@@ -885,7 +813,7 @@ class HeatGeodesics:
     >>> float(distances[0]), round(float(distances.max()), 1)  # half a great circle
     (0.0, 3.1)
     """
-    def __init__(self, mesh: _MeshLike, *, kind: str = "tufted", time: float = 1.0) -> None: ...
+    def __init__(self, mesh: _MeshLike, *, kind: str = 'tufted', time: float = 1.0) -> None: ...
     def distances(self, sources: Union[int, ArrayLike]) -> NDArray[numpy.float64]:
         """Distance of every vertex from the nearest source.
 
@@ -1001,17 +929,7 @@ class Matching:
     >>> matching.transfer(mug.region).verdict in ("accept", "check", "refuse")
     True
     """
-    def __init__(
-        self,
-        source: PreparedObject,
-        target: PreparedObject,
-        *,
-        method: Optional[str] = None,
-        rule: Optional[str] = None,
-        seed: Optional[int] = None,
-        settings: Optional[TransferSettings] = None,
-        progress: Optional[_Progress] = None,
-    ) -> None: ...
+    def __init__(self, source: PreparedObject, target: PreparedObject, *, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, second_opinion: Optional[bool] = None, settings: Optional[TransferSettings] = None, progress: Optional[_Progress] = None) -> None: ...
     @property
     def anchors(self) -> Anchors:
         """Anchors: the paired parts of the two objects."""
@@ -1232,14 +1150,7 @@ class PatchEmbeddings:
     valid : (rows, cols) array_like, optional
         False where the patch is to be ignored (bool).
     """
-    def __init__(
-        self,
-        data: ArrayLike,
-        rect: ArrayLike,
-        *,
-        coverage: Optional[ArrayLike] = None,
-        valid: Optional[ArrayLike] = None,
-    ) -> None: ...
+    def __init__(self, data: ArrayLike, rect: ArrayLike, *, coverage: Optional[ArrayLike] = None, valid: Optional[ArrayLike] = None) -> None: ...
     @property
     def coverage(self) -> NDArray[numpy.uint8]:
         """(rows, cols) uint8 array: share of each patch covered by the object, a read-only view."""
@@ -1328,15 +1239,7 @@ class Pinhole:
         """int: pixels."""
         ...
     @staticmethod
-    def with_pixel_centres_at_half(
-        width: int,
-        height: int,
-        fx: float,
-        fy: float,
-        cx: float,
-        cy: float,
-        camera_from_world: ArrayLike,
-    ) -> Pinhole:
+    def with_pixel_centres_at_half(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
         """A camera whose numbers count as ours do: the centre of pixel (0, 0) is at (½, ½).
 
         Parameters
@@ -1362,15 +1265,7 @@ class Pinhole:
         """
         ...
     @staticmethod
-    def with_pixel_centres_at_integers(
-        width: int,
-        height: int,
-        fx: float,
-        fy: float,
-        cx: float,
-        cy: float,
-        camera_from_world: ArrayLike,
-    ) -> Pinhole:
+    def with_pixel_centres_at_integers(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
         """A camera whose numbers come from a calibration (OpenCV, ROS `CameraInfo`), in which the centre
         of pixel (0, 0) is at (0, 0): half a pixel is added to its principal point.
 
@@ -1695,9 +1590,7 @@ class SemanticCloud:
     >>> cloud
     SemanticCloud(2 points, dim 3)
     """
-    def __init__(
-        self, points: ArrayLike, features: ArrayLike, n_views: Optional[ArrayLike] = None
-    ) -> None: ...
+    def __init__(self, points: ArrayLike, features: ArrayLike, n_views: Optional[ArrayLike] = None) -> None: ...
     def __len__(self) -> int: ...
     @property
     def dim(self) -> int:
@@ -1756,20 +1649,7 @@ class Shape:
     >>> shape.basis.functions.shape
     (800, 20)
     """
-    def __init__(
-        self,
-        mesh: _MeshLike,
-        *,
-        k: int = 60,
-        clip_k: bool = True,
-        working_vertices: int = 10000,
-        dust_share: float = 1e-06,
-        laplacian: str = "tufted",
-        bridges: bool = True,
-        tolerance: float = 1e-08,
-        cache: Optional[_Cache] = None,
-        progress: Optional[_Progress] = None,
-    ) -> None: ...
+    def __init__(self, mesh: _MeshLike, *, k: int = 60, clip_k: bool = True, working_vertices: int = 10000, dust_share: float = 1e-06, laplacian: str = 'tufted', bridges: bool = True, tolerance: float = 1e-08, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> None: ...
     @property
     def basis(self) -> Eigenbasis:
         """Eigenbasis: that of the working mesh at area 1 (n_working × k)."""
@@ -1860,14 +1740,7 @@ class SurfaceIndex:
     (3.0, [[0.5, 0.25, 0.25]])
     """
     def __init__(self, mesh: _MeshLike) -> None: ...
-    def closest(
-        self, queries: ArrayLike
-    ) -> tuple[
-        NDArray[numpy.float64],
-        NDArray[numpy.float64],
-        NDArray[numpy.uint32],
-        NDArray[numpy.float64],
-    ]:
+    def closest(self, queries: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32], NDArray[numpy.float64]]:
         """The point of the surface nearest to each query.
 
         Parameters
@@ -1882,9 +1755,7 @@ class SurfaceIndex:
         barycentric : (q, 3) float64 array
         """
         ...
-    def first_hit(
-        self, origins: ArrayLike, directions: ArrayLike
-    ) -> tuple[NDArray[numpy.float64], NDArray[numpy.int32]]:
+    def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[numpy.float64], NDArray[numpy.int32]]:
         """The first triangle that each ray meets.
 
         Parameters
@@ -1959,13 +1830,7 @@ class Transfer:
     def weights(self) -> NDArray[numpy.float64]:
         """(n_target,) float64 array: weight of each target vertex, a read-only view."""
         ...
-    def write(
-        self,
-        folder: _Path,
-        *,
-        about: Optional[Mapping[str, Any]] = None,
-        progress: Optional[_Progress] = None,
-    ) -> list[str]:
+    def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, progress: Optional[_Progress] = None) -> list[str]:
         """Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
         meshes, picture and scene.
 
@@ -2002,7 +1867,7 @@ class TransferSettings:
     >>> settings.zoomout["k_final"], settings.zoomout["step"], settings.n_anchors
     (40, 5, 3)
     """
-    def __init__(self, method: str = "fused", **changes: Any) -> None: ...
+    def __init__(self, method: str = 'fused', **changes: Any) -> None: ...
     def __eq__(self, other: object) -> bool: ...
     def to_dict(self) -> dict[str, Any]:
         """All settings by name, groups as dicts.
@@ -2066,14 +1931,7 @@ class ViewsFile:
     (ViewsFile(3 views, 64 × 64), True, '3')
     >>> folder.cleanup()
     """
-    def __init__(
-        self,
-        mesh: _MeshLike,
-        views: Iterable[View],
-        *,
-        rig: str = "given as cameras",
-        background: str = "as rendered",
-    ) -> None: ...
+    def __init__(self, mesh: _MeshLike, views: Iterable[View], *, rig: str = 'given as cameras', background: str = 'as rendered') -> None: ...
     def __len__(self) -> int: ...
     @property
     def cameras(self) -> list[Pinhole]:
@@ -2121,17 +1979,7 @@ class ViewsFile:
         """
         ...
 
-def align(
-    mesh: _MeshLike,
-    points: ArrayLike,
-    *,
-    viewpoint: Optional[tuple[float, float, float]] = Ellipsis,
-    init: Optional[ArrayLike] = None,
-    scale_range: Optional[tuple[float, float]] = None,
-    n_starts: Optional[int] = 400,
-    seed: Optional[int] = 0,
-    progress: Optional[_Progress] = None,
-) -> Alignment:
+def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = Ellipsis, init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
     """Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
 
     Parameters
@@ -2159,9 +2007,7 @@ def align(
     """
     ...
 
-def camera_towards(
-    mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8
-) -> Pinhole:
+def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size: int = 224, fill: float = 0.8) -> Pinhole:
     """One camera that looks along ``-direction`` at the whole object: for pictures of results.
 
     Parameters
@@ -2195,15 +2041,7 @@ def cotan_laplacian(mesh: _MeshLike) -> Laplacian:
     """
     ...
 
-def demo_object(
-    category: str = "containers",
-    seed: int = 0,
-    *,
-    instance: int = 0,
-    n_vertices: int = 3000,
-    holes: int = 0,
-    floaters: int = 0,
-) -> DemoObject:
+def demo_object(category: str = 'containers', seed: int = 0, *, instance: int = 0, n_vertices: int = 3000, holes: int = 0, floaters: int = 0) -> DemoObject:
     """Makes a procedural object of one of the paper's six categories.
 
     Parameters
@@ -2234,14 +2072,7 @@ def demo_object(
     """
     ...
 
-def diffused_indicators(
-    basis: Eigenbasis,
-    labels: ArrayLike,
-    chosen: ArrayLike,
-    *,
-    t: float = 0.005,
-    norm: str = "surface",
-) -> NDArray[numpy.float64]:
+def diffused_indicators(basis: Eigenbasis, labels: ArrayLike, chosen: ArrayLike, *, t: float = 0.005, norm: str = 'surface') -> NDArray[numpy.float64]:
     """Coefficients of the indicator functions of labels, diffused by heat and scaled to unit norm.
 
     Parameters
@@ -2263,14 +2094,7 @@ def diffused_indicators(
     """
     ...
 
-def eigenbasis(
-    laplacian: Laplacian,
-    k: int,
-    *,
-    tolerance: float = 1e-08,
-    seed: int = 0,
-    progress: Optional[_Progress] = None,
-) -> Eigenbasis:
+def eigenbasis(laplacian: Laplacian, k: int, *, tolerance: float = 1e-08, seed: int = 0, progress: Optional[_Progress] = None) -> Eigenbasis:
     """The first k eigenpairs of a Laplacian.
 
     Residuals, orthonormality and (by an inertia count) completeness are verified before a basis is
@@ -2315,32 +2139,10 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_grasps(
-    mesh: _MeshLike,
-    region: Region,
-    gripper: Union[Gripper, _Path],
-    *,
-    scale: float,
-    camera_from_object: Optional[ArrayLike] = None,
-    table: Optional[Any] = None,
-    scene_meshes: Optional[Iterable[_MeshLike]] = None,
-    scene_points: Optional[ArrayLike] = None,
-    scene_margin: Optional[float] = 0.005,
-    top: Optional[int] = 20,
-    n_samples: Optional[int] = 1000,
-    friction: Optional[float] = 0.5,
-    width_range: Optional[tuple[float, float]] = None,
-    approach: Optional[ArrayLike] = None,
-    approach_cone: Optional[float] = None,
-    demonstrated_approach: Optional[ArrayLike] = None,
-    clearance: Optional[float] = 0.0,
-    pad_in_region: Optional[float] = 0.5,
-    seed: Optional[int] = 0,
-    progress: Optional[_Progress] = None,
-) -> Grasps:
+def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
-    Every grasp that comes back was checked: the open hand on its way in and where it closes meets
+    Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
     neither object nor scene, the contacts are in force closure, and the pads lie in the region.
     Nothing found is an answer: see `Grasps.rejected` and `Grasps.nearest_miss`.
 
@@ -2351,7 +2153,7 @@ def find_grasps(
     region : Region
         Where the pads shall close; of the mesh.
     gripper : Gripper or path
-        A hand, or what `Gripper` takes.
+        A gripper, or what `Gripper` takes.
     scale : float
         Metres per unit of the mesh; 1 for a mesh in metres.
     camera_from_object : (4, 4) array_like, optional
@@ -2360,7 +2162,7 @@ def find_grasps(
     table : object, optional
         A table top as a pair: a point of it, and its normal, away from the table.
     scene_meshes : list of mesh_like, optional
-        What the hand must not touch, metres.
+        What the gripper must not touch, metres.
     scene_points : (p, 3) array_like, optional
         Points that it must keep `scene_margin` away from, metres.
     scene_margin : float, optional
@@ -2379,7 +2181,7 @@ def find_grasps(
     demonstrated_approach : (3,) array_like, optional
         The direction in which the demonstrator's hand came; agreement raises the score.
     clearance : float, optional
-        Least distance of the open hand to everything, metres.
+        Least distance of the open gripper to everything, metres.
     pad_in_region : float, optional
         Share of each pad's contact that must lie in the region.
     seed : int, optional
@@ -2401,9 +2203,7 @@ def find_grasps(
     """
     ...
 
-def geodesic_distances(
-    mesh: _MeshLike, sources: Union[int, ArrayLike], *, kind: str = "tufted", time: float = 1.0
-) -> NDArray[numpy.float64]:
+def geodesic_distances(mesh: _MeshLike, sources: Union[int, ArrayLike], *, kind: str = 'tufted', time: float = 1.0) -> NDArray[numpy.float64]:
     """Distance of every vertex from the nearest source: `HeatGeodesics` for a single question.
 
     Parameters
@@ -2460,7 +2260,7 @@ def icosphere(subdivisions: int) -> Mesh:
     """
     ...
 
-def laplacian(mesh: _MeshLike, kind: str = "tufted") -> Laplacian:
+def laplacian(mesh: _MeshLike, kind: str = 'tufted') -> Laplacian:
     """The Laplacian of a mesh.
 
     Parameters
@@ -2482,17 +2282,7 @@ def laplacian(mesh: _MeshLike, kind: str = "tufted") -> Laplacian:
     """
     ...
 
-def lift(
-    mesh: _MeshLike,
-    embeddings: Union[Embeddings, _Path],
-    *,
-    rule: str = "pull",
-    n_samples: int = 1200,
-    depth_tolerance: float = 0.01,
-    radius: float = 0.06,
-    seed: int = 0,
-    progress: Optional[_Progress] = None,
-) -> SemanticCloud:
+def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = 'pull', n_samples: int = 1200, depth_tolerance: float = 0.01, radius: float = 0.06, seed: int = 0, progress: Optional[_Progress] = None) -> SemanticCloud:
     """Lifts the embeddings of views onto samples of the surface.
 
     Parameters
@@ -2558,21 +2348,7 @@ def point_cloud_laplacian(points: ArrayLike, *, n_neighbors: int = 30, mollify_f
     """
     ...
 
-def prepare(
-    mesh: _MeshLike,
-    *,
-    features: Optional[ArrayLike] = None,
-    embeddings: Optional[Union[Embeddings, _Path]] = None,
-    cloud: Optional[SemanticCloud] = None,
-    method: Optional[str] = None,
-    settings: Optional[TransferSettings] = None,
-    k: Optional[int] = None,
-    working_vertices: Optional[int] = None,
-    n_samples: Optional[int] = None,
-    seed: Optional[int] = None,
-    cache: Optional[_Cache] = None,
-    progress: Optional[_Progress] = None,
-) -> PreparedObject:
+def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, n_samples: Optional[int] = None, seed: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> PreparedObject:
     """Makes an object ready to be matched with any number of others.
 
     Parameters
@@ -2630,18 +2406,7 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     """
     ...
 
-def render(
-    mesh: Union[_MeshLike, MeshFile],
-    cameras: Optional[Iterable[Pinhole]] = None,
-    *,
-    colors: Optional[ArrayLike] = None,
-    supersampling: int = 2,
-    background: Optional[ArrayLike] = None,
-    occlusion: float = 0.0,
-    edges: float = 0.0,
-    normals: bool = False,
-    progress: Optional[_Progress] = None,
-) -> list[View]:
+def render(mesh: Union[_MeshLike, MeshFile], cameras: Optional[Iterable[Pinhole]] = None, *, colors: Optional[ArrayLike] = None, supersampling: int = 2, background: Optional[ArrayLike] = None, occlusion: float = 0.0, edges: float = 0.0, normals: bool = False, progress: Optional[_Progress] = None) -> list[View]:
     """One picture per camera, with depth and triangle of every pixel.
 
     Parameters
@@ -2678,17 +2443,7 @@ def render(
     """
     ...
 
-def rig(
-    mesh: _MeshLike,
-    *,
-    count: int = 14,
-    size: int = 224,
-    field_of_view: float = 0.5235987755982988,
-    fill: float = 0.8,
-    max_zoom: float = 1.5,
-    principal_frame: bool = True,
-    close_ups: int = 0,
-) -> list[Pinhole]:
+def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: float = 0.5235987755982988, fill: float = 0.8, max_zoom: float = 1.5, principal_frame: bool = True, close_ups: int = 0) -> list[Pinhole]:
     """Cameras all around an object, each zoomed and centred on its silhouette.
 
     Parameters
@@ -2730,9 +2485,7 @@ def run_cli(arguments: Iterable[str]) -> int:
     """
     ...
 
-def sample_even(
-    mesh: _MeshLike, n: int, *, seed: int = 0
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+def sample_even(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
     """Points as far from each other as they can be, out of six times as many uniform ones.
 
     Parameters
@@ -2758,9 +2511,7 @@ def sample_even(
     """
     ...
 
-def sample_uniform(
-    mesh: _MeshLike, n: int, *, seed: int = 0
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
+def sample_uniform(mesh: _MeshLike, n: int, *, seed: int = 0) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.uint32]]:
     """Independent points, uniform by area.
 
     Parameters
@@ -2797,15 +2548,7 @@ def set_num_threads(n_threads: int) -> None:
     """
     ...
 
-def spectral_clusters(
-    cloud: SemanticCloud,
-    *,
-    n_clusters: int = 5,
-    neighbours: int = 10,
-    starts: int = 10,
-    seed: int = 0,
-    progress: Optional[_Progress] = None,
-) -> Clusters:
+def spectral_clusters(cloud: SemanticCloud, *, n_clusters: int = 5, neighbours: int = 10, starts: int = 10, seed: int = 0, progress: Optional[_Progress] = None) -> Clusters:
     """Cuts a cloud into parts: spectral clustering on its neighbour graph, weighed by features.
 
     Parameters
@@ -2842,26 +2585,7 @@ def torus(n_around: int, n_across: int) -> Mesh:
     """
     ...
 
-def transfer(
-    source: Union[_MeshLike, PreparedObject],
-    target: Union[_MeshLike, PreparedObject],
-    region: Union[Region, _Path],
-    *,
-    source_features: Optional[ArrayLike] = None,
-    target_features: Optional[ArrayLike] = None,
-    source_embeddings: Optional[Union[Embeddings, _Path]] = None,
-    target_embeddings: Optional[Union[Embeddings, _Path]] = None,
-    source_cloud: Optional[SemanticCloud] = None,
-    target_cloud: Optional[SemanticCloud] = None,
-    method: Optional[str] = None,
-    rule: Optional[str] = None,
-    seed: Optional[int] = None,
-    settings: Optional[TransferSettings] = None,
-    k: Optional[int] = None,
-    working_vertices: Optional[int] = None,
-    cache: Optional[_Cache] = None,
-    progress: Optional[_Progress] = None,
-) -> Transfer:
+def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, second_opinion: Optional[bool] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
     """Transfers a demonstrated region from one object to another.
 
     Parameters
