@@ -163,7 +163,7 @@ def test_a_panic_is_an_exception_and_silent(what, capfd):
     with pytest.raises(semfm.InternalError, match="on purpose") as caught:
         _semfm._work_for_tests(what)
     assert isinstance(caught.value, Exception) and caught.value.code == "internal"
-    assert "work.rs:" in str(caught.value)
+    assert "interruptible.rs:" in str(caught.value)
     assert capfd.readouterr().err == ""
     assert semfm.zoo.icosphere(1).n_vertices == 42  # life goes on
 
