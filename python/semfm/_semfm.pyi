@@ -1979,7 +1979,7 @@ class ViewsFile:
         """
         ...
 
-def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = Ellipsis, init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
+def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = (0.0, 0.0, 0.0), init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
     """Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
 
     Parameters

@@ -128,6 +128,9 @@ impl Alignment {
 #[pyfunction]
 #[pyo3(name = "align", signature = (mesh, points, *, viewpoint=(0.0, 0.0, 0.0), init=None,
     scale_range=None, n_starts=400, seed=0, progress=None))]
+#[pyo3(
+    text_signature = "(mesh, points, *, viewpoint=(0.0, 0.0, 0.0), init=None, scale_range=None, n_starts=400, seed=0, progress=None)"
+)]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn align_(
     py: Python<'_>,
