@@ -16,7 +16,7 @@ How a view becomes a grid of vectors, and where to read about it:
 1. :class:`semfm.ViewsFile` reads and checks the views: pictures, triangle images, cameras;
 2. every picture is shown to the encoder upright and rolled by 90, 180 and 270 degrees
    (:mod:`.patches`); an encoder is anything that keeps the small promise of :mod:`.encoder`:
-   :mod:`.onnx_encoder`, :mod:`.siglip`, :mod:`.dinov2`, or a class of your own;
+   :mod:`.onnx_encoder`, :mod:`.lite0`, :mod:`.siglip`, :mod:`.dinov2`, or a class of your own;
 3. per roll, tokens of outlying norm are dropped and the others scaled to unit length; the grids
    are rolled back and averaged (:mod:`.patches`);
 4. :mod:`.coverage` says how much of each patch the object fills, and :class:`semfm.Embeddings`

@@ -131,7 +131,7 @@ def open_checkpoint(model: str, device: str, threads: int) -> Checkpoint:
 def _fetch(model: str) -> Path:
     """The snapshot folder of a hub name; its last part is the commit."""
     if not _HUB_NAME.fullmatch(model) or os.path.exists(model):
-        wanted = "an ENCODER.json, a folder of a checkpoint, or a name on the hub"
+        wanted = "lite0, an ENCODER.json, a folder of a checkpoint, or a name on the hub"
         raise expected(model, "--model", wanted, "neither")
     from huggingface_hub import snapshot_download
 

@@ -22,6 +22,7 @@ _EPILOG = """\
 examples:
   semfm-embed mug.views.mcap -o mug.emb.mcap --model google/siglip2-base-patch16-224
   semfm-embed mug.views.mcap -o mug.emb.mcap --model mobilenet_v2.json --threads 2
+  semfm-embed mug.views.mcap -o mug.emb.mcap --model lite0
   semfm-embed *.views.mcap --output-folder embedded --model mobilenet_v2.json
 
 exit code: 0 written, 2 bad input or failure, 130 interrupted; a file is written whole or not at all
@@ -48,9 +49,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--model",
         required=True,
-        metavar="NAME|DIR|ENCODER.json|package.module:Class",
-        help="SigLIP, SigLIP 2 or DINOv2 by its name on the Hugging Face hub or by folder, "
-        "an ONNX encoder by its JSON, or a class of your own",
+        metavar="lite0|NAME|DIR|ENCODER.json|package.module:Class",
+        help="lite0 (EfficientNet-Lite0), SigLIP, SigLIP 2 or DINOv2 by its name on the Hugging "
+        "Face hub or by folder, an ONNX encoder by its JSON, or a class of your own",
     )
     p.add_argument(
         "--rolls",

