@@ -20,8 +20,10 @@ pub struct Needs {
 /// What the tests need that run everywhere.
 pub const TESTS: Needs = Needs { extras: &["onnx"], groups: &["test"] };
 /// What all tests need: torch, Ray, other people's libraries and viewers.
-pub const ALL_TESTS: Needs =
-    Needs { extras: &["onnx", "lite", "embed", "ray"], groups: &["test", "notebook", "peers", "viewers"] };
+pub const ALL_TESTS: Needs = Needs {
+    extras: &["onnx", "lite", "embed", "ray"],
+    groups: &["test", "notebook", "peers", "viewers"],
+};
 
 /// Makes `.venv` where it is not there, installs the package with what it `needs` where something
 /// changed since, and returns the folder of its programs.
