@@ -44,12 +44,8 @@ pub trait Encoder: Sync {
 /// The command `semfm-embed` as an encoder.
 #[derive(Clone, Debug)]
 pub struct CommandEncoder {
-    /// As in [`EncoderSettings::model`].
-    pub model: String,
-    /// As in [`EncoderSettings::keep`].
-    pub keep: bool,
-    /// As in [`EncoderSettings::threads`].
-    pub threads: usize,
+    command: EncoderCommand,
+    identity: String,
 }
 
 impl Encoder for CommandEncoder {
@@ -66,16 +62,33 @@ impl Encoder for CommandEncoder {
     }
 
     fn identity(&self) -> String {
-        format!("encoder {}", self.model)
+        self.identity.clone()
     }
 }
 
 impl CommandEncoder {
+    /// The encoder `model` ([`EncoderSettings::model`], which see for the others, too). Its files are
+    /// hashed now: a run that was begun with other weights is another run.
+    ///
+    /// # Errors
+    /// [`semfm::Error::EncoderMissing`], [`semfm::Error::EncoderFailed`].
+    pub fn new(model: String, keep: bool, threads: usize) -> semfm::Result<Self> {
+        let rolls = Method::default().info().features.rolls;
+        let settings = EncoderSettings { model, rolls, keep, threads, quiet: true };
+        let model = settings.model.clone();
+        let command = EncoderCommand::new(settings)?;
+        let identity = format!("encoder {model} {}", command.content_hash()?);
+        Ok(Self { command, identity })
+    }
+
+    /// As [`EncoderCommand::note`].
+    pub fn note(&self) -> Option<String> {
+        self.command.note()
+    }
+
     fn encode(&self, file: &MeshFile, rolls: u32) -> semfm::Result<EncodedObject> {
-        let Self { ref model, keep, threads } = *self;
-        let settings = EncoderSettings { model: model.clone(), rolls, keep, threads, quiet: true };
         // All objects are shown in grey: colour on one side of a pair misleads.
-        EncoderCommand::new(settings)?.embed(file, Coloring::Grey, &Task::default())
+        self.command.with_rolls(rolls).embed(file, Coloring::Grey, &Task::default())
     }
 }
 

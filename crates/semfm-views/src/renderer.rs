@@ -9,6 +9,8 @@ use semfm_geom::{Mesh, Pinhole, Task};
 
 #[cfg(feature = "gpu")]
 use crate::GpuRenderer;
+#[cfg(feature = "gpu")]
+use crate::gpu::may_have_graphics_processor;
 use crate::{Error, RenderSettings, Result, SurfaceColor, View, render};
 
 /// Which renderer is wanted.
@@ -87,27 +89,30 @@ impl Renderer {
         Self { note: Some(note), ..Self::cpu() }
     }
 
-    /// Opens what is wanted. `Auto` passes over drivers that draw on the CPU themselves: they
-    /// take longer and are less exact.
+    /// Opens what is wanted. `Auto` opens no driver where the machine has no graphics processor, and
+    /// passes over drivers that draw on the CPU themselves: they take longer and are less exact.
     ///
     /// # Errors
     /// For [`RendererChoice::Gpu`]: [`Error::NoGpu`] without a driver (or in a build without the
     /// feature `gpu`), [`Error::Gpu`] where it does not open.
     #[cfg(feature = "gpu")]
     pub fn open(choice: RendererChoice) -> Result<Self> {
-        match (choice, if choice == RendererChoice::Cpu { None } else { Some(GpuRenderer::new()) })
-        {
-            (_, None) => Ok(Self::cpu()),
-            (RendererChoice::Auto, Some(Err(error))) => {
-                Ok(Self::cpu_because(format!("views are drawn on the CPU: {error}")))
-            }
-            (RendererChoice::Auto, Some(Ok(gpu))) if gpu.is_software() => {
-                Ok(Self::cpu_because(format!(
-                    "views are drawn on the CPU, exactly; {} would draw them there, too",
-                    gpu.name()
-                )))
-            }
-            (_, Some(gpu)) => Ok(Self::with_gpu(gpu?, choice == RendererChoice::Auto)),
+        match choice {
+            RendererChoice::Cpu => Ok(Self::cpu()),
+            RendererChoice::Gpu => Ok(Self::with_gpu(GpuRenderer::new()?, false)),
+            RendererChoice::Auto => Ok(Self::automatic()),
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn automatic() -> Self {
+        if !may_have_graphics_processor() {
+            return Self::cpu();
+        }
+        match GpuRenderer::new() {
+            Ok(gpu) if gpu.is_software() => Self::cpu(),
+            Ok(gpu) => Self::with_gpu(gpu, true),
+            Err(error) => Self::cpu_because(format!("views are drawn on the CPU: {error}")),
         }
     }
 

@@ -54,6 +54,8 @@ pub use semfm_views as views;
 pub mod demonstration;
 #[cfg(feature = "mcap")]
 pub mod encoder_command;
+#[cfg(feature = "mcap")]
+mod encoder_inputs;
 mod error;
 pub mod files;
 mod grasp_request;

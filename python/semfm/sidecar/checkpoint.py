@@ -23,6 +23,8 @@ from .errors import SidecarError, expected
 _INSTALL = "needs torch and transformers: pip install 'semfm[embed]'"
 _CONFIGS = ["config.json", "preprocessor_config.json", "processor_config.json"]
 _WEIGHTS = ["*.safetensors", "*.safetensors.index.json"]
+#: Patterns of the files that decide the embeddings.
+FILES = [*_CONFIGS, *_WEIGHTS]
 _HUB_NAME = re.compile(r"\w[\w.-]*(/\w[\w.-]*)?")
 
 
@@ -133,16 +135,32 @@ def _fetch(model: str) -> Path:
     if not _HUB_NAME.fullmatch(model) or os.path.exists(model):
         wanted = "lite0, an ENCODER.json, a folder of a checkpoint, or a name on the hub"
         raise expected(model, "--model", wanted, "neither")
-    from huggingface_hub import snapshot_download
-
     try:
-        return Path(snapshot_download(model, allow_patterns=[*_CONFIGS, *_WEIGHTS]))
+        from huggingface_hub import snapshot_download
+    except ImportError as error:
+        raise SidecarError(f"{model}: a transformers encoder {_INSTALL} ({error})") from error
+    try:
+        return Path(snapshot_download(model, allow_patterns=FILES))
     except Exception as error:  # requests, httpx and the hub library each raise their own
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise SidecarError(
             f"{model}: no folder of that name, and it cannot be had from the Hugging Face hub "
             f"(no network, or no such model): {reason}"
         ) from error
+
+
+def present_snapshot(model: str) -> Path:
+    """The snapshot folder of a hub name as it was downloaded last; downloaded now where it is not here."""
+    if _HUB_NAME.fullmatch(model) and not os.path.exists(model):
+        try:
+            from huggingface_hub import snapshot_download
+
+            here = Path(snapshot_download(model, allow_patterns=FILES, local_files_only=True))
+            if any(here.glob("*.safetensors")):
+                return here
+        except Exception:  # the library's own family, and whatever lies below it: ask the hub
+            pass
+    return _fetch(model)
 
 
 def _model_type(model: str, folder: Path) -> str:
@@ -161,7 +179,7 @@ def _model_type(model: str, folder: Path) -> str:
 def _hash(folder: Path) -> str:
     """SHA-256 over names and contents of the files that decide the embeddings."""
     digest = hashlib.sha256()
-    files = {path for pattern in [*_CONFIGS, *_WEIGHTS] for path in folder.glob(pattern)}
+    files = {path for pattern in FILES for path in folder.glob(pattern)}
     for path in sorted(files):
         digest.update(f"{path.name}\n{path.stat().st_size}\n".encode())
         with path.open("rb") as file:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import time
@@ -12,6 +13,7 @@ from .. import __version__
 from ..errors import SemfmError
 from .embed import DTYPES, EmbedSettings, embed_file
 from .errors import SidecarError, expected
+from .inputs import encoder_inputs
 from .models import DEVICES, open_encoder
 from .patches import ROLLS
 from .progress import MODES, open_progress
@@ -38,8 +40,8 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    p.add_argument("views", nargs="+", metavar="V.views.mcap", help="views, from `semfm-cli views`")
-    to = p.add_mutually_exclusive_group(required=True)
+    p.add_argument("views", nargs="*", metavar="V.views.mcap", help="views, from `semfm-cli views`")
+    to = p.add_mutually_exclusive_group()
     to.add_argument("-o", "--output", metavar="V.emb.mcap", help="file to write, for one V")
     to.add_argument(
         "--output-folder",
@@ -52,6 +54,11 @@ def parser() -> argparse.ArgumentParser:
         metavar="lite0|NAME|DIR|ENCODER.json|package.module:Class",
         help="lite0 (EfficientNet-Lite0), SigLIP, SigLIP 2 or DINOv2 by its name on the Hugging "
         "Face hub or by folder, an ONNX encoder by its JSON, or a class of your own",
+    )
+    to.add_argument(
+        "--list-inputs",
+        action="store_true",
+        help="print what embeddings by the model depend on (files, versions) as JSON, and stop",
     )
     p.add_argument(
         "--rolls",
@@ -84,9 +91,18 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    args = parser().parse_args(argv)
+    arguments = parser()
+    args = arguments.parse_args(argv)
+    if not args.list_inputs:
+        if not args.views:
+            arguments.error("the following arguments are required: V.views.mcap")
+        if args.output is None and args.output_folder is None:
+            arguments.error("one of the arguments -o/--output --output-folder is required")
     try:
-        _run(args)
+        if args.list_inputs:
+            print(json.dumps(encoder_inputs(args.model)))
+        else:
+            _run(args)
     except SemfmError as error:
         print(f"semfm-embed: {error}", file=sys.stderr)
         return 2

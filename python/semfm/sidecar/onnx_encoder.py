@@ -33,6 +33,7 @@ from PIL import Image
 
 from .encoder import Grid
 from .errors import SidecarError, expected
+from .onnx_files import external_files
 
 FORMAT = "semfm.encoder/1"
 _LAYOUTS = ("NCHW", "NHWC")
@@ -151,14 +152,14 @@ class OnnxEncoder:
         install: str = "pip install 'semfm[onnx]'",
     ) -> None:
         self.description = description
-        weights = network if isinstance(network, bytes) else _read(network)
+        content = network if isinstance(network, bytes) else read_network(network)
         self._session = _open_session(description, network, device, install)
         # One picture per thread and one thread per picture: faster than onnxruntime's own threads
         # (they spin: twice the CPU time on two cores), and the same bits at every thread and batch
         # count. A GPU takes the batch whole.
         self._pool = None if device == "cuda" else ThreadPoolExecutor(threads)
         self.name = os.path.basename(description.path)
-        self.revision = f"sha256:{hashlib.sha256(weights).hexdigest()}"
+        self.revision = _revision(description.onnx, content)
         settings = {
             "layout": description.layout,
             "mean": description.mean,
@@ -225,12 +226,26 @@ def _resize(pictures: np.ndarray, height: int, width: int) -> np.ndarray:
     return np.stack([np.asarray(picture) for picture in resized])
 
 
-def _read(path: str) -> bytes:
+def read_network(path: str) -> bytes:
+    """The bytes of an ONNX file."""
     try:
         with open(path, "rb") as file:
             return file.read()
     except OSError as error:
         raise SidecarError(f"{path}: {error.strerror or error}") from error
+
+
+def _revision(path: str, network: bytes) -> str:
+    """SHA-256 over the network and the files beside it that hold its weights."""
+    digest = hashlib.sha256(network)
+    for weights in external_files(path, network):
+        try:
+            with open(weights, "rb") as file:
+                while block := file.read(1 << 20):
+                    digest.update(block)
+        except OSError as error:
+            raise SidecarError(f"{weights}: {error.strerror or error}") from error
+    return f"sha256:{digest.hexdigest()}"
 
 
 def _open_session(

@@ -130,7 +130,7 @@ impl EvalCommand {
         // What cannot be compared with should be known before the work is done.
         let before = self.work.compare.as_deref().map(Results::read).transpose()?;
         let dataset = self.dataset()?;
-        let encoder = self.encoder(common);
+        let encoder = self.encoder(common)?;
         let embeddings = match &encoder {
             Some(encoder) => EmbeddingSource::Encoder(encoder),
             None => EmbeddingSource::Files(self.features.embeddings.clone()),
@@ -162,12 +162,16 @@ impl EvalCommand {
         outcome_of(&results, common)
     }
 
-    fn encoder(&self, common: &Common) -> Option<CommandEncoder> {
-        let model = self.features.encoder.clone()?;
+    fn encoder(&self, common: &Common) -> Result<Option<CommandEncoder>> {
+        let Some(model) = self.features.encoder.clone() else { return Ok(None) };
         let keep = !self.work.no_cache;
         // Several encoders at work at once share the cores, as the pairs do.
         let threads = Workers::new(common.threads, self.work.jobs).threads;
-        Some(CommandEncoder { model, keep, threads })
+        let encoder = CommandEncoder::new(model, keep, threads)?;
+        if let Some(note) = encoder.note().filter(|_| !common.quiet) {
+            console::message(format_args!("note: {note}"));
+        }
+        Ok(Some(encoder))
     }
 
     fn dataset(&self) -> Result<Dataset> {

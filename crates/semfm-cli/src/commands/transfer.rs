@@ -190,6 +190,9 @@ impl TransferCommand {
                 let encoder = EncoderCommand::new(self.encoder_settings(common)?)?;
                 let EncodedPair { source, target } =
                     encoder.embed_pair(&files.source, &files.target, coloring, task)?;
+                if let Some(note) = encoder.note().filter(|_| !common.quiet) {
+                    console::message(format_args!("note: {note}"));
+                }
                 (source.embeddings, target.embeddings)
             };
         for (name, embeddings) in [("source", &a), ("target", &b)] {

@@ -1,7 +1,7 @@
 //! The renderer on a graphics driver: the same pictures as [`render`](crate::render()), from the
 //! same request.
 //!
-//! `device` opens the driver, `pipelines` holds its programs (`shaders.wgsl`), `gpu_mesh` the mesh.
+//! `hardware` tells whether there is a processor to draw, `device` opens the driver, `pipelines` holds its programs (`shaders.wgsl`), `gpu_mesh` the mesh.
 //! `tiles` cuts the views to the rectangles that the object fills and puts them into batches; `draw`
 //! sends each to the driver, which draws it into a `render_target`, and reads it back while the next
 //! is drawn. Triangle and depth are those at a pixel's centre, colour is the mean of its samples.
@@ -14,6 +14,7 @@ mod draw;
 #[cfg(test)]
 mod failure_tests;
 mod gpu_mesh;
+mod hardware;
 mod pipelines;
 mod render_target;
 mod tiles;
@@ -29,6 +30,7 @@ use crate::{Error, RenderSettings, Result, SurfaceColor, View};
 use device::{Device, DriverLimits};
 use draw::Draw;
 use gpu_mesh::GpuMesh;
+pub(crate) use hardware::may_have_graphics_processor;
 use pipelines::Pipelines;
 use render_target::{Extent, RenderTarget};
 use tiles::{batches, extent};
