@@ -11,6 +11,9 @@
 //! (hard) for `nearest` and `sinkhorn`, and a calibration error of .09 and .04, and of .14 and .16;
 //! with the second opinion .98 and .83, .97 and .94, and .06 and .04, and .11 and .12.
 //!
+//! `wks` between objects without features has no second opinion either: it gets the same formula over
+//! the distances of wave kernel signatures, never more than .75, so that its verdict is `check` at best.
+//!
 //! Dirichlet energy, orthogonality, commutativity and the margin of the anchors do not predict success
 //! (AUC .42–.57); they are reported, and nothing is decided by them.
 
@@ -28,6 +31,9 @@ use crate::point_map::rows_of;
 pub const ACCEPT: f64 = 0.8;
 /// Below this probability the answer is more likely wrong than right: no answer.
 pub const CHECK: f64 = 0.5;
+/// The most that an answer from geometry alone is trusted: it has nothing to be held against, so somebody
+/// should look at it.
+pub(crate) const MOST_WITHOUT_FEATURES: f64 = 0.75;
 /// Votes that are neither clearly in nor clearly out, on the scale on which [`Region::COUNTS`] is the threshold.
 const AMBIGUOUS: std::ops::Range<f64> = 0.3..0.65;
 /// More ambiguity than this says nothing more.

@@ -2,7 +2,9 @@
 
 use semfm_geom::{Shape, Task};
 
-use crate::confidence::{Answer, Evidence, probability_by_agreement, verdict};
+use crate::confidence::{
+    Answer, Evidence, MOST_WITHOUT_FEATURES, probability_by_agreement, verdict,
+};
 use crate::hypotheses::{Hypothesis, hypotheses, is_connected};
 use crate::method::Method;
 use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
@@ -16,11 +18,12 @@ use crate::transfer::Transfer;
 use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result};
 
 /// Transfers `region`, which lies on the source's original vertices, to the target: a [`Matching`]
-/// for one region, whose report lists the anchors whatever the method.
+/// for one region, whose report lists the anchors whatever the method, where there are features.
 ///
 /// # Errors
 /// [`Error::EmptyRegion`], [`Error::Length`] where the region is not one of the source's mesh or
-/// the features differ in dimension, [`Error::OutOfRange`] for impossible settings,
+/// the features differ in dimension, [`Error::OutOfRange`] for impossible settings and for a method that
+/// reads features where an object has none,
 /// [`Error::LinearAlgebra`], [`Error::NotOriented`] for `wks` with an orientation, [`Error::Geom`] on
 /// cancellation. A region that lands nowhere is no error but a refusal.
 pub fn transfer(
@@ -32,7 +35,9 @@ pub fn transfer(
 ) -> Result<Transfer> {
     check_region(region, source.shape().original().n_vertices())?;
     let mut matching = Matching::new(source, target, settings, task)?;
-    matching.stages.time("anchors", || matching.pair.select_anchors(task).map(drop))?;
+    if source.has_features() {
+        matching.stages.time("anchors", || matching.pair.select_anchors(task).map(drop))?;
+    }
     matching.transfer(region)
 }
 
@@ -76,8 +81,11 @@ impl Matching {
         semfm_geom::keep_faer_sequential();
         settings.check()?;
         let available = source.shape().basis().k().min(target.shape().basis().k());
-        let settings = settings.clipped(available);
+        let mut settings = settings.clipped(available);
         let info = settings.method.info();
+        check_features(source, target, settings.method)?;
+        // Another opinion of the same signatures would be none.
+        settings.second_opinion &= source.has_features();
         let mut stages = Stages::default();
         task.check()?;
         let pair = Pair::new(source, target, &settings, &mut stages)?;
@@ -153,6 +161,8 @@ impl Matching {
             (ConfidenceRule::Agreement, Some(agreement)) => probability_by_agreement(agreement),
             _ => evidence.probability(),
         };
+        let most = if self.source().has_features() { 1.0 } else { MOST_WITHOUT_FEATURES };
+        let confidence = confidence.min(most);
         Ok(Transfer {
             region,
             confidence,
@@ -272,6 +282,23 @@ fn at_vertices(vertex_of_point: &[u32], inside: &[bool]) -> Vec<bool> {
 fn onto_original(shape: &Shape, weights: &[f64]) -> Result<Region> {
     let weights = shape.onto_original(weights);
     Region::from_weights(weights.into_iter().map(|w| w.clamp(0.0, 1.0)).collect())
+}
+
+/// Both objects have features, or neither has and the method reads none.
+fn check_features(source: &PreparedObject, target: &PreparedObject, method: Method) -> Result<()> {
+    match (source.has_features(), target.has_features()) {
+        (true, true) => Ok(()),
+        (false, false) if !method.info().reads_features => Ok(()),
+        (false, false) => {
+            let expected = "`wks`, since the objects were prepared without features";
+            Error::out_of_range("method", expected, format!("`{method}`"))
+        }
+        (source, _) => {
+            let (with, without) = if source { ("source", "target") } else { ("target", "source") };
+            let found = format!("features of the {with} and none of the {without}");
+            Error::out_of_range("features", "those of both objects, or of neither", found)
+        }
+    }
 }
 
 fn check_region(region: &Region, n_vertices: usize) -> Result<()> {

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
+use semfm_geom::descriptors::{WksSettings, wks};
 use semfm_geom::sampling::farthest_points;
 use semfm_geom::{PointIndex, SemanticCloud, Shape, Task};
 
@@ -20,6 +21,8 @@ const MIXED: usize = 6;
 const MIX_REACH: f64 = 0.01;
 /// Vertices matched while a sampled map grows. 300 cost .01 IoU, 1200 gain nothing.
 const MAP_SAMPLES: usize = 600;
+/// Points whose signatures stand in for features where there are none.
+const SIGNATURE_POINTS: usize = 1200;
 /// Neighbours of a cloud point in the graph that votes are spread on.
 const GRAPH_NEIGHBOURS: usize = 10;
 /// Least share of the mean mass that a sample gets when no vertex is nearest to it.
@@ -58,6 +61,7 @@ pub struct PreparedObject {
 struct Derived {
     shape: Arc<Shape>,
     cloud: Arc<SemanticCloud>,
+    has_features: bool,
     cloud_index: PointIndex,
     /// π: the cloud point nearest to each working vertex (n).
     point_of_vertex: Vec<u32>,
@@ -90,6 +94,32 @@ impl PreparedObject {
     /// [`Error::LinearAlgebra`] where the principal directions of the features are not found,
     /// [`Error::Geom`] on cancellation.
     pub fn new(shape: Arc<Shape>, cloud: Arc<SemanticCloud>, task: &Task) -> Result<Self> {
+        Self::derive(shape, cloud, true, task)
+    }
+
+    /// Prepares an object from its shape alone, for methods that read no features (`wks`). Its cloud
+    /// holds wave kernel signatures at farthest-point vertices.
+    ///
+    /// # Errors
+    /// As [`PreparedObject::new`]; [`Error::Geom`] for a basis without an eigenvalue above zero.
+    pub fn without_features(shape: Arc<Shape>, task: &Task) -> Result<Self> {
+        let settings = WksSettings::default();
+        let signatures = wks(shape.basis(), &settings)?; // (n × energies)
+        let vertices = shape.mesh().vertices();
+        let chosen = farthest_points(vertices, SIGNATURE_POINTS);
+        let points = chosen.iter().map(|&v| vertices[v as usize]).collect();
+        let rows = chosen.iter().flat_map(|&v| signatures.row(v as usize).iter());
+        let (values, n_views) = (rows.map(|&x| x as f32).collect(), vec![0; chosen.len()]);
+        let cloud = SemanticCloud::new(points, values, signatures.ncols(), n_views)?;
+        Self::derive(shape, Arc::new(cloud), false, task)
+    }
+
+    fn derive(
+        shape: Arc<Shape>,
+        cloud: Arc<SemanticCloud>,
+        has_features: bool,
+        task: &Task,
+    ) -> Result<Self> {
         task.check()?;
         let cloud_index = PointIndex::new(cloud.points())?;
         let mesh_index = PointIndex::new(shape.mesh().vertices())?;
@@ -102,6 +132,7 @@ impl PreparedObject {
         let derived = Derived {
             shape,
             cloud,
+            has_features,
             cloud_index,
             point_of_vertex,
             vertex_of_point,
@@ -134,6 +165,11 @@ impl PreparedObject {
     /// Surface points with features.
     pub fn cloud(&self) -> &Arc<SemanticCloud> {
         &self.derived.cloud
+    }
+
+    /// Whether the cloud's features come from outside, and not from the shape itself.
+    pub fn has_features(&self) -> bool {
+        self.derived.has_features
     }
 
     /// The semantic clusters of the cloud's points: cut when first asked for, then kept for these

@@ -155,7 +155,9 @@ impl Matching {
         task: &semfm::Task,
     ) -> semfm::Result<Self> {
         let pair = Matched::new(&source.inner.object, &target.inner.object, settings, task)?;
-        pair.anchors(task)?; // its reports list them, as those of the short call
+        if pair.source().has_features() {
+            pair.anchors(task)?; // its reports list them, as those of the short call
+        }
         Ok(Self { pair: Arc::new(pair), source, target })
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use semfm::geom::SemanticCloud as Cloud;
-use semfm::{FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
+use semfm::{FeatureSource, Method, PipelineSettings, PreparationReport, Prepared, Task, fmap};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
@@ -82,14 +82,21 @@ impl PreparedObject {
         py: Python<'py>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (Shape, SemanticCloud, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
+        (
+            Shape,
+            Option<SemanticCloud>,
+            bool,
+            Option<(usize, Vec<usize>)>,
+            Vec<(&'static str, f64)>,
+        ),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
         let report = &self.inner.report;
         let lifted = report.lifted.as_ref();
         let lifted = lifted.map(|lifted| (lifted.n_seen, lifted.lifted_by_view.clone()));
         let stages = report.stages_ms.clone();
-        Ok((restore, (self.shape(), self.cloud(), report.from_cache, lifted, stages)))
+        let cloud = self.inner.object.has_features().then(|| self.cloud());
+        Ok((restore, (self.shape(), cloud, report.from_cache, lifted, stages)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -107,7 +114,7 @@ impl PreparedObject {
 pub fn _restore_prepared(
     py: Python<'_>,
     shape: &Bound<'_, Shape>,
-    cloud: &Bound<'_, SemanticCloud>,
+    cloud: Option<&Bound<'_, SemanticCloud>>,
     from_cache: bool,
     lifted: Option<(usize, Vec<usize>)>,
     stages_ms: Vec<(String, f64)>,
@@ -120,8 +127,14 @@ pub fn _restore_prepared(
             _ => ("prepare", *ms),
         })
         .collect();
-    let (shape, cloud) = (Arc::clone(&shape.get().inner), Arc::clone(&cloud.get().inner));
-    let object = run(py, None, move |task| Ok(fmap::PreparedObject::new(shape, cloud, task)?))?;
+    let shape = Arc::clone(&shape.get().inner);
+    let cloud = cloud.map(|cloud| Arc::clone(&cloud.get().inner));
+    let object = run(py, None, move |task| {
+        Ok(match cloud {
+            Some(cloud) => fmap::PreparedObject::new(shape, cloud, task)?,
+            None => fmap::PreparedObject::without_features(shape, task)?,
+        })
+    })?;
     let lifted = lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view });
     let report = PreparationReport { from_cache, lifted, stages_ms };
     Ok(PreparedObject::new(Prepared { object, report }))
@@ -132,6 +145,7 @@ pub enum OwnedFeatures {
     Views(Arc<EmbeddingsFile>),
     PerVertex(Vec<f32>),
     Cloud(Arc<Cloud>),
+    Geometry,
 }
 
 impl OwnedFeatures {
@@ -140,6 +154,7 @@ impl OwnedFeatures {
         py: Python<'_>,
         side: &str,
         mesh: &semfm::Mesh,
+        method: Method,
         features: Option<&Bound<'_, PyAny>>,
         embeddings: Option<&Bound<'_, PyAny>>,
         cloud: Option<&Bound<'_, SemanticCloud>>,
@@ -160,8 +175,10 @@ impl OwnedFeatures {
                 Ok(Self::Views(embeddings_of(embeddings, &name, mesh)?))
             }
             (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().inner.clone())),
+            (None, None, None) if !method.info().reads_features => Ok(Self::Geometry),
             (None, None, None) => {
-                let expected = "features per vertex, embeddings, or a cloud";
+                let expected =
+                    "features per vertex, embeddings, or a cloud (method=\"wks\" needs none)";
                 Err(errors::invalid(py, &format!("{side}features"), expected, "none of them"))
             }
             _ => {
@@ -182,6 +199,7 @@ impl OwnedFeatures {
             Self::Views(file) => FeatureSource::Views(&file.views),
             Self::PerVertex(features) => FeatureSource::PerVertex(features),
             Self::Cloud(cloud) => FeatureSource::Cloud(Arc::clone(cloud)),
+            Self::Geometry => FeatureSource::Geometry,
         };
         let prepared = semfm::prepare(mesh.clone(), source, settings, task)?;
         Ok(PreparedObject::new(prepared))
@@ -200,7 +218,7 @@ impl OwnedFeatures {
 /// cloud : SemanticCloud, optional
 ///     Surface points with features, made by the caller.
 /// method : str, optional
-///     Lift as this method does: ``"fused"`` where neither this nor `settings` is given.
+///     Lift as this method does (``"wks"`` needs no features): ``"fused"`` where neither this nor `settings` is given.
 /// settings : TransferSettings, optional
 ///     Lift as the method of these settings does.
 /// k : int, optional
@@ -264,6 +282,7 @@ pub fn prepare(
     }
     let mesh = from_any(mesh, "mesh")?;
     check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-    let features = OwnedFeatures::of(py, "", &mesh, features, embeddings, cloud)?;
+    let method = settings.transfer.method;
+    let features = OwnedFeatures::of(py, "", &mesh, method, features, embeddings, cloud)?;
     run(py, progress, move |task| features.prepare(&mesh, &settings, task))
 }

@@ -42,7 +42,7 @@ impl Side {
         let mesh = from_any(value, name)?;
         check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
         let features =
-            OwnedFeatures::of(py, &format!("{name}_"), &mesh, features, embeddings, cloud)?;
+            OwnedFeatures::of(py, &format!("{name}_"), &mesh, settings.transfer.method, features, embeddings, cloud)?;
         Ok(Self::Raw(mesh, features))
     }
 
@@ -86,7 +86,7 @@ impl Side {
 /// target_cloud : SemanticCloud, optional
 /// method : str, optional
 ///     ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
-///     ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
+///     ``anchored``, ``sinkhorn``, ``nearest``, or ``wks``, which needs no features.
 /// rule : str, optional
 ///     How a map transfers the region: ``preimage`` (where none is given) or ``image``.
 /// seed : int, optional

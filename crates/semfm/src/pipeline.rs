@@ -70,6 +70,8 @@ pub enum FeatureSource<'a> {
     PerVertex(&'a [f32]),
     /// A cloud that the caller made.
     Cloud(Arc<SemanticCloud>),
+    /// None: the geometry alone, for the method `wks`.
+    Geometry,
 }
 
 /// An object ready to be matched, and how it was prepared.
@@ -106,8 +108,10 @@ pub fn prepare(
     task: &Task,
 ) -> Result<Prepared> {
     let start = Instant::now();
-    let LiftedCloud { cloud, report: lifted } =
-        semantic_cloud(&mesh, features, &settings.lift, task)?;
+    let lifted = match features {
+        FeatureSource::Geometry => None,
+        features => Some(semantic_cloud(&mesh, features, &settings.lift, task)?),
+    };
     let lift_ms = milliseconds_since(start);
 
     let start = Instant::now();
@@ -115,11 +119,15 @@ pub fn prepare(
     let shape_ms = milliseconds_since(start);
 
     let start = Instant::now();
-    let object = PreparedObject::new(Arc::new(shape.shape), cloud, task)?;
+    let (from_cache, shape) = (shape.hit, Arc::new(shape.shape));
+    let (object, lifted) = match lifted {
+        Some(LiftedCloud { cloud, report }) => (PreparedObject::new(shape, cloud, task)?, report),
+        None => (PreparedObject::without_features(shape, task)?, None),
+    };
     let prepare_ms = milliseconds_since(start);
 
     let stages_ms = vec![("lift", lift_ms), ("shape", shape_ms), ("prepare", prepare_ms)];
-    let report = PreparationReport { from_cache: shape.hit, lifted, stages_ms };
+    let report = PreparationReport { from_cache, lifted, stages_ms };
     Ok(Prepared { object, report })
 }
 
@@ -136,8 +144,8 @@ pub struct LiftedCloud {
 /// who give one shape several kinds of features.
 ///
 /// # Errors
-/// [`Error::Invalid`] where per-vertex features do not fit the mesh, [`Error::Views`] for views that
-/// do not, [`Error::Geom`] for a mesh without area and on cancellation.
+/// [`Error::Invalid`] where per-vertex features do not fit the mesh and for
+/// [`FeatureSource::Geometry`], [`Error::Views`] for views that do not fit, [`Error::Geom`] for a mesh without area and on cancellation.
 pub fn semantic_cloud(
     mesh: &Mesh,
     features: FeatureSource<'_>,
@@ -154,6 +162,9 @@ pub fn semantic_cloud(
             Ok(LiftedCloud { cloud: Arc::new(cloud), report: None })
         }
         FeatureSource::Cloud(cloud) => Ok(LiftedCloud { cloud, report: None }),
+        FeatureSource::Geometry => {
+            Err(Error::invalid("features", "those of views, vertices or a cloud", "none"))
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::encoder_command::{EncodedPair, EncoderCommand, EncoderSettings};
 use semfm::files::{
@@ -22,9 +22,9 @@ use crate::options::Common;
 /// Transfer a region from one object to another
 ///
 /// Features say which places of the two surfaces are alike: embeddings files of both objects, an
-/// encoder that makes them, or per-vertex features from any network.
+/// encoder that makes them, or per-vertex features from any network. The method `wks` needs none.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("features_from").required(true)
+#[command(group = ArgGroup::new("features_from")
     .args(["source_embeddings", "encoder", "source_features"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --encoder google/siglip2-base-patch16-224\n  \
@@ -78,6 +78,12 @@ struct FeatureOptions {
     /// Lift with the settings of this method instead of the method's own
     #[arg(long, value_name = "METHOD")]
     features: Option<Method>,
+}
+
+impl FeatureOptions {
+    fn are_missing(&self) -> bool {
+        self.encoder.is_none() && self.source_embeddings.is_none() && self.source_features.is_none()
+    }
 }
 
 #[derive(Debug, Args)]
@@ -174,6 +180,19 @@ impl TransferCommand {
         common: &Common,
     ) -> Result<Pair<Prepared>> {
         let options = &self.features;
+        if options.are_missing() {
+            let method = self.matching.method;
+            if method.info().reads_features {
+                bail!(
+                    "--method {method} needs features of both objects: give --encoder, \
+                     --source-embeddings with --target-embeddings, or --source-features with \
+                     --target-features (--method wks needs none)"
+                );
+            }
+            let features =
+                Pair { source: FeatureSource::Geometry, target: FeatureSource::Geometry };
+            return self.prepare_both(files, features, settings, task);
+        }
         if let (Some(a), Some(b)) = (&options.source_features, &options.target_features) {
             let a = read_vertex_features(a, &files.source.mesh)?;
             let b = read_vertex_features(b, &files.target.mesh)?;

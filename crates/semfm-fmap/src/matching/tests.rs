@@ -22,6 +22,44 @@ fn blob_object(stretch: f64, offset: f32) -> PreparedObject {
     object(shape(&mesh, 60), cloud(&mesh, stretch, offset))
 }
 
+fn bare(object: &PreparedObject) -> PreparedObject {
+    PreparedObject::without_features(object.shape().clone(), &Task::default()).unwrap()
+}
+
+#[test]
+fn wks_gives_the_same_region_without_features_and_trusts_it_less() {
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
+    let (region, task) = (tip(&source, 1.0), Task::default());
+    for rule in [Rule::Preimage, Rule::Image] {
+        let settings = TransferSettings { rule, ..TransferSettings::of(Method::Wks) };
+        let with = transfer(&source, &target, &region, &settings, &task).unwrap();
+        let without = transfer(&bare(&source), &bare(&target), &region, &settings, &task).unwrap();
+        assert_eq!(without.region, with.region);
+        assert_eq!(without.point_map, with.point_map);
+        assert_eq!(without.report.agreement, None);
+        assert!(without.verdict != Verdict::Accept, "{}", without.confidence);
+        assert!(without.report.anchors.is_empty());
+    }
+}
+
+#[test]
+fn a_method_that_reads_features_refuses_objects_without() {
+    let (source, target) = (blob_object(1.0, 0.2), blob_object(1.5, 0.6));
+    let (region, task) = (tip(&source, 1.0), Task::default());
+    let refusal = |source: &PreparedObject, target: &PreparedObject, method: Method| {
+        let settings = TransferSettings::of(method);
+        transfer(source, target, &region, &settings, &task).unwrap_err().to_string()
+    };
+    for method in Method::ALL.into_iter().filter(|method| method.info().reads_features) {
+        let message = refusal(&bare(&source), &bare(&target), method);
+        assert!(message.contains("`wks`") && message.contains(method.name()), "{message}");
+    }
+    let message = refusal(&source, &bare(&target), Method::Wks);
+    assert!(message.contains("none of the target"), "{message}");
+    let message = refusal(&bare(&source), &target, Method::Wks);
+    assert!(message.contains("none of the source"), "{message}");
+}
+
 /// The end of a blob towards +x.
 fn tip(object: &PreparedObject, stretch: f64) -> Region {
     let inside: Vec<bool> =

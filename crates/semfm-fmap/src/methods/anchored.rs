@@ -20,6 +20,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "the paper's anchors, then features and heat",
     color: [204, 121, 167],
     features: ViewFeatures::PULLED,
+    reads_features: true,
     has_map: true,
     confidence: ConfidenceRule::Agreement,
     settings,

@@ -25,6 +25,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "the default: transport starts a map that features steer, the vote is spread along them",
     color: [0, 158, 115],
     features: ViewFeatures::PULLED,
+    reads_features: true,
     has_map: true,
     confidence: ConfidenceRule::Evidence,
     settings,

@@ -20,6 +20,9 @@ pub struct MethodInfo {
     pub color: [u8; 3],
     /// How the features that it was made for come about.
     pub features: ViewFeatures,
+    /// Whether it reads features at all: one that does not is content with the geometry
+    /// ([`PreparedObject::without_features`](crate::PreparedObject::without_features)).
+    pub reads_features: bool,
     /// Whether a functional map stands behind the answer: the others have no image rule.
     pub has_map: bool,
     /// What its confidence is made of.

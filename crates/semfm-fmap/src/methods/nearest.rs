@@ -14,6 +14,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "the vote of the nearest points in feature space, no map",
     color: [230, 159, 0],
     features: ViewFeatures::PULLED,
+    reads_features: true,
     has_map: false,
     confidence: ConfidenceRule::Agreement,
     settings,

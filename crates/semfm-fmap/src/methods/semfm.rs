@@ -23,6 +23,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "the published method to the letter: two anchors, minimum-norm C, plain ZoomOut",
     color: [0, 114, 178],
     features: ViewFeatures { lifting: Lifting::Unproject, rolls: 1 },
+    reads_features: true,
     has_map: true,
     confidence: ConfidenceRule::Agreement,
     settings,

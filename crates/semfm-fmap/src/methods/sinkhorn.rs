@@ -14,6 +14,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "unbalanced transport between the clouds, no map",
     color: [86, 180, 233],
     features: ViewFeatures::PULLED,
+    reads_features: true,
     has_map: false,
     confidence: ConfidenceRule::Agreement,
     settings,

@@ -19,6 +19,7 @@ pub(super) const INFO: MethodInfo = MethodInfo {
     summary: "wave kernel signatures: geometry alone, the paper's baseline",
     color: [213, 94, 0],
     features: ViewFeatures::PULLED,
+    reads_features: false,
     has_map: true,
     confidence: ConfidenceRule::Agreement,
     settings,
