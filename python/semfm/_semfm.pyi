@@ -2361,7 +2361,7 @@ def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings
     cloud : SemanticCloud, optional
         Surface points with features, made by the caller.
     method : str, optional
-        Lift as this method does: ``"fused"`` where neither this nor `settings` is given.
+        Lift as this method does (``"wks"`` needs no features): ``"fused"`` where neither this nor `settings` is given.
     settings : TransferSettings, optional
         Lift as the method of these settings does.
     k : int, optional
@@ -2607,7 +2607,7 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     target_cloud : SemanticCloud, optional
     method : str, optional
         ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
-        ``anchored``, ``sinkhorn``, ``nearest`` or ``wks``.
+        ``anchored``, ``sinkhorn``, ``nearest``, or ``wks``, which needs no features.
     rule : str, optional
         How a map transfers the region: ``preimage`` (where none is given) or ``image``.
     seed : int, optional

@@ -82,13 +82,7 @@ impl PreparedObject {
         py: Python<'py>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (
-            Shape,
-            Option<SemanticCloud>,
-            bool,
-            Option<(usize, Vec<usize>)>,
-            Vec<(&'static str, f64)>,
-        ),
+        (Shape, Option<SemanticCloud>, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
         let report = &self.inner.report;

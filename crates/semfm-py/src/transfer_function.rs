@@ -41,8 +41,15 @@ impl Side {
         }
         let mesh = from_any(value, name)?;
         check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-        let features =
-            OwnedFeatures::of(py, &format!("{name}_"), &mesh, settings.transfer.method, features, embeddings, cloud)?;
+        let features = OwnedFeatures::of(
+            py,
+            &format!("{name}_"),
+            &mesh,
+            settings.transfer.method,
+            features,
+            embeddings,
+            cloud,
+        )?;
         Ok(Self::Raw(mesh, features))
     }
 

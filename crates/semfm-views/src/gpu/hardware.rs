@@ -75,7 +75,9 @@ fn is_software(driver: &Path) -> bool {
     let name = driver.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let text = std::fs::read_to_string(driver).unwrap_or_default().to_lowercase();
     SOFTWARE_DRIVERS.iter().any(|software| {
-        name.contains(software) || text.contains(&format!("libvulkan_{software}")) || text.contains(&format!("libvk_{software}"))
+        name.contains(software)
+            || text.contains(&format!("libvulkan_{software}"))
+            || text.contains(&format!("libvk_{software}"))
     })
 }
 
@@ -92,9 +94,11 @@ mod tests {
     /// A machine with these (empty) files and these links.
     fn machine(files: &[&str], links: &[(&str, &str)]) -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
-        for (path, link) in files.iter().map(|file| (file, None)).chain(
-            links.iter().map(|(path, to)| (path, Some(to))),
-        ) {
+        for (path, link) in files
+            .iter()
+            .map(|file| (file, None))
+            .chain(links.iter().map(|(path, to)| (path, Some(to))))
+        {
             let path = root.path().join(path);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             match link {
@@ -118,7 +122,8 @@ mod tests {
         assert!(!is_possible(&[], &[]));
         assert!(!is_possible(&[LAVAPIPE, INTEL], &[]));
         assert!(!is_possible(&["dev/dri/card0", "dev/nvidiactl", "dev/nvidia-uvm", INTEL], &[]));
-        let virtual_node = ("sys/class/drm/renderD128/device/driver", "/sys/bus/platform/drivers/vgem");
+        let virtual_node =
+            ("sys/class/drm/renderD128/device/driver", "/sys/bus/platform/drivers/vgem");
         assert!(!is_possible(&["dev/dri/renderD128", INTEL], &[virtual_node]));
     }
 
