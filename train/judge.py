@@ -18,8 +18,6 @@ from semfm.__main__ import main as run_command
 from semfm.sidecar.embed import EmbedSettings, embed_file
 from semfm.sidecar.onnx_encoder import OnnxEncoder
 
-METHODS = ("fused", "nearest")
-
 
 def embed_objects(data: Path, encoder_json: str, folder: Path, rolls: int, count: int) -> None:
     """Writes `NAME.emb.mcap` of every labelled object; views are kept in the folder for next time."""
@@ -39,10 +37,10 @@ def embed_objects(data: Path, encoder_json: str, folder: Path, rolls: int, count
         embed_file(views, output, encoder, EmbedSettings(rolls=rolls))
 
 
-def table(rows: list[dict]) -> str:
+def table(rows: list[dict], methods: list[str]) -> str:
     """Mean IoU of each method over all pairs and by group, one line a method."""
     lines = []
-    for method in METHODS:
+    for method in methods:
         mine = [row for row in rows if row["method"] == method]
         groups: dict[str, list[float]] = {}
         for row in mine:
@@ -61,6 +59,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
     parser.add_argument("--rolls", type=int, choices=(1, 2, 4), default=1)
     parser.add_argument("--views", type=int, default=14)
+    parser.add_argument("--methods", default="fused,nearest")
     parser.add_argument("--threads", type=int, default=2)
     arguments = parser.parse_args()
     embed_objects(
@@ -69,10 +68,10 @@ def main() -> None:
     report = arguments.output / "report"
     run_command(
         ["eval", str(arguments.data), "--embeddings", str(arguments.output / "embeddings"),
-         "--methods", ",".join(METHODS), "--gallery", "0", "--no-predictions", "--fresh", "--quiet",
+         "--methods", arguments.methods, "--gallery", "0", "--no-predictions", "--fresh", "--quiet",
          "--threads", str(arguments.threads), "-o", str(report)]  # fmt: skip
     )
-    print(table(json.loads((report / "results.json").read_text())["rows"]))
+    print(table(json.loads((report / "results.json").read_text())["rows"], arguments.methods.split(",")))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ pub const TESTS: Needs = Needs { extras: &["onnx"], groups: &["test"] };
 /// What all tests need: torch, Ray, other people's libraries and viewers.
 pub const ALL_TESTS: Needs = Needs {
     extras: &["onnx", "lite", "embed", "ray"],
-    groups: &["test", "notebook", "peers", "viewers"],
+    groups: &["test", "train", "notebook", "peers", "viewers"],
 };
 
 /// Makes `.venv` where it is not there, installs the package with what it `needs` where something
