@@ -5,7 +5,8 @@
 
 The rate warms up, stays, and falls to zero over the last `--decay` share of the pictures; a piece
 with `--decay 0` can be gone on from at any time. Every piece writes its checkpoint as it goes, and
-objects that have been added to the folder since are taken up at each report.
+objects that have been added to the folder since are taken up at each report. See `workers.py` for
+training with several processes.
 
 Loss, over patches with weight w, target t (length 1 on average) and token z:
 
@@ -24,6 +25,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from . import workers
 from .augment import as_input, augmented
 from .checkpoint import Checkpoint
 from .examples import Batch, Examples, fit_axes
@@ -49,7 +51,7 @@ class Settings:
 
     @property
     def steps(self) -> int:
-        return max(1, self.pictures // self.batch)
+        return max(1, self.pictures // (self.batch * workers.count()))
 
     def rate_at(self, step: int) -> float:
         """Warm-up, plateau, linear fall to zero."""
@@ -100,6 +102,8 @@ class Trainer:
         if start is not None:
             self.mean.load_state_dict(start.mean_weights)
         self.step_of_piece = 0
+        pictures = start.provenance["pictures"] if start is not None else 0
+        self.steps_before = pictures // (settings.batch * workers.count())
 
     def step(self, batch: Batch) -> Fit:
         """One step on a batch of inputs (see `augment.py`)."""
@@ -112,6 +116,7 @@ class Trainer:
         found = fit(tokens, batch.targets, batch.weights)
         self.optimiser.zero_grad(set_to_none=True)
         found.loss.backward()
+        workers.average_gradients(self.student.parameters())
         torch.nn.utils.clip_grad_norm_(self.student.parameters(), _CLIP_NORM)
         self.optimiser.step()
         self.step_of_piece += 1
@@ -119,8 +124,9 @@ class Trainer:
         return found
 
     def _update_mean(self) -> None:
-        """mean ← mean + (weights − mean) / n for n = min(steps, _MEAN_STEPS): young means are short."""
-        share = 1 / min(1 + self.step_of_piece / 10, _MEAN_STEPS)
+        """mean ← mean + (weights − mean) / n, n = min(steps / 10, _MEAN_STEPS): young means are short."""
+        steps = self.steps_before + self.step_of_piece
+        share = 1 / min(1 + steps / 10, _MEAN_STEPS)
         with torch.no_grad():
             state = self.student.state_dict()
             for name, tensor in self.mean.state_dict().items():
@@ -158,6 +164,11 @@ def batches(examples: Examples, settings: Settings, seed: int):
                 break
 
 
+def cpu_minutes() -> float:
+    """CPU time of all processes of this piece, as if they were alike."""
+    return time.process_time() * workers.count() / 60
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path, help="folder of train.dataset")
@@ -172,6 +183,7 @@ def main() -> None:
     parser.add_argument("--report", type=int, default=150, help="steps between reports")
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
+    workers.start()
     start = Checkpoint.read(arguments.start) if arguments.start else None
     axes = start.axes if start else fit_axes(arguments.data, "train_*.npz")
     seen, left_out = Examples.empty(), Examples.empty()
@@ -188,16 +200,16 @@ def main() -> None:
     def checkpoint() -> Checkpoint:
         piece = {
             "seed": settings.seed,
-            "pictures": trainer.step_of_piece * settings.batch,
+            "pictures": trainer.step_of_piece * settings.batch * workers.count(),
             "rate": settings.rate,
             "decay": settings.decay,
-            "batch": settings.batch,
+            "batch": settings.batch * workers.count(),
             "objects": len(seen.pictures),
         }
         provenance = {
             "objects": len(seen.pictures),
             "pictures": before["pictures"] + piece["pictures"],
-            "cpu_minutes": round(before["cpu_minutes"] + time.process_time() / 60, 1),
+            "cpu_minutes": round(before["cpu_minutes"] + cpu_minutes(), 1),
             "variance_kept": round(axes.kept, 4),
             "pieces": [*before["pieces"], piece],
         }
@@ -210,23 +222,27 @@ def main() -> None:
         )
 
     load_new()
-    print(f"{len(seen.pictures)} objects, {len(left_out.pictures)} left out, "
-          f"{axes.kept:.3f} of the variance on the axes", flush=True)  # fmt: skip
+    if workers.rank() == 0:
+        print(f"{len(seen.pictures)} objects, {len(left_out.pictures)} left out, "
+              f"{axes.kept:.3f} of the variance on the axes", flush=True)  # fmt: skip
     recent = []
-    source = batches(seen, settings, settings.seed + before["pictures"])
+    seed = (settings.seed + before["pictures"]) * workers.count() + workers.rank()
+    source = batches(seen, settings, seed)
     while trainer.step_of_piece < settings.steps:
         found = trainer.step(next(source))
         recent.append((found.squared.item(), found.cosine.item()))
-        if trainer.step_of_piece % arguments.report == 0 or trainer.step_of_piece == settings.steps:
+        if trainer.step_of_piece % arguments.report and trainer.step_of_piece < settings.steps:
+            continue
+        if workers.rank() == 0:
             squared, cosine = np.mean(recent, axis=0)
             kept_back = trainer.validate(left_out)
             print(f"step {trainer.step_of_piece} of {settings.steps}: squared {squared:.3f}, cosine "
                   f"{cosine:.3f}; left out: squared {kept_back.squared:.3f}, cosine "
                   f"{kept_back.cosine:.3f}; {len(seen.pictures)} objects, "
-                  f"{time.process_time() / 60:.1f} CPU min", flush=True)  # fmt: skip
-            recent.clear()
+                  f"{cpu_minutes():.1f} CPU min", flush=True)  # fmt: skip
             checkpoint().write(arguments.output)
-            load_new()
+        recent.clear()
+        load_new()
 
 
 if __name__ == "__main__":
