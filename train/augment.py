@@ -6,6 +6,7 @@ teacher's features tell left from right too weakly to be worth keeping.
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 
 from .examples import MEAN, STD, Batch
@@ -27,7 +28,7 @@ def as_input(pictures: torch.Tensor) -> torch.Tensor:
     return (pictures.float() / 255 - MEAN) / STD
 
 
-def _turned(batch: Batch, i: int, generator: torch.Generator):
+def _turned(batch: Batch, i: int, generator: torch.Generator) -> list[torch.Tensor]:
     turns = int(torch.randint(4, (), generator=generator))
     mirror = bool(torch.randint(2, (), generator=generator))
     parts = []
@@ -38,14 +39,19 @@ def _turned(batch: Batch, i: int, generator: torch.Generator):
 
 
 def _relit(pictures: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """Each picture through a table of its own: 256 greys to inputs, (n, 256)."""
     n = len(pictures)
 
-    def normal(std: float) -> torch.Tensor:
-        return std * torch.randn(n, 1, 1, 1, generator=generator)
+    def uniform() -> torch.Tensor:
+        return torch.rand(n, 1, generator=generator)
 
-    ground = pictures == 255
-    x = as_input(pictures)
-    x = x * torch.exp(normal(_CONTRAST)) + normal(_BRIGHTNESS)
-    other = torch.rand(n, 1, 1, 1, generator=generator) < _OTHER_GROUND
-    grey = torch.rand(n, 1, 1, 1, generator=generator) * 2 - 1
-    return torch.where(ground, torch.where(other, grey, torch.ones(())), x)
+    def normal(std: float) -> torch.Tensor:
+        return std * torch.randn(n, 1, generator=generator)
+
+    tables = as_input(torch.arange(256)) * torch.exp(normal(_CONTRAST)) + normal(_BRIGHTNESS)
+    other, grey = uniform() < _OTHER_GROUND, 2 * uniform() - 1
+    white = as_input(torch.tensor(255.0))
+    tables[:, 255:] = torch.where(other, grey, white)  # the background
+    # numpy looks bytes up without widening them to indices of 8 bytes
+    looked_up = [table[picture] for table, picture in zip(tables.numpy(), pictures.numpy())]
+    return torch.from_numpy(np.stack(looked_up))

@@ -27,9 +27,17 @@ class Checkpoint:
 
     def student(self) -> Student:
         """The net with its averaged weights, ready to use."""
-        student = Student()
-        student.load_state_dict(self.mean_weights)
-        return student.eval()
+        return self._load(self.mean_weights).eval()
+
+    def student_in_training(self) -> Student:
+        """The net with the weights that the optimiser has reached."""
+        return self._load(self.weights)
+
+    @staticmethod
+    def _load(weights: dict) -> Student:
+        student = Student(normed="stem.norm.weight" in weights)
+        student.load_state_dict(weights)
+        return student
 
     def write(self, path: Path) -> None:
         """Whole or not at all."""

@@ -69,9 +69,9 @@ class Examples:
     def __len__(self) -> int:
         return sum(len(pictures) for pictures in self.pictures)
 
-    def load_new(self, folder: Path, pattern: str, axes: Axes) -> int:
-        """Adds the files that were not there at the last call; how many."""
-        new = [path for path in sorted(folder.glob(pattern)) if path.name not in self.files]
+    def load_new(self, paths: list[Path], axes: Axes) -> int:
+        """Adds the files that were not among those of earlier calls; how many."""
+        new = [path for path in paths if path.name not in self.files]
         for path in new:
             with np.load(path) as arrays:
                 field = axes.project(arrays["features"])

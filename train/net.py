@@ -4,8 +4,9 @@
     tokens (n, 64, 14, 14), one for each patch of 16 × 16 pixels
 
 Residual blocks are two 3×3 convolutions; the last four have dilations 1, 2, 1, 2, so that a token
-sees the whole object. While training every convolution but the last is followed by a batch norm,
-which `folded` merges into its weights: the exported net has convolutions, ReLU and additions alone.
+sees the whole object. At first every convolution but the last is followed by a batch norm; later
+pieces of training, and the exported net, have convolutions, ReLU and additions alone: `without_norms`
+merges each norm into its convolution.
 """
 
 from __future__ import annotations
@@ -24,12 +25,14 @@ _DILATIONS = (1, 2, 1, 2)
 
 
 class ConvNorm(nn.Module):
-    """A convolution and its batch norm."""
+    """A convolution and its batch norm, or one with a bias in its place."""
 
-    def __init__(self, n_in: int, n_out: int, kernel: int, stride=1, padding=0, dilation=1) -> None:
+    def __init__(
+        self, n_in: int, n_out: int, kernel: int, stride=1, padding=0, dilation=1, normed=True
+    ) -> None:
         super().__init__()
-        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, padding, dilation, bias=False)
-        self.norm = nn.BatchNorm2d(n_out)
+        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, padding, dilation, bias=not normed)
+        self.norm = nn.BatchNorm2d(n_out) if normed else nn.Identity()
         nn.init.kaiming_normal_(self.conv.weight, nonlinearity="relu")
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
@@ -39,11 +42,12 @@ class ConvNorm(nn.Module):
 class Residual(nn.Module):
     """relu(x + conv(relu(conv(x)))), of 3×3 convolutions; the first one is dilated."""
 
-    def __init__(self, width: int, dilation: int) -> None:
+    def __init__(self, width: int, dilation: int, normed=True) -> None:
         super().__init__()
-        self.first = ConvNorm(width, width, 3, padding=dilation, dilation=dilation)
-        self.second = ConvNorm(width, width, 3, padding=1)
-        nn.init.zeros_(self.second.norm.weight)  # starts as the identity
+        self.first = ConvNorm(width, width, 3, padding=dilation, dilation=dilation, normed=normed)
+        self.second = ConvNorm(width, width, 3, padding=1, normed=normed)
+        if normed:
+            nn.init.zeros_(self.second.norm.weight)  # starts as the identity
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return torch.relu(x + self.second(torch.relu(self.first(x))))
@@ -52,14 +56,15 @@ class Residual(nn.Module):
 class Student(nn.Module):
     """See the module."""
 
-    def __init__(self, channels: int = 1) -> None:
+    def __init__(self, normed: bool = True) -> None:
         super().__init__()
         a, b, c = _WIDTHS
-        self.stem = ConvNorm(channels, a, 4, stride=4)
-        self.down = ConvNorm(a, b, 3, stride=2, padding=1)
-        self.fine = Residual(b, 1)
-        self.patch = ConvNorm(b, c, 2, stride=2)
-        self.coarse = nn.ModuleList(Residual(c, dilation) for dilation in _DILATIONS)
+        self.normed = normed
+        self.stem = ConvNorm(1, a, 4, stride=4, normed=normed)
+        self.down = ConvNorm(a, b, 3, stride=2, padding=1, normed=normed)
+        self.fine = Residual(b, 1, normed)
+        self.patch = ConvNorm(b, c, 2, stride=2, normed=normed)
+        self.coarse = nn.ModuleList(Residual(c, dilation, normed) for dilation in _DILATIONS)
         self.head = nn.Conv2d(c, DIM, 1)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
@@ -107,6 +112,19 @@ def folded(student: Student) -> list[Layer]:
         return [_detached(layer) for layer in _layers(student)]
 
 
+def without_norms(student: Student) -> Student:
+    """The same function with norms merged into their convolutions, to be trained on."""
+    merged = Student(normed=False)
+    convs = [layer for layer in folded(student) if isinstance(layer, Conv)]
+    with torch.no_grad():
+        # modules are made in the order in which they run, so parameters come in the layers' order
+        modules = [m for m in merged.modules() if isinstance(m, nn.Conv2d)]
+        for module, conv in zip(modules, convs, strict=True):
+            module.weight.copy_(conv.weight)
+            module.bias.copy_(conv.bias)
+    return merged
+
+
 def _layers(student: Student) -> Iterator[Layer]:
     yield _fold(student.stem, relu=True)
     yield _fold(student.down, relu=True)
@@ -127,9 +145,10 @@ def _fold_residual(block: Residual) -> Iterator[Layer]:
 
 def _fold(unit: ConvNorm, relu: bool) -> Conv:
     """norm(conv(x)) = γ (w∗x − μ) / √(σ² + ε) + β = (s w)∗x + (β − s μ) with s = γ / √(σ² + ε)."""
-    norm = unit.norm
+    conv, norm = unit.conv, unit.norm
+    if isinstance(norm, nn.Identity):
+        return Conv(conv.weight, conv.bias, conv.stride[0], conv.padding[0], conv.dilation[0], relu)
     s = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-    conv = unit.conv
     return Conv(
         conv.weight * s[:, None, None, None],
         norm.bias - s * norm.running_mean,

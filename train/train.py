@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ from . import workers
 from .augment import as_input, augmented
 from .checkpoint import Checkpoint
 from .examples import Batch, Examples, fit_axes
-from .net import Student
+from .net import Student, without_norms
 
 #: Tried: .02. Larger slows learning down, smaller was not told apart.
 _WEIGHT_DECAY = 0.02
@@ -48,15 +49,20 @@ class Settings:
     rate: float = 2e-3
     batch: int = 64
     seed: int = 0
+    minutes: float = math.inf
 
     @property
     def steps(self) -> int:
         return max(1, self.pictures // (self.batch * workers.count()))
 
-    def rate_at(self, step: int) -> float:
+    def progress(self, step: int, minutes: float) -> float:
+        """How much of the piece is over, 0 to 1: by the count, or by the clock where one is set."""
+        return max(step / self.steps, minutes / self.minutes)
+
+    def rate_at(self, step: int, progress: float) -> float:
         """Warm-up, plateau, linear fall to zero."""
-        left = (self.steps - step) / max(self.decay * self.steps, 1e-9)
-        return self.rate * min(1, (step + 1) / _WARM_UP_STEPS, left)
+        left = (1 - progress) / max(self.decay, 1e-9)
+        return self.rate * max(0, min(1, (step + 1) / _WARM_UP_STEPS, left))
 
 
 @dataclass(frozen=True)
@@ -84,10 +90,19 @@ def fit(tokens: torch.Tensor, targets: torch.Tensor, weights: torch.Tensor) -> F
 class Trainer:
     """A student, its running mean and its optimiser."""
 
-    def __init__(self, settings: Settings, start: Checkpoint | None = None) -> None:
+    def __init__(
+        self, settings: Settings, start: Checkpoint | None = None, merge_norms: bool = False
+    ) -> None:
         torch.manual_seed(settings.seed)
         self.settings = settings
-        self.student = Student().to(memory_format=torch.channels_last)
+        student = start.student_in_training() if start is not None else Student()
+        mean = start.student() if start is not None else copy.deepcopy(student)
+        merged = merge_norms and student.normed
+        if merged:
+            student = without_norms(mean)
+            mean = copy.deepcopy(student)
+        self.student = student.to(memory_format=torch.channels_last)
+        self.mean = mean.to(memory_format=torch.channels_last)
         plain = [p for p in self.student.parameters() if p.ndim <= 1]
         matrices = [p for p in self.student.parameters() if p.ndim > 1]
         groups = [
@@ -95,20 +110,23 @@ class Trainer:
             {"params": plain, "weight_decay": 0.0},
         ]
         self.optimiser = torch.optim.AdamW(groups, lr=settings.rate)
-        if start is not None:
-            self.student.load_state_dict(start.weights)
+        if start is not None and not merged:
             self.optimiser.load_state_dict(start.optimiser)
-        self.mean = copy.deepcopy(self.student)
-        if start is not None:
-            self.mean.load_state_dict(start.mean_weights)
         self.step_of_piece = 0
         pictures = start.provenance["pictures"] if start is not None else 0
         self.steps_before = pictures // (settings.batch * workers.count())
+        self._started = time.monotonic()
+
+    def progress(self) -> float:
+        """How much of the piece is over, the same in all processes."""
+        minutes = (time.monotonic() - self._started) / 60
+        return workers.largest(self.settings.progress(self.step_of_piece, minutes))
 
     def step(self, batch: Batch) -> Fit:
         """One step on a batch of inputs (see `augment.py`)."""
+        rate = self.settings.rate_at(self.step_of_piece, self.progress())
         for group in self.optimiser.param_groups:
-            group["lr"] = self.settings.rate_at(self.step_of_piece)
+            group["lr"] = rate
         self.student.train()
         inputs = batch.pictures.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
@@ -175,8 +193,14 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CHECKPOINT")
     parser.add_argument("--from", dest="start", type=Path, metavar="CHECKPOINT")
     parser.add_argument("--pictures", type=int, required=True, help="passes through the net")
+    parser.add_argument(
+        "--minutes", type=float, default=math.inf, help="end by the clock where that is earlier"
+    )
     parser.add_argument("--decay", type=float, default=0.3)
     parser.add_argument("--rate", type=float, default=2e-3)
+    parser.add_argument(
+        "--merge-norms", action="store_true", help="go on from the running mean without batch norms"
+    )
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=2)
@@ -188,14 +212,19 @@ def main() -> None:
     axes = start.axes if start else fit_axes(arguments.data, "train_*.npz")
     seen, left_out = Examples.empty(), Examples.empty()
     settings = Settings(
-        arguments.pictures, arguments.decay, arguments.rate, arguments.batch, arguments.seed
-    )
-    trainer = Trainer(settings, start)
+        arguments.pictures, arguments.decay, arguments.rate, arguments.batch, arguments.seed,
+        arguments.minutes,
+    )  # fmt: skip
+    trainer = Trainer(settings, start, arguments.merge_norms)
     before = start.provenance if start else {"pictures": 0, "cpu_minutes": 0.0, "pieces": []}
 
     def load_new() -> None:
-        seen.load_new(arguments.data, "train_*.npz", axes)
-        left_out.load_new(arguments.data, "left_*.npz", axes)
+        seen.load_new(workers.mine(sorted(arguments.data.glob("train_*.npz"))), axes)
+        if workers.rank() == 0:
+            left_out.load_new(sorted(arguments.data.glob("left_*.npz"))[:32], axes)
+
+    def n_objects() -> int:
+        return len(list(arguments.data.glob("train_*.npz")))
 
     def checkpoint() -> Checkpoint:
         piece = {
@@ -203,11 +232,12 @@ def main() -> None:
             "pictures": trainer.step_of_piece * settings.batch * workers.count(),
             "rate": settings.rate,
             "decay": settings.decay,
+            "norms": trainer.student.normed,
             "batch": settings.batch * workers.count(),
-            "objects": len(seen.pictures),
+            "objects": n_objects(),
         }
         provenance = {
-            "objects": len(seen.pictures),
+            "objects": n_objects(),
             "pictures": before["pictures"] + piece["pictures"],
             "cpu_minutes": round(before["cpu_minutes"] + cpu_minutes(), 1),
             "variance_kept": round(axes.kept, 4),
@@ -223,22 +253,24 @@ def main() -> None:
 
     load_new()
     if workers.rank() == 0:
-        print(f"{len(seen.pictures)} objects, {len(left_out.pictures)} left out, "
+        print(f"{len(seen.pictures)} objects a process, {len(left_out.pictures)} left out, "
               f"{axes.kept:.3f} of the variance on the axes", flush=True)  # fmt: skip
     recent = []
     seed = (settings.seed + before["pictures"]) * workers.count() + workers.rank()
     source = batches(seen, settings, seed)
-    while trainer.step_of_piece < settings.steps:
+    over = False
+    while not over:
         found = trainer.step(next(source))
         recent.append((found.squared.item(), found.cosine.item()))
-        if trainer.step_of_piece % arguments.report and trainer.step_of_piece < settings.steps:
+        over = trainer.progress() >= 1
+        if trainer.step_of_piece % arguments.report and not over:
             continue
         if workers.rank() == 0:
             squared, cosine = np.mean(recent, axis=0)
             kept_back = trainer.validate(left_out)
             print(f"step {trainer.step_of_piece} of {settings.steps}: squared {squared:.3f}, cosine "
                   f"{cosine:.3f}; left out: squared {kept_back.squared:.3f}, cosine "
-                  f"{kept_back.cosine:.3f}; {len(seen.pictures)} objects, "
+                  f"{kept_back.cosine:.3f}; {len(seen.pictures) * workers.count()} objects, "
                   f"{cpu_minutes():.1f} CPU min", flush=True)  # fmt: skip
             checkpoint().write(arguments.output)
         recent.clear()

@@ -31,6 +31,20 @@ def count() -> int:
     return distributed.get_world_size() if distributed.is_initialized() else 1
 
 
+def mine(items: list) -> list:
+    """This process's share of a list: every item belongs to one process."""
+    return items[rank() :: count()]
+
+
+def largest(value: float) -> float:
+    """The largest of a number over all processes, so that they decide alike."""
+    if count() == 1:
+        return value
+    found = torch.tensor([value], dtype=torch.float64)
+    distributed.all_reduce(found, distributed.ReduceOp.MAX)
+    return found.item()
+
+
 def average_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
     """Replaces each gradient by its mean over all processes."""
     if count() == 1:

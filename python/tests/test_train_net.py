@@ -96,13 +96,23 @@ def test_turns_move_pictures_targets_and_weights_alike():
 def test_steps_lower_the_loss(data):
     axes = examples.fit_axes(data, "train_*.npz")
     seen = examples.Examples.empty()
-    assert seen.load_new(data, "train_*.npz", axes) == 2
-    assert seen.load_new(data, "train_*.npz", axes) == 0, "files are loaded once"
+    paths = sorted(data.glob("train_*.npz"))
+    assert seen.load_new(paths, axes) == 2
+    assert seen.load_new(paths, axes) == 0, "files are loaded once"
     settings = training.Settings(pictures=10**6, batch=8, decay=0)
     trainer = training.Trainer(settings)
     source = training.batches(seen, settings, 0)
     losses = [float(trainer.step(next(source)).loss.detach()) for _ in range(30)]
     assert np.mean(losses[-5:]) < 0.9 * np.mean(losses[:5])
+
+
+def test_norms_merge_into_convolutions():
+    student = export.random_student(3)
+    merged = net.without_norms(student).eval()
+    picture = torch.rand(2, 1, 224, 224) * 2 - 1
+    with torch.no_grad():
+        assert torch.allclose(merged(picture), student(picture), atol=1e-3)
+    assert not any(isinstance(m, torch.nn.BatchNorm2d) for m in merged.modules())
 
 
 def test_the_exported_file_reads_back_exactly(tmp_path):
