@@ -7,9 +7,7 @@ the *target*::
 
     mug, kettle = semfm.Mesh.read("mug.obj"), semfm.Mesh.read("kettle.ply")
     grip = semfm.Region.near(mug, contact=[0.05, 0.0, 0.04], radius=0.03)
-    result = semfm.transfer(
-        mug, kettle, grip,
-        source_embeddings="mug.emb.mcap", target_embeddings="kettle.emb.mcap")
+    result = semfm.transfer(mug, kettle, grip)
     print(result.verdict, result.region.vertices)
 
 `transfer` is the short call. `prepare` and `Matching` keep what is costly when one object is matched
@@ -59,6 +57,7 @@ from ._semfm import (
     demo_object,
     diffused_indicators,
     eigenbasis,
+    embed,
     farthest_points,
     find_grasps,
     geodesic_distances,
@@ -141,6 +140,7 @@ __all__ = [
     "demo_object",
     "diffused_indicators",
     "eigenbasis",
+    "embed",
     "errors",
     "farthest_points",
     "find_grasps",

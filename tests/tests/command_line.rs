@@ -12,7 +12,9 @@ use tempfile::TempDir;
 fn demo(category: &str, seed: &str) -> (TempDir, [PathBuf; 6]) {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().to_str().unwrap();
+    let simulated = ["--level", "medium"];
     let arguments = ["demo", "--quiet", "--category", category, "--seed", seed, "-o", at];
+    let arguments = [&arguments[..], &simulated].concat();
     let answer = run(&arguments);
     assert_eq!(answer.code, Some(0), "{answer:?}");
     let name = |i: usize, extension: &str| {
@@ -248,4 +250,70 @@ fn per_vertex_features_from_anywhere_carry_a_region() {
     let both = found.iter().filter(|v| truth.binary_search(v).is_ok()).count();
     let iou = both as f64 / (found.len() + truth.len() - both) as f64;
     assert!(iou > 0.7, "IoU {iou} with features that tell the grip");
+}
+
+#[test]
+fn the_built_in_encoder_is_the_default_and_reports_name_it() {
+    let (folder, files) = demo("containers", "0");
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let at = |name: &str| text(&folder.path().join(name));
+    let [a, b] = ["a.emb.mcap", "b.emb.mcap"].map(at);
+    for (mesh, embeddings) in [(&files[0], &a), (&files[1], &b)] {
+        let answer = run(&["embed", &text(mesh), "-o", embeddings, "--json", "--no-cache"]);
+        assert_eq!(answer.code, Some(0), "{answer:?}");
+        let told: Value = serde_json::from_str(&answer.out).unwrap();
+        assert_eq!((&told["encoder"], &told["n_views"]), (&"builtin".into(), &14.into()));
+    }
+    let short = ["transfer".to_owned(), text(&files[0]), text(&files[1])];
+    let short = [&short[..], &["--region".to_owned(), text(&files[2])]].concat();
+    let by_files = ["--source-embeddings", &a, "--target-embeddings", &b];
+    let ways: [(&str, &[&str]); 5] = [
+        ("default", &["--no-cache"]),
+        ("made-and-kept", &[]),
+        ("kept", &[]),
+        ("named", &["--encoder", "builtin"]),
+        ("files", &by_files),
+    ];
+    let mut answers = Vec::new();
+    for (name, more) in ways {
+        let mut arguments = short.clone();
+        arguments.extend(["-o".to_owned(), at(name)]);
+        arguments.extend(more.iter().map(|&word| word.to_owned()));
+        let answer = run(&arguments);
+        assert!(matches!(answer.code, Some(0 | 1)), "{name}: {answer:?}");
+        let report = json(&folder.path().join(name).join("report.json"));
+        for side in ["source", "target"] {
+            let encoder = &report[side]["encoder"];
+            assert_eq!(encoder["name"], "builtin", "{name}: {encoder}");
+            assert!(encoder["version"].as_str().unwrap().contains('+'), "{name}: {encoder}");
+            assert_eq!((&encoder["rolls"], &encoder["n_views"]), (&1.into(), &14.into()));
+        }
+        answers.push(json(&folder.path().join(name).join("region.json")));
+    }
+    assert!(answers.windows(2).all(|pair| pair[0] == pair[1]), "the ways differ");
+}
+
+#[test]
+fn only_the_files_that_were_asked_for_stay_in_the_folder() {
+    let (folder, files) = demo("containers", "0");
+    let out = folder.path().join("transfer");
+    let names = || -> Vec<String> {
+        let entries = std::fs::read_dir(&out).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    let all = names();
+    assert_eq!(transfer(&files, &out, &["--no-pictures"]).code, Some(0));
+    let data =
+        ["point_map.json", "region.json", "report.json", "source.ply", "target.glb", "target.ply"];
+    assert_eq!(names(), data);
+    assert_eq!(transfer(&files, &out, &["--only", "region"]).code, Some(0));
+    assert_eq!(names(), ["region.json", "report.json"]);
+    assert_eq!(transfer(&files, &out, &["--gripper", "franka", "--scale", "0.24"]).code, Some(0));
+    assert_eq!(names(), all);
+    let more = ["--gripper", "franka", "--scale", "0.24", "--no-pictures"];
+    assert_eq!(transfer(&files, &out, &more).code, Some(0));
+    assert!(!out.join("grasps.png").exists() && out.join("grasps.json").is_file());
 }

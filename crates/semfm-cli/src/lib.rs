@@ -12,7 +12,8 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    Outcome, align, completions, demo, eval, eval_maps, grasp, info, region, show, transfer, views,
+    Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show, transfer,
+    views,
 };
 use options::Common;
 
@@ -33,6 +34,7 @@ struct Arguments {
 enum Command {
     Demo(demo::DemoCommand),
     Views(views::ViewsCommand),
+    Embed(embed::EmbedCommand),
     Region(region::RegionCommand),
     Transfer(Box<transfer::TransferCommand>),
     Grasp(Box<grasp::GraspCommand>),
@@ -58,6 +60,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
     let run = || match arguments.command {
         Command::Demo(command) => command.run(&common),
         Command::Views(command) => command.run(&common),
+        Command::Embed(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),
         Command::Grasp(command) => command.run(&common),

@@ -34,7 +34,7 @@ pub(crate) struct PairPlace {
 /// What an evaluation is made of.
 pub(crate) struct Evaluation<'a> {
     pub dataset: &'a Dataset,
-    pub embeddings: &'a EmbeddingSource<'a>,
+    pub embeddings: &'a EmbeddingSource,
     pub settings: &'a EvalSettings,
     pub methods: &'a [MethodRun],
     /// Where what is done is kept.

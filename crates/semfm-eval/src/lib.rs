@@ -39,7 +39,7 @@ pub use correspondence::{
     MapSettings, MapSummary, run_maps,
 };
 pub use dataset::Dataset;
-pub use embeddings::{EmbeddingSource, Encoder};
+pub use embeddings::EmbeddingSource;
 pub use error::{Error, Result};
 pub use journal::{RunIdentity, RunSettings};
 pub use report::ReportSettings;

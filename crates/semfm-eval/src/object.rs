@@ -7,7 +7,7 @@ use std::time::Instant;
 use semfm::fmap::PreparedObject;
 use semfm::fmap::clusters::ClusterSettings;
 use semfm::geom::{SemanticCloud, Shape, ShapeCache, ShapeSettings};
-use semfm::{FeatureSource, LiftedCloud, Region, Task, semantic_cloud};
+use semfm::{EncoderRecord, FeatureSource, LiftedCloud, Region, Task, semantic_cloud};
 
 use crate::dataset::{LabelledObject, ObjectEntry};
 use crate::embeddings::EmbeddingSource;
@@ -20,7 +20,7 @@ pub(crate) type Attempt<T> = std::result::Result<T, Failure>;
 
 /// How objects are prepared.
 pub(crate) struct Preparation<'a> {
-    pub embeddings: &'a EmbeddingSource<'a>,
+    pub embeddings: &'a EmbeddingSource,
     pub shape: &'a ShapeSettings,
     pub cache: &'a ShapeCache,
     pub seed: u64,
@@ -78,7 +78,12 @@ impl EvalObject {
             clouds.insert(features, attempt("features", cloud)?);
         }
         if let Some(Ok(cloud)) = clouds.get(&Features::of_default_method()) {
-            (row.encoder, row.rolls, row.seen) = (cloud.encoder.clone(), cloud.rolls, cloud.seen);
+            row.seen = cloud.seen;
+            if let Some(encoder) = cloud.encoder.clone() {
+                row.encoder = Some(encoder.name);
+                row.encoder_version = Some(encoder.version);
+                row.rolls = Some(encoder.rolls);
+            }
         }
         let mut prepared = BTreeMap::new();
         if !clouds.is_empty() {
@@ -146,8 +151,7 @@ impl TimedObject {
 /// An object's semantic cloud, where its features came from and what making it took.
 struct TimedCloud {
     cloud: Arc<SemanticCloud>,
-    encoder: Option<String>,
-    rolls: Option<u32>,
+    encoder: Option<EncoderRecord>,
     /// Share of the samples that some view saw.
     seen: Option<f64>,
     stages_ms: BTreeMap<&'static str, f64>,
@@ -167,7 +171,7 @@ fn timed_cloud(
         let labels = part_features(object, part_names);
         let cloud = semantic_cloud(mesh, FeatureSource::PerVertex(&labels), &lift, task)?.cloud;
         let stages_ms = BTreeMap::new();
-        return Ok(TimedCloud { cloud, encoder: None, rolls: None, seen: None, stages_ms });
+        return Ok(TimedCloud { cloud, encoder: None, seen: None, stages_ms });
     }
     let embedded = preparation.embeddings.views(entry, object, features.rolls(), task)?;
     let mut stages_ms = BTreeMap::new();
@@ -178,11 +182,10 @@ fn timed_cloud(
     }
     let start = Instant::now();
     let features = FeatureSource::Views(&embedded.views);
-    let LiftedCloud { cloud, report } = semantic_cloud(mesh, features, &lift, task)?;
+    let LiftedCloud { cloud, report, .. } = semantic_cloud(mesh, features, &lift, task)?;
     stages_ms.insert("lift", milliseconds_since(start));
     Ok(TimedCloud {
         encoder: Some(embedded.encoder),
-        rolls: Some(embedded.rolls),
         seen: report.map(|report| report.n_seen as f64 / cloud.n_points() as f64),
         cloud,
         stages_ms,

@@ -85,6 +85,9 @@ pub struct ObjectRow {
     pub parts: Vec<String>,
     /// Name of the encoder that made the features of our views.
     pub encoder: Option<String>,
+    /// Version of its weights.
+    #[serde(default)]
+    pub encoder_version: Option<String>,
     /// Rotations that were averaged in them.
     pub rolls: Option<u32>,
     /// Share of the samples that some view saw.

@@ -6,7 +6,7 @@ use std::path::Path;
 use semfm::Task;
 use serde_json::json;
 
-use crate::dataset::{Dataset, DatasetOrigin};
+use crate::dataset::Dataset;
 use crate::embeddings::EmbeddingSource;
 use crate::evaluation::{Evaluation, PairPlace};
 use crate::journal::{FORMAT, Journal, Line, RunIdentity, RunSettings};
@@ -26,7 +26,7 @@ use crate::{Error, Result};
 /// cancellation. What goes wrong with one object or pair stands in its rows.
 pub fn run(
     dataset: &Dataset,
-    embeddings: &EmbeddingSource<'_>,
+    embeddings: &EmbeddingSource,
     settings: &EvalSettings,
     folder: &Path,
     task: &Task,
@@ -67,7 +67,7 @@ pub fn run(
 /// stands in its rows.
 pub fn evaluate(
     dataset: &Dataset,
-    embeddings: &EmbeddingSource<'_>,
+    embeddings: &EmbeddingSource,
     settings: &EvalSettings,
     task: &Task,
 ) -> Result<Results> {
@@ -116,17 +116,14 @@ impl Finished {
 
 fn identity(
     dataset: &Dataset,
-    embeddings: &EmbeddingSource<'_>,
+    embeddings: &EmbeddingSource,
     settings: &EvalSettings,
 ) -> RunIdentity {
     RunIdentity {
         format: FORMAT.into(),
         program: settings.program.clone(),
         dataset: dataset.hash.clone(),
-        embeddings: match &dataset.origin {
-            DatasetOrigin::Synthetic { level, .. } => format!("the simulated encoder ({level})"),
-            DatasetOrigin::Folder { .. } => embeddings.identity(),
-        },
+        embeddings: embeddings.identity(dataset),
         methods: settings.variants.iter().map(|variant| variant.name().to_owned()).collect(),
         settings: RunSettings {
             seed: settings.seed,

@@ -14,7 +14,7 @@ fn assert_send_sync<T: Send + Sync>() {}
 #[test]
 fn public_types_are_send_and_sync() {
     assert_send_sync::<(BootstrapSettings, PairDraws, Calibration, Comparison)>();
-    assert_send_sync::<(Embedded, EmbeddingSource<'_>, ObjectRow, Row)>();
+    assert_send_sync::<(Embedded, EmbeddingSource, ObjectRow, Row)>();
     assert_send_sync::<(Difference, Scope, ScoreTable<'_>, Summary, Workers)>();
     assert_send_sync::<(CorrespondenceDataset, MapMethod, MapResults, MapSettings)>();
     assert_send_sync::<(Dataset, EvalSettings, Finished, Override, Variant)>();

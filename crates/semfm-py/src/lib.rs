@@ -17,6 +17,7 @@ mod arrays_out;
 mod cloud;
 mod descriptors;
 mod eigenbasis;
+mod embed;
 mod embeddings;
 mod errors;
 mod functional_map;
@@ -58,6 +59,8 @@ mod _semfm {
     use crate::descriptors::{diffused_indicators, hks, wks};
     #[pymodule_export]
     use crate::eigenbasis::{Eigenbasis, eigenbasis};
+    #[pymodule_export]
+    use crate::embed::embed;
     #[pymodule_export]
     use crate::embeddings::{_restore_embeddings, _restore_patches, Embeddings, PatchEmbeddings};
     #[pymodule_export]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
+use semfm::encoder::rendered_views::Drawable;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io;
 
@@ -269,6 +270,34 @@ pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Shared<semfm::
     }
     let wanted = "a Mesh, a path, or an object with vertices and faces (or triangles)";
     Err(errors::wrong_type(name, wanted, value))
+}
+
+/// An object to be shown to an encoder: a mesh, with the colours of its file where there is one.
+#[derive(Clone)]
+pub struct GivenObject {
+    pub mesh: Shared<semfm::Mesh>,
+    file: Option<Arc<io::MeshFile>>,
+}
+
+impl GivenObject {
+    /// From a `MeshFile`, or from whatever is a mesh; a file that a path names is read with its
+    /// colours.
+    pub fn of(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
+        let file = match (value.cast::<MeshFile>(), value.extract::<PathBuf>()) {
+            (Ok(file), _) => file.get().inner.clone(),
+            (_, Ok(path)) => read_mesh(value.py(), path, None)?.inner,
+            _ => return Ok(Self { mesh: from_any(value, name)?, file: None }),
+        };
+        Ok(Self { mesh: Shared::part_of(&file, |file| &file.mesh), file: Some(file) })
+    }
+
+    /// As an encoder is shown it.
+    pub fn drawable(&self) -> Drawable<'_> {
+        match &self.file {
+            Some(file) => Drawable::File(file),
+            None => Drawable::Mesh(&self.mesh),
+        }
+    }
 }
 
 /// A mesh file: the mesh and what the file says about its colours.

@@ -3,15 +3,18 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use semfm::geom::SemanticCloud as Cloud;
-use semfm::{FeatureSource, Method, PipelineSettings, PreparationReport, Prepared, Task, fmap};
+use semfm::encoder::rendered_views::Coloring;
+use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, open_encoder};
+use semfm::geom::{SemanticCloud as Cloud, ShapeCache};
+use semfm::object_encoder::ObjectEncoder;
+use semfm::{FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
 use crate::arrays_in::{self, Axis};
 use crate::cloud::{SemanticCloud, embeddings_of};
-use crate::interruptible::run;
-use crate::mesh::{Mesh, from_any};
+use crate::interruptible::{guard, run};
+use crate::mesh::{GivenObject, Mesh};
 use crate::settings::{Options, TransferSettings};
 use crate::shape::{Shape, check_shape_size};
 use crate::shared::Shared;
@@ -63,6 +66,12 @@ impl PreparedObject {
         self.inner.report.from_cache
     }
 
+    /// dict, optional: name, version, rolls and number of views of the encoder behind the features; None where it is not known.
+    #[getter]
+    fn encoder<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json::to_python(py, &self.inner.report.encoder)
+    }
+
     /// dict: milliseconds by stage.
     #[getter]
     fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -82,15 +91,23 @@ impl PreparedObject {
         py: Python<'py>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (Shape, Option<SemanticCloud>, bool, Option<(usize, Vec<usize>)>, Vec<(&'static str, f64)>),
+        (
+            Shape,
+            Option<SemanticCloud>,
+            bool,
+            Option<(usize, Vec<usize>)>,
+            Vec<(&'static str, f64)>,
+            Bound<'py, PyAny>,
+        ),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_prepared")?;
         let report = &self.inner.report;
         let lifted = report.lifted.as_ref();
         let lifted = lifted.map(|lifted| (lifted.n_seen, lifted.lifted_by_view.clone()));
         let stages = report.stages_ms.clone();
+        let encoder = self.encoder(py)?;
         let cloud = self.inner.object.has_features().then(|| self.cloud());
-        Ok((restore, (self.shape(), cloud, report.from_cache, lifted, stages)))
+        Ok((restore, (self.shape(), cloud, report.from_cache, lifted, stages, encoder)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -104,7 +121,7 @@ impl PreparedObject {
 
 /// A prepared object out of a pickle.
 #[pyfunction]
-#[pyo3(signature = (shape, cloud, from_cache, lifted, stages_ms))]
+#[pyo3(signature = (shape, cloud, from_cache, lifted, stages_ms, encoder))]
 pub fn _restore_prepared(
     py: Python<'_>,
     shape: &Bound<'_, Shape>,
@@ -112,10 +129,14 @@ pub fn _restore_prepared(
     from_cache: bool,
     lifted: Option<(usize, Vec<usize>)>,
     stages_ms: Vec<(String, f64)>,
+    encoder: &Bound<'_, PyAny>,
 ) -> PyResult<PreparedObject> {
+    let encoder = serde_json::from_value(json::from_python(encoder, "encoder")?).ok().flatten();
     let stages_ms = stages_ms
         .iter()
         .map(|(name, ms)| match &**name {
+            "views" => ("views", *ms),
+            "embed" => ("embed", *ms),
             "lift" => ("lift", *ms),
             "shape" => ("shape", *ms),
             _ => ("prepare", *ms),
@@ -130,12 +151,13 @@ pub fn _restore_prepared(
         })
     })?;
     let lifted = lifted.map(|(n_seen, lifted_by_view)| LiftReport { n_seen, lifted_by_view });
-    let report = PreparationReport { from_cache, lifted, stages_ms };
+    let report = PreparationReport { from_cache, lifted, encoder, stages_ms };
     Ok(PreparedObject::new(Prepared { object, report }))
 }
 
 /// Where an object's features come from, owned.
 pub enum OwnedFeatures {
+    Encoder(ObjectEncoder),
     Views(Arc<EmbeddingsFile>),
     PerVertex(Vec<f32>),
     Cloud(Arc<Cloud>),
@@ -143,16 +165,20 @@ pub enum OwnedFeatures {
 }
 
 impl OwnedFeatures {
-    /// The one source of features that was given, of three arguments whose names begin with `side`.
+    /// The one source of features that was given, of arguments whose names begin with `side`; an
+    /// encoder where there is none of the others.
     pub fn of(
         py: Python<'_>,
         side: &str,
         mesh: &semfm::Mesh,
-        method: Method,
-        features: Option<&Bound<'_, PyAny>>,
-        embeddings: Option<&Bound<'_, PyAny>>,
-        cloud: Option<&Bound<'_, SemanticCloud>>,
+        given: &GivenFeatures<'_, '_>,
+        settings: &PipelineSettings,
     ) -> PyResult<Self> {
+        let GivenFeatures { features, embeddings, cloud, encoder } = *given;
+        if encoder.is_some() && (features.is_some() || embeddings.is_some() || cloud.is_some()) {
+            let expected = "one of features, embeddings, cloud and encoder";
+            return Err(errors::invalid(py, "encoder", expected, "several"));
+        }
         match (features, embeddings, cloud) {
             (Some(features), None, None) => {
                 let rows = [Axis::Is(mesh.n_vertices()), Axis::Any("d")];
@@ -169,11 +195,14 @@ impl OwnedFeatures {
                 Ok(Self::Views(embeddings_of(embeddings, &name, mesh)?))
             }
             (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().inner.clone())),
-            (None, None, None) if !method.info().reads_features => Ok(Self::Geometry),
             (None, None, None) => {
-                let expected =
-                    "features per vertex, embeddings, or a cloud (method=\"wks\" needs none)";
-                Err(errors::invalid(py, &format!("{side}features"), expected, "none of them"))
+                let method = settings.transfer.method.info();
+                if !method.reads_features && encoder.is_none() {
+                    return Ok(Self::Geometry);
+                }
+                let rolls = method.features.rolls;
+                let encoder = encoder_of(py, encoder, None, rolls, &settings.cache)?;
+                Ok(Self::Encoder(encoder))
             }
             _ => {
                 let expected = "one of features, embeddings and cloud";
@@ -185,32 +214,69 @@ impl OwnedFeatures {
     /// Prepares the object.
     pub fn prepare(
         &self,
-        mesh: &semfm::Mesh,
+        object: &GivenObject,
         settings: &PipelineSettings,
         task: &Task,
     ) -> semfm::Result<PreparedObject> {
+        let mesh = &object.mesh;
         let source = match self {
-            Self::Views(file) => FeatureSource::Views(&file.views),
+            Self::Encoder(encoder) => {
+                let encoded = encoder.embed(object.drawable(), Coloring::Grey, task)?;
+                let prepared = encoded.prepare((**mesh).clone(), settings, task)?;
+                return Ok(PreparedObject::new(prepared));
+            }
+            Self::Views(file) => FeatureSource::from(&**file),
             Self::PerVertex(features) => FeatureSource::PerVertex(features),
             Self::Cloud(cloud) => FeatureSource::Cloud(Arc::clone(cloud)),
             Self::Geometry => FeatureSource::Geometry,
         };
-        let prepared = semfm::prepare(mesh.clone(), source, settings, task)?;
+        let prepared = semfm::prepare((**mesh).clone(), source, settings, task)?;
         Ok(PreparedObject::new(prepared))
     }
 }
 
+/// The arguments that say where an object's features come from.
+#[derive(Clone, Copy)]
+pub struct GivenFeatures<'a, 'py> {
+    pub features: Option<&'a Bound<'py, PyAny>>,
+    pub embeddings: Option<&'a Bound<'py, PyAny>>,
+    pub cloud: Option<&'a Bound<'py, SemanticCloud>>,
+    pub encoder: Option<&'a str>,
+}
+
+/// The encoder of this name, the built-in one where none is given, for a method that asks for up to
+/// `most_rolls` rotations where their number is not given.
+pub fn encoder_of(
+    py: Python<'_>,
+    name: Option<&str>,
+    rolls: Option<u32>,
+    most_rolls: u32,
+    cache: &ShapeCache,
+) -> PyResult<ObjectEncoder> {
+    let settings = OpenSettings { quiet: true, ..OpenSettings::default() };
+    let name = name.unwrap_or(BUILTIN_ENCODERS[0].name);
+    let encoder = guard(py, || Ok(open_encoder(name, &settings)?))?;
+    let rolls = rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(most_rolls));
+    Ok(ObjectEncoder::new(encoder, cache).with_rolls(rolls))
+}
+
 /// Makes an object ready to be matched with any number of others.
+///
+/// Where neither features, embeddings nor a cloud are given, an encoder makes them.
 ///
 /// Parameters
 /// ----------
-/// mesh : mesh_like
+/// mesh : mesh_like or MeshFile
 /// features : (n, d) array_like, optional
 ///     A feature vector per vertex, from any network.
 /// embeddings : Embeddings or path, optional
 ///     Patch embeddings of rendered views of this very mesh.
 /// cloud : SemanticCloud, optional
 ///     Surface points with features, made by the caller.
+/// encoder : str, optional
+///     Shown rendered views in grey: ``builtin`` (where nothing of all this is given), a ``.net``
+///     file, a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or
+///     ``package.module:Class``.
 /// method : str, optional
 ///     Lift as this method does (``"wks"`` needs no features): ``"fused"`` where neither this nor `settings` is given.
 /// settings : TransferSettings, optional
@@ -224,7 +290,7 @@ impl OwnedFeatures {
 /// seed : int, optional
 ///     Of everything drawn by chance; 0 where none is given.
 /// cache : cache, optional
-///     Where prepared shapes are kept: a folder, or True for the user's own.
+///     Where prepared shapes and embeddings are kept: a folder, or True for the user's own.
 /// progress : progress, optional
 ///
 /// Returns
@@ -240,8 +306,8 @@ impl OwnedFeatures {
 /// True
 #[pyfunction]
 #[pyo3(signature = (
-    mesh, *, features=None, embeddings=None, cloud=None, method=None, settings=None, k=None,
-    working_vertices=None, n_samples=None, seed=None, cache=None, progress=None
+    mesh, *, features=None, embeddings=None, cloud=None, encoder=None, method=None, settings=None,
+    k=None, working_vertices=None, n_samples=None, seed=None, cache=None, progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
 pub fn prepare(
@@ -250,6 +316,7 @@ pub fn prepare(
     features: Option<&Bound<'_, PyAny>>,
     embeddings: Option<&Bound<'_, PyAny>>,
     cloud: Option<&Bound<'_, SemanticCloud>>,
+    encoder: Option<&str>,
     method: Option<&str>,
     settings: Option<&Bound<'_, TransferSettings>>,
     k: Option<usize>,
@@ -274,9 +341,9 @@ pub fn prepare(
         arrays_in::within_memory(py, "n_samples", n, 1024)?;
         settings.lift.n_samples = n;
     }
-    let mesh = from_any(mesh, "mesh")?;
-    check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-    let method = settings.transfer.method;
-    let features = OwnedFeatures::of(py, "", &mesh, method, features, embeddings, cloud)?;
-    run(py, progress, move |task| features.prepare(&mesh, &settings, task))
+    let object = GivenObject::of(mesh, "mesh")?;
+    check_shape_size(py, object.mesh.n_vertices(), &settings.shape)?;
+    let given = GivenFeatures { features, embeddings, cloud, encoder };
+    let features = OwnedFeatures::of(py, "", &object.mesh, &given, &settings)?;
+    run(py, progress, move |task| features.prepare(&object, &settings, task))
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use semfm::files::{Provenance, TransferResult};
 use semfm::fmap;
-use semfm_show::write_transfer;
+use semfm_show::{TransferFiles, write_transfer};
 use serde_json::{Value, json};
 
 use crate::interruptible::run;
@@ -114,20 +114,24 @@ impl Transfer {
     ///     Made if it is not there.
     /// about : dict, optional
     ///     Put into the report as it is.
+    /// pictures : bool, default True
+    ///     Also draw ``transfer.png``, ``features.png`` and ``transfer.mcap``.
     /// progress : progress, optional
     ///
     /// Returns
     /// -------
     /// list of str
     ///     The files.
-    #[pyo3(signature = (folder, *, about=None, progress=None))]
+    #[pyo3(signature = (folder, *, about=None, pictures=true, progress=None))]
     fn write(
         &self,
         py: Python<'_>,
         folder: PathBuf,
         about: Option<&Bound<'_, PyDict>>,
+        pictures: bool,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<String>> {
+        let which = if pictures { TransferFiles::All } else { TransferFiles::WithoutPictures };
         let about = about.map(|about| dicts::from_python(about, "about")).transpose()?;
         let version = Some(env!("CARGO_PKG_VERSION").to_owned());
         let mut provenance = Provenance { version, ..Provenance::default() };
@@ -140,7 +144,7 @@ impl Transfer {
             let (source, target, transfer) = (&*source, &*target, &*shared);
             let (region, provenance) = (&*region, &provenance);
             let result = TransferResult { source, target, region, transfer, provenance };
-            Ok(write_transfer(&folder, &result, task)?)
+            Ok(write_transfer(&folder, &result, which, task)?)
         })?;
         Ok(files.iter().map(|file| file.display().to_string()).collect())
     }

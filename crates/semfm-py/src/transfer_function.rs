@@ -7,8 +7,8 @@ use crate::cloud::SemanticCloud;
 use crate::errors;
 use crate::interruptible::run;
 use crate::matching::Matching;
-use crate::mesh::from_any;
-use crate::prepared::{OwnedFeatures, PreparedObject};
+use crate::mesh::GivenObject;
+use crate::prepared::{GivenFeatures, OwnedFeatures, PreparedObject};
 use crate::region::region_of;
 use crate::settings::{Options, TransferSettings};
 use crate::shape::check_shape_size;
@@ -18,19 +18,18 @@ use crate::transfer::Transfer;
 /// One of the two objects, prepared or to be prepared.
 enum Side {
     Ready(PreparedObject),
-    Raw(Shared<semfm::Mesh>, OwnedFeatures),
+    Raw(GivenObject, OwnedFeatures),
 }
 
 impl Side {
     fn of(
         value: &Bound<'_, PyAny>,
         name: &str,
-        features: Option<&Bound<'_, PyAny>>,
-        embeddings: Option<&Bound<'_, PyAny>>,
-        cloud: Option<&Bound<'_, SemanticCloud>>,
+        given: &GivenFeatures<'_, '_>,
         settings: &PipelineSettings,
     ) -> PyResult<Self> {
         let py = value.py();
+        let GivenFeatures { features, embeddings, cloud, .. } = given;
         if let Ok(prepared) = value.cast::<PreparedObject>() {
             if features.is_some() || embeddings.is_some() || cloud.is_some() {
                 let argument = format!("{name}_features");
@@ -39,24 +38,17 @@ impl Side {
             }
             return Ok(Self::Ready(prepared.get().clone()));
         }
-        let mesh = from_any(value, name)?;
-        check_shape_size(py, mesh.n_vertices(), &settings.shape)?;
-        let features = OwnedFeatures::of(
-            py,
-            &format!("{name}_"),
-            &mesh,
-            settings.transfer.method,
-            features,
-            embeddings,
-            cloud,
-        )?;
-        Ok(Self::Raw(mesh, features))
+        let object = GivenObject::of(value, name)?;
+        check_shape_size(py, object.mesh.n_vertices(), &settings.shape)?;
+        let side = format!("{name}_");
+        let features = OwnedFeatures::of(py, &side, &object.mesh, given, settings)?;
+        Ok(Self::Raw(object, features))
     }
 
     fn mesh(&self) -> Shared<semfm::Mesh> {
         match self {
             Self::Ready(object) => object.mesh_inner(),
-            Self::Raw(mesh, _) => mesh.clone(),
+            Self::Raw(object, _) => object.mesh.clone(),
         }
     }
 
@@ -67,18 +59,48 @@ impl Side {
     ) -> semfm::Result<PreparedObject> {
         match self {
             Self::Ready(object) => Ok(object),
-            Self::Raw(mesh, features) => features.prepare(&mesh, settings, task),
+            Self::Raw(object, features) => features.prepare(&object, settings, task),
         }
     }
 }
 
+/// Both sides prepared, side by side. Two objects that an encoder is to be shown are encoded as a
+/// pair: in their own colours where both have some, by one start of the encoder.
+fn prepare_both(
+    source: Side,
+    target: Side,
+    settings: &PipelineSettings,
+    task: &semfm::Task,
+) -> semfm::Result<[PreparedObject; 2]> {
+    let encoded = match (&source, &target) {
+        (
+            Side::Raw(a, OwnedFeatures::Encoder(encoder)),
+            Side::Raw(b, OwnedFeatures::Encoder(_)),
+        ) => Some(encoder.embed_pair(a.drawable(), b.drawable(), task)?),
+        _ => None,
+    };
+    let (source, target) = match &encoded {
+        None => rayon::join(|| source.prepare(settings, task), || target.prepare(settings, task)),
+        Some(pair) => {
+            let (a, b) = (source.mesh(), target.mesh());
+            rayon::join(
+                || Ok(PreparedObject::new(pair.source.prepare((*a).clone(), settings, task)?)),
+                || Ok(PreparedObject::new(pair.target.prepare((*b).clone(), settings, task)?)),
+            )
+        }
+    };
+    Ok([source?, target?])
+}
+
 /// Transfers a demonstrated region from one object to another.
+///
+/// Where neither features, embeddings nor clouds are given, an encoder makes them.
 ///
 /// Parameters
 /// ----------
-/// source : mesh_like or PreparedObject
+/// source : mesh_like, MeshFile or PreparedObject
 ///     The demonstrated object.
-/// target : mesh_like or PreparedObject
+/// target : mesh_like, MeshFile or PreparedObject
 ///     The one to act on.
 /// region : Region or path
 ///     Where the demonstration touched the source.
@@ -91,6 +113,9 @@ impl Side {
 /// source_cloud : SemanticCloud, optional
 ///     Surface points with features, made by the caller.
 /// target_cloud : SemanticCloud, optional
+/// encoder : str, optional
+///     Shown rendered views: ``builtin`` (where nothing of all this is given), a ``.net`` file, a
+///     Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or ``package.module:Class``.
 /// method : str, optional
 ///     ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
 ///     ``anchored``, ``sinkhorn``, ``nearest``, or ``wks``, which needs no features.
@@ -108,7 +133,7 @@ impl Side {
 /// working_vertices : int, optional
 ///     Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
 /// cache : cache, optional
-///     Where prepared shapes are kept: a folder, or True for the user's own.
+///     Where prepared shapes and embeddings are kept: a folder, or True for the user's own.
 /// progress : progress, optional
 ///
 /// Returns
@@ -128,8 +153,9 @@ impl Side {
 #[pyfunction]
 #[pyo3(signature = (
     source, target, region, *, source_features=None, target_features=None, source_embeddings=None,
-    target_embeddings=None, source_cloud=None, target_cloud=None, method=None, rule=None, seed=None,
-    second_opinion=None, settings=None, k=None, working_vertices=None, cache=None, progress=None
+    target_embeddings=None, source_cloud=None, target_cloud=None, encoder=None, method=None, rule=None,
+    seed=None, second_opinion=None, settings=None, k=None, working_vertices=None, cache=None,
+    progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
 pub fn transfer(
@@ -142,6 +168,7 @@ pub fn transfer(
     target_embeddings: Option<&Bound<'_, PyAny>>,
     source_cloud: Option<&Bound<'_, SemanticCloud>>,
     target_cloud: Option<&Bound<'_, SemanticCloud>>,
+    encoder: Option<&str>,
     method: Option<&str>,
     rule: Option<&str>,
     seed: Option<u64>,
@@ -156,10 +183,20 @@ pub fn transfer(
     let options =
         Options { method, rule, seed, second_opinion, settings, k, working_vertices, cache };
     let settings = options.pipeline(py)?;
-    let source =
-        Side::of(source, "source", source_features, source_embeddings, source_cloud, &settings)?;
-    let target =
-        Side::of(target, "target", target_features, target_embeddings, target_cloud, &settings)?;
+    let given = GivenFeatures {
+        features: source_features,
+        embeddings: source_embeddings,
+        cloud: source_cloud,
+        encoder,
+    };
+    let source = Side::of(source, "source", &given, &settings)?;
+    let given = GivenFeatures {
+        features: target_features,
+        embeddings: target_embeddings,
+        cloud: target_cloud,
+        encoder,
+    };
+    let target = Side::of(target, "target", &given, &settings)?;
     let region = region_of(region, &source.mesh())?;
     let n = source.mesh().n_vertices();
     if region.n_vertices() != n {
@@ -167,8 +204,7 @@ pub fn transfer(
         return Err(errors::invalid(py, "region", &expected, &region.n_vertices().to_string()));
     }
     run(py, progress, move |task| {
-        let prepare = |side: Side| side.prepare(&settings, task);
-        let (source, target) = rayon::join(|| prepare(source), || prepare(target));
-        Matching::of(source?, target?, &settings.transfer, task)?.transferred(region)
+        let [source, target] = prepare_both(source, target, &settings, task)?;
+        Matching::of(source, target, &settings.transfer, task)?.transferred(region)
     })
 }

@@ -46,19 +46,29 @@ pub fn write_object(
     level: Level,
     task: &Task,
 ) -> Result<ObjectFiles> {
-    let name = object.name();
-    let [mesh, truth, embeddings] =
-        ["obj", "json", "emb.mcap"].map(|extension| folder.join(format!("{name}.{extension}")));
-    let files = ObjectFiles { mesh, truth, embeddings };
     let views = render_views(object, task)?;
     let embeddings = EmbeddingsFile {
         path: PathBuf::new(),
         metadata: metadata(object, level),
         views: embed(object, &views, level)?,
     };
+    let files = write_labelled_mesh(folder, object)?;
+    embeddings.write(&files.embeddings, Dtype::F16)?;
+    Ok(files)
+}
+
+/// Writes `NAME.obj` and `NAME.json` into `folder`, which must exist. The embeddings are for the
+/// caller to make and to write where the answer says.
+///
+/// # Errors
+/// [`Error::Geom`](crate::Error::Geom) where a file cannot be written.
+pub fn write_labelled_mesh(folder: &Path, object: &SynthObject) -> Result<ObjectFiles> {
+    let name = object.name();
+    let [mesh, truth, embeddings] =
+        ["obj", "json", "emb.mcap"].map(|extension| folder.join(format!("{name}.{extension}")));
+    let files = ObjectFiles { mesh, truth, embeddings };
     write_mesh(&files.mesh, &object.mesh)?;
     write_json(&files.truth, &truth_of(object))?;
-    embeddings.write(&files.embeddings, Dtype::F16)?;
     Ok(files)
 }
 

@@ -20,7 +20,7 @@ use std::str::FromStr;
 
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};
-pub use files::{ObjectFiles, render_views, write_object};
+pub use files::{ObjectFiles, render_views, write_labelled_mesh, write_object};
 pub use object::{ObjectSettings, SynthObject, make_object};
 
 /// The six categories of the paper (section V-A).

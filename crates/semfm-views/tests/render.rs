@@ -4,7 +4,7 @@ mod shapes;
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole, Task};
-use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
+use semfm_views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig, triangle_ids};
 use shapes::{ellipsoid, lumpy_torus, together, zoo};
 
 fn shot(mesh: &Mesh, camera: Pinhole) -> View {
@@ -50,6 +50,20 @@ fn compare_with_rays(mesh: &Mesh, camera: &Pinhole) {
     }
     let share = f64::from(different) / view.triangles.len() as f64;
     assert!(share <= 1e-3, "{different} of {} pixels see another triangle", view.triangles.len());
+}
+
+#[test]
+fn triangles_alone_are_those_of_the_views() {
+    for (name, mesh) in zoo() {
+        let settings = RigSettings { count: 3, size: 70, ..Default::default() };
+        let cameras = rig(&mesh, &settings).unwrap();
+        let (light, task) = (RenderSettings::default(), Task::default());
+        let views = render(&mesh, &SurfaceColor::GREY, &cameras, &light, &task).unwrap();
+        let ids = triangle_ids(&mesh, &cameras, &task).unwrap();
+        for (view, ids) in views.iter().zip(&ids) {
+            assert_eq!(&view.triangles, ids, "{name}");
+        }
+    }
 }
 
 #[test]

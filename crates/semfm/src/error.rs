@@ -15,6 +15,9 @@ pub enum Error {
     /// Views, embeddings and their files.
     #[error(transparent)]
     Views(#[from] semfm_views::Error),
+    /// Encoders and their files.
+    #[error(transparent)]
+    Encoder(#[from] semfm_encoder::Error),
     /// Maps and regions.
     #[error(transparent)]
     Fmap(#[from] semfm_fmap::Error),
@@ -37,23 +40,6 @@ pub enum Error {
         /// What was given.
         found: String,
     },
-    /// The program that makes embeddings is not there.
-    #[error(
-        "the encoder needs the program `{program}`, which is not there: install it with \
-         `pip install '.[onnx]'` (or `'.[embed]'` for SigLIP and DINOv2), or name it in SEMFM_EMBED"
-    )]
-    EncoderMissing {
-        /// Name or path of the program.
-        program: String,
-    },
-    /// The program that makes embeddings failed.
-    #[error("{program} ended with {status} (its reason stands above)")]
-    EncoderFailed {
-        /// Name or path of the program.
-        program: String,
-        /// How it ended.
-        status: String,
-    },
     /// A file is not what its format demands.
     #[error(transparent)]
     Format(#[from] FormatError),
@@ -73,12 +59,12 @@ impl Error {
         match self {
             Self::Geom(cause) => cause.code(),
             Self::Views(cause) => cause.code(),
+            Self::Encoder(cause) => cause.code(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.code(),
             Self::Robot(cause) => cause.code(),
             Self::Grasp(cause) => cause.code(),
             Self::Align(cause) => cause.code(),
             Self::Fmap(_) | Self::Invalid { .. } => "invalid",
-            Self::EncoderMissing { .. } | Self::EncoderFailed { .. } => "encoder",
             Self::Format(_) => "format",
         }
     }
@@ -88,11 +74,12 @@ impl Error {
         match self {
             Self::Geom(cause) => cause.place(),
             Self::Views(cause) => cause.place(),
+            Self::Encoder(cause) => cause.place(),
             Self::Fmap(semfm_fmap::Error::Geom(cause)) => cause.place(),
             Self::Robot(cause) => cause.place(),
             Self::Grasp(cause) => cause.place(),
             Self::Align(cause) => cause.place(),
-            Self::Fmap(_) | Self::EncoderMissing { .. } | Self::EncoderFailed { .. } => None,
+            Self::Fmap(_) => None,
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format(error) => Some(error.place.clone()),
         }

@@ -45,6 +45,7 @@
 //! ```
 
 pub use semfm_align as align;
+pub use semfm_encoder as encoder;
 pub use semfm_fmap as fmap;
 pub use semfm_geom as geom;
 pub use semfm_grasp as grasp;
@@ -52,17 +53,13 @@ pub use semfm_robot as robot;
 pub use semfm_views as views;
 
 pub mod demonstration;
-#[cfg(feature = "mcap")]
-pub mod encoder_command;
-#[cfg(feature = "mcap")]
-mod encoder_inputs;
 mod error;
 pub mod files;
 mod grasp_request;
 mod grasp_result;
-mod pipeline;
 #[cfg(feature = "mcap")]
-pub mod rendered_views;
+pub mod object_encoder;
+mod pipeline;
 pub mod weight_colors;
 
 pub use error::{Error, Result};
@@ -74,6 +71,6 @@ pub use grasp::find_grasps;
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
 pub use pipeline::{
-    FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared, prepare,
-    semantic_cloud,
+    EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
+    prepare, semantic_cloud,
 };

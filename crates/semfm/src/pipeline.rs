@@ -1,6 +1,6 @@
 //! The tour, from two meshes to a region, in the order of the paper.
 //!
-//! 1. [`prepare`] makes a mesh ready: its features are lifted to the surface as a semantic cloud
+//! 1. [`prepare`] makes a mesh ready: an encoder is shown views of it and their features are lifted to the surface as a semantic cloud
 //!    (section IV-C), the mesh is cleaned and simplified and gets Laplacian and eigenbasis
 //!    (section III), and both become a [`PreparedObject`].
 //! 2. [`transfer`](crate::transfer) matches two prepared objects and transfers a region from one to
@@ -10,14 +10,20 @@
 //!
 //! The shell and the Python package call these same functions.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
 
+use semfm_encoder::rendered_views::{Coloring, RenderedObject};
+use semfm_encoder::{EncodedViews, Encoder, EncoderIdentity};
 use semfm_fmap::{Lifting, Method, PreparedObject, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
 use semfm_geom::{Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
-use semfm_views::{EmbeddedView, LiftReport, LiftSettings, lift};
+#[cfg(feature = "mcap")]
+use semfm_views::mcap::EmbeddingsFile;
+use semfm_views::{EmbeddedView, LiftReport, LiftSettings, Renderer, lift};
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
@@ -64,14 +70,76 @@ impl PipelineSettings {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum FeatureSource<'a> {
+    /// An encoder that is shown rendered views of the mesh in grey, at the rotations that it wants
+    /// (the built-in one: [`builtin_encoder`](crate::encoder::builtin_encoder)).
+    Encoder(&'a dyn Encoder),
     /// Patch embeddings of rendered views of this very mesh.
     Views(&'a [EmbeddedView]),
+    /// The same with the name of the encoder that made them, for reports.
+    Embedded {
+        /// The views.
+        views: &'a [EmbeddedView],
+        /// Who made them.
+        encoder: EncoderRecord,
+    },
     /// One feature vector per vertex of the mesh as read (n × d, row-major), from any network.
     PerVertex(&'a [f32]),
     /// A cloud that the caller made.
     Cloud(Arc<SemanticCloud>),
     /// None: the geometry alone, for the method `wks`.
     Geometry,
+}
+
+/// Which encoder made an object's features, as reports name it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EncoderRecord {
+    /// Name of the encoder.
+    pub name: String,
+    /// Version of its weights.
+    pub version: String,
+    /// Rotations of each view that were averaged.
+    pub rolls: u32,
+    /// Views of the object.
+    pub n_views: usize,
+    /// True where the features were made up, without a network.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub simulated: bool,
+}
+
+impl fmt::Display for EncoderRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, version, rolls, n_views, .. } = self;
+        write!(f, "{n_views} views by {name} {version} ({rolls} rolls)")
+    }
+}
+
+impl EncoderRecord {
+    /// Of what an encoder made.
+    pub fn of(encoded: &EncodedViews) -> Self {
+        let EncoderIdentity { name, version } = encoded.encoder.clone();
+        let n_views = encoded.views.len();
+        Self { name, version, rolls: encoded.rolls, n_views, simulated: false }
+    }
+
+    /// Of an embeddings file.
+    #[cfg(feature = "mcap")]
+    pub fn of_file(file: &EmbeddingsFile) -> Self {
+        let about = &file.metadata;
+        Self {
+            name: about.encoder.clone(),
+            version: about.revision.clone(),
+            rolls: about.rolls,
+            n_views: file.views.len(),
+            simulated: about.simulated,
+        }
+    }
+}
+
+#[cfg(feature = "mcap")]
+impl<'a> From<&'a EmbeddingsFile> for FeatureSource<'a> {
+    fn from(file: &'a EmbeddingsFile) -> Self {
+        Self::Embedded { views: &file.views, encoder: EncoderRecord::of_file(file) }
+    }
 }
 
 /// An object ready to be matched, and how it was prepared.
@@ -90,7 +158,10 @@ pub struct PreparationReport {
     pub from_cache: bool,
     /// How well the views covered the surface, where there were views.
     pub lifted: Option<LiftReport>,
-    /// Milliseconds per stage: `lift`, `shape`, `prepare`.
+    /// The encoder behind the features, where it is known.
+    pub encoder: Option<EncoderRecord>,
+    /// Milliseconds of wall time per stage: `views` and `embed` where an encoder was asked, `lift`,
+    /// `shape`, `prepare`.
     pub stages_ms: Vec<(&'static str, f64)>,
 }
 
@@ -99,7 +170,7 @@ pub struct PreparationReport {
 ///
 /// # Errors
 /// [`Error::Invalid`] where per-vertex features do not fit the mesh; [`Error::Views`] for views that
-/// do not; [`Error::Geom`] for a mesh without area, impossible shape settings or an eigensolver that
+/// do not; [`Error::Encoder`] for an encoder without an answer; [`Error::Geom`] for a mesh without area, impossible shape settings or an eigensolver that
 /// does not converge, and on cancellation; [`Error::Fmap`] for features without variance.
 pub fn prepare(
     mesh: Mesh,
@@ -107,28 +178,61 @@ pub fn prepare(
     settings: &PipelineSettings,
     task: &Task,
 ) -> Result<Prepared> {
+    let mut stages_ms = Vec::new();
+    let encoded = match &features {
+        FeatureSource::Encoder(encoder) => Some(encode(&mesh, *encoder, &mut stages_ms, task)?),
+        _ => None,
+    };
+    let features = encoded.as_ref().map_or(features, |encoded| FeatureSource::Embedded {
+        views: &encoded.views,
+        encoder: EncoderRecord::of(encoded),
+    });
     let start = Instant::now();
     let lifted = match features {
         FeatureSource::Geometry => None,
         features => Some(semantic_cloud(&mesh, features, &settings.lift, task)?),
     };
-    let lift_ms = milliseconds_since(start);
+    stages_ms.push(("lift", milliseconds_since(start)));
 
     let start = Instant::now();
     let shape = settings.cache.shape(mesh, &settings.shape, task)?;
-    let shape_ms = milliseconds_since(start);
+    stages_ms.push(("shape", milliseconds_since(start)));
 
     let start = Instant::now();
     let (from_cache, shape) = (shape.hit, Arc::new(shape.shape));
-    let (object, lifted) = match lifted {
-        Some(LiftedCloud { cloud, report }) => (PreparedObject::new(shape, cloud, task)?, report),
-        None => (PreparedObject::without_features(shape, task)?, None),
+    let (object, lifted, encoder) = match lifted {
+        Some(LiftedCloud { cloud, report, encoder }) => {
+            (PreparedObject::new(shape, cloud, task)?, report, encoder)
+        }
+        None => (PreparedObject::without_features(shape, task)?, None, None),
     };
-    let prepare_ms = milliseconds_since(start);
+    stages_ms.push(("prepare", milliseconds_since(start)));
 
-    let stages_ms = vec![("lift", lift_ms), ("shape", shape_ms), ("prepare", prepare_ms)];
-    let report = PreparationReport { from_cache, lifted, stages_ms };
+    let report = PreparationReport { from_cache, lifted, encoder, stages_ms };
     Ok(Prepared { object, report })
+}
+
+/// What an encoder makes of a mesh: rendered as it wants, in memory.
+fn encode(
+    mesh: &Mesh,
+    encoder: &dyn Encoder,
+    stages_ms: &mut Vec<(&'static str, f64)>,
+    task: &Task,
+) -> Result<EncodedViews> {
+    let wants = encoder.wants();
+    let start = Instant::now();
+    let settings = wants.settings(Coloring::Grey);
+    let rendered = RenderedObject::new(mesh, &settings, &Renderer::cpu(), task)?;
+    stages_ms.push(("views", milliseconds_since(start)));
+
+    let start = Instant::now();
+    let mut encoded = encoder.encode(&[rendered], wants.rolls, task)?;
+    stages_ms.push(("embed", milliseconds_since(start)));
+    let found = encoded.len();
+    encoded.pop().filter(|_| found == 1).ok_or_else(|| {
+        let expected = "embeddings of the one object that it was shown";
+        Error::invalid("encoder", expected, format!("those of {found}"))
+    })
 }
 
 /// The semantic cloud of a mesh, and how well views covered the surface.
@@ -138,6 +242,8 @@ pub struct LiftedCloud {
     pub cloud: Arc<SemanticCloud>,
     /// What was seen, where there were views.
     pub report: Option<LiftReport>,
+    /// The encoder behind the features, where it is known.
+    pub encoder: Option<EncoderRecord>,
 }
 
 /// The features of a mesh as a cloud on its surface. [`prepare`] does this; alone it is for callers
@@ -145,7 +251,7 @@ pub struct LiftedCloud {
 ///
 /// # Errors
 /// [`Error::Invalid`] where per-vertex features do not fit the mesh and for
-/// [`FeatureSource::Geometry`], [`Error::Views`] for views that do not fit, [`Error::Geom`] for a mesh without area and on cancellation.
+/// [`FeatureSource::Geometry`], [`Error::Views`] for views that do not fit, [`Error::Encoder`] for an encoder without an answer, [`Error::Geom`] for a mesh without area and on cancellation.
 pub fn semantic_cloud(
     mesh: &Mesh,
     features: FeatureSource<'_>,
@@ -153,15 +259,26 @@ pub fn semantic_cloud(
     task: &Task,
 ) -> Result<LiftedCloud> {
     match features {
+        FeatureSource::Encoder(encoder) => {
+            let encoded = encode(mesh, encoder, &mut Vec::new(), task)?;
+            let encoder = EncoderRecord::of(&encoded);
+            let features = FeatureSource::Embedded { views: &encoded.views, encoder };
+            semantic_cloud(mesh, features, settings, task)
+        }
         FeatureSource::Views(views) => {
             let lifted = lift(mesh, views, settings, task)?;
-            Ok(LiftedCloud { cloud: Arc::new(lifted.cloud), report: Some(lifted.report) })
+            let (cloud, report) = (Arc::new(lifted.cloud), Some(lifted.report));
+            Ok(LiftedCloud { cloud, report, encoder: None })
+        }
+        FeatureSource::Embedded { views, encoder } => {
+            let lifted = semantic_cloud(mesh, FeatureSource::Views(views), settings, task)?;
+            Ok(LiftedCloud { encoder: Some(encoder), ..lifted })
         }
         FeatureSource::PerVertex(features) => {
             let cloud = cloud_of_vertices(mesh, features, settings.n_samples)?;
-            Ok(LiftedCloud { cloud: Arc::new(cloud), report: None })
+            Ok(LiftedCloud { cloud: Arc::new(cloud), report: None, encoder: None })
         }
-        FeatureSource::Cloud(cloud) => Ok(LiftedCloud { cloud, report: None }),
+        FeatureSource::Cloud(cloud) => Ok(LiftedCloud { cloud, report: None, encoder: None }),
         FeatureSource::Geometry => {
             Err(Error::invalid("features", "those of views, vertices or a cloud", "none"))
         }

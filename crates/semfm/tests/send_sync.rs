@@ -42,7 +42,6 @@ fn public_types_are_send_and_sync() {
 #[cfg(feature = "mcap")]
 #[test]
 fn types_of_the_encoder_are_send_and_sync() {
-    is_send_and_sync::<semfm::encoder_command::EncoderCommand>();
-    is_send_and_sync::<semfm::encoder_command::EncodedObject>();
-    is_send_and_sync::<semfm::rendered_views::ViewSettings>();
+    is_send_and_sync::<semfm::object_encoder::ObjectEncoder>();
+    is_send_and_sync::<semfm::object_encoder::EncodedObject>();
 }

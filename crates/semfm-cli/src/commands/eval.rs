@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
+use semfm::Method;
 use semfm::geom::ShapeCache;
 use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
-use semfm_eval::embeddings::CommandEncoder;
 use semfm_eval::workers::Workers;
 use semfm_eval::{EmbeddingSource, EvalSettings, Override, Results, Variant, report, table, vlm};
 use semfm_synth::Level;
 use serde_json::json;
 
 use super::Outcome;
+use super::encoder_options::EncoderOptions;
 use super::report_options::ReportOptions;
 use crate::console;
 use crate::options::Common;
@@ -28,6 +29,7 @@ use crate::options::Common;
 #[command(group = ArgGroup::new("what").required(true).args(["dataset", "synthetic", "report_only"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli eval --synthetic -o report\n  \
+    semfm-cli eval objects -o report\n  \
     semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
     semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
     Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured.")]
@@ -52,7 +54,7 @@ pub struct EvalCommand {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Procedural objects")]
 struct SyntheticOptions {
-    /// Evaluate on procedural objects with a simulated encoder
+    /// Evaluate on procedural objects, with a simulated encoder unless --encoder names a real one
     #[arg(long)]
     synthetic: bool,
     /// How hard the simulated features are: easy, medium or hard
@@ -69,13 +71,11 @@ struct SyntheticOptions {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Features")]
 struct FeatureOptions {
-    /// Folder of `NAME.emb.mcap` [default: beside the meshes]
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["encoder", "synthetic"])]
+    /// Folder of `NAME.emb.mcap` [default: beside the meshes, where there are any]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["encoder", "rolls", "synthetic"])]
     embeddings: Option<PathBuf>,
-    /// Make the embeddings: a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or a
-    /// class of Python as package.module:Class
-    #[arg(long, value_name = "MODEL", conflicts_with = "synthetic")]
-    encoder: Option<String>,
+    #[command(flatten)]
+    encoder: EncoderOptions,
     /// `fused`: give the published method our views and lifting instead of its own
     #[arg(long, value_name = "METHOD", value_parser = ["fused", "semfm"])]
     features: Option<String>,
@@ -130,13 +130,9 @@ impl EvalCommand {
         // What cannot be compared with should be known before the work is done.
         let before = self.work.compare.as_deref().map(Results::read).transpose()?;
         let dataset = self.dataset()?;
-        let encoder = self.encoder(common)?;
-        let embeddings = match &encoder {
-            Some(encoder) => EmbeddingSource::Encoder(encoder),
-            None => EmbeddingSource::Files(self.features.embeddings.clone()),
-        };
+        let embeddings = self.embeddings(&dataset, common)?;
         let settings = self.settings(common)?;
-        self.announce(&dataset, &settings, common);
+        self.announce(&dataset, &embeddings, &settings, common);
         let task = console::progress_with_time_left(common.quiet);
         let vlm = self.methods.vlm.as_deref().map(|path| vlm::read(path, &dataset)).transpose()?;
         let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
@@ -162,16 +158,32 @@ impl EvalCommand {
         outcome_of(&results, common)
     }
 
-    fn encoder(&self, common: &Common) -> Result<Option<CommandEncoder>> {
-        let Some(model) = self.features.encoder.clone() else { return Ok(None) };
-        let keep = !self.work.no_cache;
+    /// Files where some are named or lie beside the meshes; the simulated encoder for procedural
+    /// objects; else the encoder that is named, or the built-in one.
+    fn embeddings(&self, dataset: &Dataset, common: &Common) -> Result<EmbeddingSource> {
+        let FeatureOptions { embeddings, encoder, .. } = &self.features;
+        if embeddings.is_some() {
+            return Ok(EmbeddingSource::Files(embeddings.clone()));
+        }
+        if encoder.is_default() {
+            if self.synthetic.synthetic {
+                return Ok(EmbeddingSource::Simulated);
+            }
+            if EmbeddingSource::any_beside(dataset) {
+                return Ok(EmbeddingSource::Files(None));
+            }
+        }
+        let cache = if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() };
         // Several encoders at work at once share the cores, as the pairs do.
         let threads = Workers::new(common.threads, self.work.jobs).threads;
-        let encoder = CommandEncoder::new(model, keep, threads)?;
-        if let Some(note) = encoder.note().filter(|_| !common.quiet) {
+        let quiet = Common { threads, quiet: true, ..*common };
+        let most_rolls = Method::default().info().features.rolls;
+        let (rolls, encoder) = (encoder.rolls, encoder.open(most_rolls, &cache, &quiet)?);
+        let source = EmbeddingSource::of_encoder(encoder, rolls)?;
+        if let Some(note) = source.note().filter(|_| !common.quiet) {
             console::message(format_args!("note: {note}"));
         }
-        Ok(Some(encoder))
+        Ok(source)
     }
 
     fn dataset(&self) -> Result<Dataset> {
@@ -211,15 +223,22 @@ impl EvalCommand {
         Ok(settings)
     }
 
-    fn announce(&self, dataset: &Dataset, settings: &EvalSettings, common: &Common) {
+    fn announce(
+        &self,
+        dataset: &Dataset,
+        embeddings: &EmbeddingSource,
+        settings: &EvalSettings,
+        common: &Common,
+    ) {
         if !common.quiet {
             console::message(format_args!(
-                "{} pairs of {} objects in {} groups, {} methods, {} at once",
+                "{} pairs of {} objects in {} groups, {} methods, {} at once; features: {}",
                 dataset.n_pairs(),
                 dataset.objects.len(),
                 dataset.groups.len(),
                 settings.variants.len(),
                 settings.workers.jobs,
+                embeddings.identity(dataset),
             ));
         }
     }

@@ -3,6 +3,8 @@
 pub mod align;
 pub mod completions;
 pub mod demo;
+pub mod embed;
+mod encoder_options;
 pub mod eval;
 pub mod eval_maps;
 pub mod grasp;

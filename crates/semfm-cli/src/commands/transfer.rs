@@ -2,18 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
-use clap::{ArgGroup, Args};
-use semfm::encoder_command::{EncodedPair, EncoderCommand, EncoderSettings};
+use anyhow::{Context, Result};
+use clap::Args;
 use semfm::files::{
     Provenance, Seeds, TransferInputs, read_embeddings, read_region, read_vertex_features,
 };
 use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, read_mesh};
-use semfm::rendered_views::Coloring;
+use semfm::object_encoder::EncodedPair;
 use semfm::{FeatureSource, Method, PipelineSettings, Prepared, Rule, Task, prepare, transfer};
+use semfm_show::TransferFiles;
 
 use super::Outcome;
+use super::encoder_options::EncoderOptions;
 use super::grasp::{GraspOptions, gripper_help};
 use super::transfer_output::TransferOutput;
 use crate::console;
@@ -21,12 +22,12 @@ use crate::options::Common;
 
 /// Transfer a region from one object to another
 ///
-/// Features say which places of the two surfaces are alike: embeddings files of both objects, an
-/// encoder that makes them, or per-vertex features from any network. The method `wks` needs none.
+/// Features say which places of the two surfaces are alike. The built-in encoder makes them, or
+/// another one; or they come as embeddings files of both objects, or per vertex from any network. The
+/// method `wks` needs none.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("features_from")
-    .args(["source_embeddings", "encoder", "source_features"]))]
 #[command(after_help = "Examples:\n  \
+    semfm-cli transfer mug.obj kettle.ply --region grip.json -o out\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --encoder google/siglip2-base-patch16-224\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out \\\n    \
     --source-embeddings mug.emb.mcap --target-embeddings kettle.emb.mcap\n\n\
@@ -42,6 +43,12 @@ pub struct TransferCommand {
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    /// Write the answer alone: region.json and report.json
+    #[arg(long, value_name = "region", value_parser = ["region"])]
+    only: Option<String>,
+    /// Write no pictures and no scene for Foxglove
+    #[arg(long, conflicts_with = "only")]
+    no_pictures: bool,
     #[command(flatten)]
     features: FeatureOptions,
     #[command(flatten)]
@@ -57,20 +64,17 @@ pub struct TransferCommand {
 #[command(next_help_heading = "Features")]
 struct FeatureOptions {
     /// Embeddings of the source's views
-    #[arg(long, value_name = "A.emb.mcap", requires = "target_embeddings")]
+    #[arg(long, value_name = "A.emb.mcap", requires = "target_embeddings",
+        conflicts_with_all = ["encoder", "rolls", "source_features"])]
     source_embeddings: Option<PathBuf>,
     /// Embeddings of the target's views
     #[arg(long, value_name = "B.emb.mcap", requires = "source_embeddings")]
     target_embeddings: Option<PathBuf>,
-    /// Make the embeddings: a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or a
-    /// class of Python as package.module:Class
-    #[arg(long, value_name = "MODEL")]
-    encoder: Option<String>,
-    /// Rotations of each view that the encoder averages [default: 4, for `semfm` 1]
-    #[arg(long, value_name = "1|2|4", requires = "encoder")]
-    rolls: Option<u32>,
+    #[command(flatten)]
+    encoder: EncoderOptions,
     /// Per-vertex features of the source (n × d)
-    #[arg(long, value_name = "A.npy", requires = "target_features")]
+    #[arg(long, value_name = "A.npy", requires = "target_features",
+        conflicts_with_all = ["encoder", "rolls"])]
     source_features: Option<PathBuf>,
     /// Per-vertex features of the target (n × d)
     #[arg(long, value_name = "B.npy", requires = "source_features")]
@@ -78,12 +82,6 @@ struct FeatureOptions {
     /// Lift with the settings of this method instead of the method's own
     #[arg(long, value_name = "METHOD")]
     features: Option<Method>,
-}
-
-impl FeatureOptions {
-    fn are_missing(&self) -> bool {
-        self.encoder.is_none() && self.source_embeddings.is_none() && self.source_features.is_none()
-    }
 }
 
 #[derive(Debug, Args)]
@@ -158,6 +156,11 @@ impl TransferCommand {
             None => None,
         };
         let Pair { source, target } = self.prepare(files, &settings, &task, common)?;
+        for (name, prepared) in [("source", &source), ("target", &target)] {
+            if let Some(encoder) = prepared.report.encoder.as_ref().filter(|_| common.verbose) {
+                console::message(format_args!("{name}: {encoder}"));
+            }
+        }
         let (a, b) = (&source.object, &target.object);
         let transferred = transfer(a, b, &region, &settings.transfer, &task)?;
         let output = TransferOutput {
@@ -166,6 +169,11 @@ impl TransferCommand {
             region: &region,
             transfer: &transferred,
             provenance: self.provenance(&settings),
+            files: match (&self.only, self.no_pictures) {
+                (Some(_), _) => TransferFiles::Region,
+                (None, true) => TransferFiles::WithoutPictures,
+                (None, false) => TransferFiles::All,
+            },
             grasps,
         };
         output.write(&self.output, &task, common)
@@ -180,19 +188,6 @@ impl TransferCommand {
         common: &Common,
     ) -> Result<Pair<Prepared>> {
         let options = &self.features;
-        if options.are_missing() {
-            let method = self.matching.method;
-            if method.info().reads_features {
-                bail!(
-                    "--method {method} needs features of both objects: give --encoder, \
-                     --source-embeddings with --target-embeddings, or --source-features with \
-                     --target-features (--method wks needs none)"
-                );
-            }
-            let features =
-                Pair { source: FeatureSource::Geometry, target: FeatureSource::Geometry };
-            return self.prepare_both(files, features, settings, task);
-        }
         if let (Some(a), Some(b)) = (&options.source_features, &options.target_features) {
             let a = read_vertex_features(a, &files.source.mesh)?;
             let b = read_vertex_features(b, &files.target.mesh)?;
@@ -200,33 +195,33 @@ impl TransferCommand {
                 Pair { source: FeatureSource::PerVertex(&a), target: FeatureSource::PerVertex(&b) };
             return self.prepare_both(files, features, settings, task);
         }
-        let (a, b) =
-            if let (Some(a), Some(b)) = (&options.source_embeddings, &options.target_embeddings) {
-                let a = read_embeddings(a, &files.source.mesh)?;
-                (a, read_embeddings(b, &files.target.mesh)?)
-            } else {
-                let coloring = Coloring::of_pair(&files.source, &files.target);
-                let encoder = EncoderCommand::new(self.encoder_settings(common)?)?;
-                let EncodedPair { source, target } =
-                    encoder.embed_pair(&files.source, &files.target, coloring, task)?;
-                if let Some(note) = encoder.note().filter(|_| !common.quiet) {
-                    console::message(format_args!("note: {note}"));
-                }
-                (source.embeddings, target.embeddings)
-            };
-        for (name, embeddings) in [("source", &a), ("target", &b)] {
-            if common.verbose {
-                let (n, about) = (embeddings.views.len(), &embeddings.metadata);
-                let (encoder, rolls) = (&about.encoder, about.rolls);
-                console::message(format_args!("{name}: {n} views by {encoder} ({rolls} rolls)"));
-            }
+        if let (Some(a), Some(b)) = (&options.source_embeddings, &options.target_embeddings) {
+            let a = read_embeddings(a, &files.source.mesh)?;
+            let b = read_embeddings(b, &files.target.mesh)?;
+            let features =
+                Pair { source: FeatureSource::from(&a), target: FeatureSource::from(&b) };
+            return self.prepare_both(files, features, settings, task);
         }
-        let features =
-            Pair { source: FeatureSource::Views(&a.views), target: FeatureSource::Views(&b.views) };
-        self.prepare_both(files, features, settings, task)
+        let method = self.matching.method.info();
+        if !method.reads_features && options.encoder.is_default() {
+            let features =
+                Pair { source: FeatureSource::Geometry, target: FeatureSource::Geometry };
+            return self.prepare_both(files, features, settings, task);
+        }
+        let most_rolls = method.features.rolls;
+        let encoder = options.encoder.open(most_rolls, &settings.cache, common)?;
+        let EncodedPair { source, target } =
+            encoder.embed_pair(&files.source, &files.target, task)?;
+        if let Some(note) = encoder.why_not_kept().filter(|_| !common.quiet) {
+            console::message(format_args!("note: {note}"));
+        }
+        self.side_by_side(
+            || source.prepare(files.source.mesh, settings, task),
+            || target.prepare(files.target.mesh, settings, task),
+        )
     }
 
-    /// Both objects prepared side by side, or the first failure, which names its file.
+    /// Both objects with features that are there.
     fn prepare_both(
         &self,
         files: Pair<MeshFile>,
@@ -234,25 +229,23 @@ impl TransferCommand {
         settings: &PipelineSettings,
         task: &Task,
     ) -> Result<Pair<Prepared>> {
-        let (source, target) = rayon::join(
+        self.side_by_side(
             || prepare(files.source.mesh, features.source, settings, task),
             || prepare(files.target.mesh, features.target, settings, task),
-        );
+        )
+    }
+
+    /// Both objects prepared side by side, or the first failure, which names its file.
+    fn side_by_side(
+        &self,
+        source: impl FnOnce() -> semfm::Result<Prepared> + Send,
+        target: impl FnOnce() -> semfm::Result<Prepared> + Send,
+    ) -> Result<Pair<Prepared>> {
+        let (source, target) = rayon::join(source, target);
         let named = |path: &Path| path.display().to_string();
         Ok(Pair {
             source: source.with_context(|| named(&self.source))?,
             target: target.with_context(|| named(&self.target))?,
-        })
-    }
-
-    fn encoder_settings(&self, common: &Common) -> Result<EncoderSettings> {
-        let model = self.features.encoder.clone().context("--encoder is missing")?;
-        Ok(EncoderSettings {
-            model,
-            rolls: self.features.rolls.unwrap_or(self.matching.method.info().features.rolls),
-            keep: !self.matching.no_cache,
-            threads: common.threads,
-            quiet: common.quiet,
         })
     }
 

@@ -1,13 +1,14 @@
 //! What `transfer` and `demo` write and print of a finished transfer.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use semfm::files::{Provenance, TransferResult, stages_ms};
 use semfm::fmap::Stages;
 use semfm::grasp::Grasps;
 use semfm::{GraspProblem, Prepared, Region, Task, Transfer, Verdict};
-use semfm_show::write_transfer;
+use semfm_show::{TransferFiles, write_transfer};
 use serde_json::{Value, json};
 
 use super::Outcome;
@@ -22,6 +23,8 @@ pub struct TransferOutput<'a> {
     pub region: &'a Region,
     pub transfer: &'a Transfer,
     pub provenance: Provenance,
+    /// Which files are written.
+    pub files: TransferFiles,
     /// Grasps in the transferred region, where a gripper was given.
     pub grasps: Option<GraspProblem>,
 }
@@ -30,21 +33,28 @@ impl TransferOutput<'_> {
     /// Writes every file, prints the answer, and says how the run ended. A refused region is not
     /// grasped.
     pub fn write(&self, folder: &Path, task: &Task, common: &Common) -> Result<Outcome> {
-        let mut files = write_transfer(folder, &self.result(), task)?;
+        let start = Instant::now();
+        let mut files = write_transfer(folder, &self.result(), self.files, task)?;
+        let write_ms = start.elapsed().as_secs_f64() * 1e3;
         let refused = self.transfer.verdict == Verdict::Refuse;
         let mut grasps = None;
         if let Some(problem) = self.grasps.as_ref().filter(|_| !refused) {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
             let (file, picture) = (folder.join("grasps.json"), folder.join("grasps.png"));
+            remove_old_grasps(folder)?;
             write_grasps(&file, problem, &found)?;
-            draw_grasps(&picture, problem, weights, &found, task)?;
-            files.extend([file, picture]);
+            files.push(file);
+            if self.files == TransferFiles::All {
+                draw_grasps(&picture, problem, weights, &found, task)?;
+                files.push(picture);
+            }
             grasps = Some(found);
         } else {
             remove_old_grasps(folder)?;
         }
-        let stages = stages_ms(self.source, self.target, self.transfer);
+        let mut stages = stages_ms(self.source, self.target, self.transfer);
+        stages.push("write", write_ms);
         if common.json {
             console::data(self.summary(&stages, &files, grasps.as_ref()));
         } else {

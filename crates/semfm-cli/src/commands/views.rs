@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use semfm::encoder::rendered_views::{Coloring, RenderedObject, ViewSettings};
 use semfm::geom::io::{MeshFormat, read_mesh};
-use semfm::rendered_views::{Coloring, ViewSettings, write_rendered_views};
 use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings};
 use semfm_show::write_sheet;
 
@@ -156,15 +156,16 @@ impl ViewsCommand {
             },
         };
         let task = console::progress(common.quiet);
-        let views = write_rendered_views(&self.output, &file, &settings, &renderer, &task)
+        let rendered = RenderedObject::new(&file, &settings, &renderer, &task)
             .with_context(|| self.mesh.display().to_string())?;
+        rendered.write(&self.output)?;
         if let Some(note) = renderer.note().filter(|_| !common.quiet) {
             console::message(format_args!("note: {note}"));
         }
         console::data(self.output.display());
         if let Some(sheet) = &self.sheet {
-            let columns = (views.len() as f64).sqrt().ceil() as usize;
-            write_sheet(sheet, &views, columns)?;
+            let columns = (rendered.views.len() as f64).sqrt().ceil() as usize;
+            write_sheet(sheet, &rendered.views, columns)?;
             console::data(sheet.display());
         }
         Ok(Outcome::Done)

@@ -83,7 +83,8 @@ impl Canvas {
     pub(super) fn write_png(&self, path: &Path) -> Result<()> {
         let (width, height) = (self.width as u32, self.height as u32);
         write_atomically(path, |out| {
-            PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive)
+            // Time counts more than size: most pictures are looked at once.
+            PngEncoder::new_with_quality(out, CompressionType::Fast, FilterType::Up)
                 .write_image(&self.rgb, width, height, ExtendedColorType::Rgb8)
                 .map_err(std::io::Error::other)
         })?;

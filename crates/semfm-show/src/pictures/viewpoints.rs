@@ -4,8 +4,7 @@
 use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::geom::{Mesh, Pinhole, Task};
-use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, render};
-use semfm::views::{camera_towards, fibonacci_directions};
+use semfm::views::{RigSettings, camera_towards, fibonacci_directions, triangle_ids};
 
 use super::pair_rotation::{Standing, WeightedMesh, pair_rotation};
 use super::upright::upright;
@@ -162,8 +161,8 @@ struct PixelCounts {
 
 impl PixelCounts {
     /// A face belongs to the region where one of its vertices does.
-    fn of(view: &View, WeightedMesh { mesh, weights }: WeightedMesh<'_>) -> Self {
-        let faces = view.triangles.iter().filter_map(|&t| usize::try_from(t).ok());
+    fn of(triangles: &[i32], WeightedMesh { mesh, weights }: WeightedMesh<'_>) -> Self {
+        let faces = triangles.iter().filter_map(|&t| usize::try_from(t).ok());
         let is_inside = |face: &usize| {
             mesh.faces()[*face].iter().any(|&v| weights[v as usize] >= Region::COUNTS)
         };
@@ -178,9 +177,8 @@ fn visible(
 ) -> Result<Vec<Visible>> {
     let cameras: Vec<Pinhole> =
         directions.iter().map(|d| d.camera(object.mesh, SMALL_SIDE)).collect::<Result<_>>()?;
-    let views =
-        render(object.mesh, &SurfaceColor::default(), &cameras, &RenderSettings::default(), task)?;
-    let counts: Vec<PixelCounts> = views.iter().map(|view| PixelCounts::of(view, object)).collect();
+    let views = triangle_ids(object.mesh, &cameras, task)?;
+    let counts: Vec<PixelCounts> = views.iter().map(|ids| PixelCounts::of(ids, object)).collect();
     let most_region = counts.iter().map(|count| count.region).max().unwrap_or(0).max(1) as f64;
     let most_object = counts.iter().map(|count| count.object).max().unwrap_or(0).max(1) as f64;
     Ok(counts

@@ -57,7 +57,9 @@ pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
-pub use transfer_folder::{AnchorRanks, ObjectAnchors, TransferResult, write_transfer};
+pub use transfer_folder::{
+    AnchorRanks, ObjectAnchors, TransferResult, write_answer, write_transfer,
+};
 pub use transfer_report::{
     CloudRecord, ObjectRecord, Provenance, Seeds, TransferInputs, TransferReportFile, stages_ms,
 };

@@ -114,21 +114,30 @@ pub fn write_transfer(
     result: &TransferResult<'_>,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder)
-        .map_err(|source| semfm_geom::Error::Io { path: folder.to_owned(), source })?;
+    let mut files = write_answer(folder, result)?;
     let (source, target) = (result.source_mesh(), result.target_mesh());
-    let names =
-        ["region.json", "report.json", "point_map.json", "source.ply", "target.ply", "target.glb"];
-    let [region, report, point_map, source_ply, target_ply, target_glb] =
-        names.map(|name| folder.join(name));
-
-    TransferredRegionFile::new(result.transfer, target).write(&region)?;
-    result.report().write(&report)?;
+    let names = ["point_map.json", "source.ply", "target.ply", "target.glb"];
+    let [point_map, source_ply, target_ply, target_glb] = names.map(|name| folder.join(name));
     point_map_file(result, &result.anchor_ranks(task)?).write(&point_map)?;
     write_weighted(&source_ply, source, result.region.weights())?;
     write_weighted(&target_ply, target, result.transfer.weights())?;
     write_weighted(&target_glb, target, result.transfer.weights())?;
-    Ok(vec![region, report, point_map, source_ply, target_ply, target_glb])
+    files.extend([point_map, source_ply, target_ply, target_glb]);
+    Ok(files)
+}
+
+/// Writes only the answer of a transfer into `folder`, which is made if it is not there:
+/// `region.json` and `report.json`. Returns the paths.
+///
+/// # Errors
+/// [`semfm_geom::Error::Io`] for the first file that cannot be written.
+pub fn write_answer(folder: &Path, result: &TransferResult<'_>) -> Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(folder)
+        .map_err(|source| semfm_geom::Error::Io { path: folder.to_owned(), source })?;
+    let [region, report] = ["region.json", "report.json"].map(|name| folder.join(name));
+    TransferredRegionFile::new(result.transfer, result.target_mesh()).write(&region)?;
+    result.report().write(&report)?;
+    Ok(vec![region, report])
 }
 
 fn point_map_file(result: &TransferResult<'_>, ranks: &AnchorRanks) -> PointMapFile {

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use super::transfer_folder::TransferResult;
 use super::write_json;
-use crate::{Prepared, Result, Transfer};
+use crate::{EncoderRecord, Prepared, Result, Transfer};
 
 /// The format that is written.
 const FORMAT: &str = "semfm.report/1";
@@ -46,6 +46,9 @@ pub struct ObjectRecord {
     pub shape: ShapeReport,
     /// Whether the shape was read from the cache.
     pub from_cache: bool,
+    /// The encoder behind its features, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<EncoderRecord>,
     /// Its semantic cloud.
     pub cloud: CloudRecord,
 }
@@ -157,6 +160,7 @@ impl ObjectRecord {
             mesh: MeshIdentity::of(object.shape().original()),
             shape: object.shape().report().clone(),
             from_cache: report.from_cache,
+            encoder: report.encoder.clone(),
             cloud: CloudRecord {
                 n_points: object.cloud().n_points(),
                 dim: object.cloud().dim(),

@@ -3,7 +3,7 @@
 //! A name says little: the network under an `ENCODER.json` is replaced, a checkpoint is trained on and
 //! saved into the same folder, a class is edited. The program that makes embeddings knows which files it
 //! reads (`semfm-embed --list-inputs`), and their content is hashed here, once for each
-//! [`EncoderCommand`](crate::encoder_command::EncoderCommand).
+//! [`CommandEncoder`](crate::CommandEncoder).
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -59,7 +59,7 @@ impl EncoderInputs {
     /// Asks the program what embeddings by `model` depend on.
     ///
     /// # Errors
-    /// [`Error::EncoderMissing`], [`Error::EncoderFailed`], and [`Error::Invalid`] for an answer in
+    /// [`Error::ProgramMissing`], [`Error::ProgramFailed`], and [`Error::Invalid`] for an answer in
     /// another format.
     pub fn ask(program: &OsStr, model: &str) -> Result<Self> {
         let name = program.display().to_string();
@@ -69,10 +69,10 @@ impl EncoderInputs {
             Ok(answer) if answer.status.success() => answer.stdout,
             Ok(answer) => {
                 let status = answer.status.to_string();
-                return Err(Error::EncoderFailed { program: name, status });
+                return Err(Error::ProgramFailed { program: name, status });
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return Err(Error::EncoderMissing { program: name });
+                return Err(Error::ProgramMissing { model: model.to_owned(), program: name });
             }
             Err(source) => {
                 return Err(semfm_geom::Error::Io { path: name.into(), source }.into());
@@ -107,7 +107,8 @@ impl EncoderInputs {
         });
         let files = hashed.collect::<Result<BTreeMap<_, _>>>()?;
         let content = Content { model: &self.model, packages: &self.packages, files };
-        Ok(blake3::hash(crate::files::to_json(&content).to_string().as_bytes()))
+        let json = serde_json::json!(content).to_string();
+        Ok(blake3::hash(json.as_bytes()))
     }
 
     /// How the files look now.

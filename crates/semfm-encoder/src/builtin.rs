@@ -1,0 +1,62 @@
+//! The encoders that are part of the program: one row each.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use crate::Result;
+use crate::encoder::WantedViews;
+use crate::net_encoder::NetEncoder;
+
+/// An encoder whose weights are in the program.
+#[derive(Debug)]
+pub struct BuiltinEncoder {
+    /// The name used by `--encoder`.
+    pub name: &'static str,
+    /// One line for help texts.
+    pub summary: &'static str,
+    /// The content of its `.net` file.
+    weights: &'static [u8],
+    /// What it is shown, where that is not what [`NetEncoder::parse`] says.
+    shown: fn(&mut WantedViews),
+    /// Made when first asked for.
+    encoder: OnceLock<Arc<NetEncoder>>,
+}
+
+/// All of them; the first is the default everywhere.
+pub static BUILTIN_ENCODERS: [BuiltinEncoder; 1] = [BuiltinEncoder {
+    name: "builtin",
+    summary: "a small network that is part of the program and needs nothing else",
+    weights: include_bytes!("../weights/builtin.net"),
+    // It was trained to say the same of a turned picture: one rotation is as good as four.
+    shown: |wants| wants.rolls = 1,
+    encoder: OnceLock::new(),
+}];
+
+impl BuiltinEncoder {
+    /// The built-in encoder of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        BUILTIN_ENCODERS.iter().find(|encoder| encoder.name == name)
+    }
+
+    /// The network, read once.
+    ///
+    /// # Errors
+    /// [`Error::Format`](crate::Error::Format) where the program was built with a broken file, which a
+    /// test rules out.
+    pub fn encoder(&self) -> Result<Arc<NetEncoder>> {
+        if let Some(encoder) = self.encoder.get() {
+            return Ok(Arc::clone(encoder));
+        }
+        let path = format!("{}.net", self.name);
+        let encoder = NetEncoder::parse(Path::new(&path), self.weights)?.with_wants(self.shown);
+        Ok(Arc::clone(self.encoder.get_or_init(|| Arc::new(encoder))))
+    }
+}
+
+/// The built-in default encoder.
+///
+/// # Errors
+/// As [`BuiltinEncoder::encoder`].
+pub fn builtin_encoder() -> Result<Arc<NetEncoder>> {
+    BUILTIN_ENCODERS[0].encoder()
+}

@@ -1,0 +1,36 @@
+//! Encoders: rendered views in, one vector per image patch out.
+//!
+//! An [`Encoder`] says what it wants to be shown ([`WantedViews`]), gets the pictures
+//! ([`RenderedObject`]) and gives back [`EncodedViews`]. One is built in ([`builtin_encoder`]): a small
+//! convolutional network of our own whose weights are part of the program, with a forward pass in some
+//! three hundred lines ([`NetEncoder`]); it needs no Python, no download and no further file, and its
+//! pictures never leave memory. Encoders outside answer through the program `semfm-embed`
+//! ([`CommandEncoder`], feature `mcap`). [`open_encoder`] finds any of them by name.
+
+mod builtin;
+mod channel;
+#[cfg(feature = "mcap")]
+mod command;
+#[cfg(feature = "mcap")]
+mod command_inputs;
+mod convolution;
+mod encoder;
+mod error;
+mod layer;
+mod net_encoder;
+mod net_file;
+mod network;
+mod open;
+pub mod rendered_views;
+mod turned;
+
+pub use builtin::{BUILTIN_ENCODERS, BuiltinEncoder, builtin_encoder};
+pub use channel::Channel;
+#[cfg(feature = "mcap")]
+pub use command::{CommandEncoder, PROGRAM_VARIABLE};
+pub use encoder::{EncodedViews, Encoder, EncoderIdentity, WantedViews};
+pub use error::{Error, Result};
+pub use layer::{ConvLayer, Layer};
+pub use net_encoder::NetEncoder;
+pub use net_file::{Background, NetHeader, write_net};
+pub use open::{OpenSettings, encoder_names, open_encoder};

@@ -1,0 +1,279 @@
+//! Embeddings of objects by any encoder, kept between runs.
+//!
+//! An object is rendered as its encoder wants it and encoded; what comes out is kept under a key of
+//! everything that it depends on, the encoder's version among it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use half::f16;
+use semfm_encoder::Encoder;
+use semfm_encoder::rendered_views::{Coloring, Drawable, RenderedObject, ViewSettings};
+use semfm_geom::io::{read_json, write_json};
+use semfm_geom::{Mesh, MeshHash, ShapeCache, Task};
+use semfm_views::mcap::{Dtype, EmbeddingsFile};
+use semfm_views::{EmbeddedView, Renderer};
+use serde::{Deserialize, Serialize};
+
+use crate::files::read_embeddings;
+use crate::{FeatureSource, PipelineSettings, Prepared, Result, prepare};
+
+/// An encoder with the folder in which its embeddings are kept.
+#[derive(Clone, Debug)]
+pub struct ObjectEncoder {
+    encoder: Arc<dyn Encoder>,
+    rolls: u32,
+    /// `None` where nothing is kept.
+    folder: Option<PathBuf>,
+}
+
+/// Embeddings of one object.
+#[derive(Clone, Debug)]
+pub struct EncodedObject {
+    /// The embeddings of its views.
+    pub embeddings: EmbeddingsFile,
+    /// What making them took, now or then; `None` where that is not known.
+    pub times: Option<EncodingTimes>,
+    /// Whether they were kept from an earlier run.
+    pub from_cache: bool,
+}
+
+/// Embeddings of two objects.
+#[derive(Clone, Debug)]
+pub struct EncodedPair {
+    /// Of the demonstrated object.
+    pub source: EncodedObject,
+    /// Of the object to act on.
+    pub target: EncodedObject,
+}
+
+/// What making the embeddings of an object took (wall time), the encoder's start included.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct EncodingTimes {
+    /// Milliseconds for the views.
+    pub views_ms: f64,
+    /// Milliseconds for the encoder.
+    pub embed_ms: f64,
+}
+
+/// What embeddings depend on. The key is a hash of its JSON.
+#[derive(Serialize)]
+struct CacheKey {
+    mesh: MeshHash,
+    /// Hash of the object's colours, where they are shown.
+    colors: Option<String>,
+    /// Hash of everything that makes the encoder.
+    encoder: String,
+    /// The version of the code that draws the views.
+    version: &'static str,
+    rolls: u32,
+    views: ViewSettings,
+}
+
+impl EncodedObject {
+    /// Prepares the mesh that was encoded; what encoding took in this run is part of the report.
+    ///
+    /// # Errors
+    /// As [`prepare`].
+    pub fn prepare(
+        &self,
+        mesh: Mesh,
+        settings: &PipelineSettings,
+        task: &Task,
+    ) -> Result<Prepared> {
+        let mut prepared = prepare(mesh, FeatureSource::from(&self.embeddings), settings, task)?;
+        if let Some(EncodingTimes { views_ms, embed_ms }) = self.times.filter(|_| !self.from_cache)
+        {
+            let stages = [("views", views_ms), ("embed", embed_ms)];
+            prepared.report.stages_ms.splice(..0, stages);
+        }
+        Ok(prepared)
+    }
+}
+
+impl ObjectEncoder {
+    /// The encoder at the rotations that it wants. Embeddings are kept in the folder `embeddings`
+    /// within that of `cache`, or not at all where the cache is off.
+    pub fn new(encoder: Arc<dyn Encoder>, cache: &ShapeCache) -> Self {
+        let folder = cache.folder().map(|shapes| shapes.join("embeddings"));
+        Self { rolls: encoder.wants().rolls, encoder, folder }
+    }
+
+    /// Each picture at this many rotations: 1, 2 or 4.
+    pub fn with_rolls(self, rolls: u32) -> Self {
+        Self { rolls, ..self }
+    }
+
+    /// Rotations of each picture that are averaged.
+    pub fn rolls(&self) -> u32 {
+        self.rolls
+    }
+
+    /// The encoder.
+    pub fn encoder(&self) -> &Arc<dyn Encoder> {
+        &self.encoder
+    }
+
+    /// Why embeddings are not kept although they should be, in words.
+    pub fn why_not_kept(&self) -> Option<String> {
+        self.folder.as_ref()?;
+        self.encoder.why_not_kept()
+    }
+
+    /// The embeddings of an object's views, in the object's own colours or in grey, as far as colours
+    /// say anything to the encoder; made where they are not there yet.
+    ///
+    /// # Errors
+    /// [`Error::Encoder`](crate::Error::Encoder) where the object cannot be drawn or encoded, or the
+    /// encoder's files cannot be read. Trouble with what is kept is never an error.
+    pub fn embed<'a>(
+        &self,
+        object: impl Into<Drawable<'a>>,
+        coloring: Coloring,
+        task: &Task,
+    ) -> Result<EncodedObject> {
+        let object = object.into();
+        match self.kept(object, coloring)? {
+            Some(kept) => Ok(kept),
+            None => Ok(self.make(&[object], coloring, task)?.remove(0)),
+        }
+    }
+
+    /// The embeddings of two objects, in their own colours where both have some. Those that are not
+    /// there yet are made in one call of the encoder, which may take longer to start than to look at
+    /// an object.
+    ///
+    /// # Errors
+    /// As [`ObjectEncoder::embed`].
+    pub fn embed_pair<'a>(
+        &self,
+        source: impl Into<Drawable<'a>>,
+        target: impl Into<Drawable<'a>>,
+        task: &Task,
+    ) -> Result<EncodedPair> {
+        let (source, target) = (source.into(), target.into());
+        let coloring = Coloring::of_pair(source, target);
+        let kept = [self.kept(source, coloring)?, self.kept(target, coloring)?];
+        let is_same = self.look(source, coloring) == self.look(target, coloring);
+        Ok(match kept {
+            [Some(source), Some(target)] => EncodedPair { source, target },
+            [Some(source), None] => {
+                EncodedPair { source, target: self.make(&[target], coloring, task)?.remove(0) }
+            }
+            [None, Some(target)] => {
+                EncodedPair { source: self.make(&[source], coloring, task)?.remove(0), target }
+            }
+            [None, None] if is_same => {
+                let both = self.make(&[source], coloring, task)?.remove(0);
+                EncodedPair { source: both.clone(), target: both }
+            }
+            [None, None] => {
+                let mut made = self.make(&[source, target], coloring, task)?;
+                let target = made.remove(1);
+                EncodedPair { source: made.remove(0), target }
+            }
+        })
+    }
+
+    /// What is kept of an object. Whatever is wrong with a kept file, a new one is the cure.
+    fn kept(&self, object: Drawable<'_>, coloring: Coloring) -> Result<Option<EncodedObject>> {
+        let Some(folder) = &self.folder else { return Ok(None) };
+        let hash = self.encoder.content_hash()?;
+        if self.encoder.why_not_kept().is_some() {
+            return Ok(None);
+        }
+        let path = self.kept_at(folder, hash, object, coloring);
+        let Ok(embeddings) = read_embeddings(&path, object.mesh()) else { return Ok(None) };
+        let times = read_json(path.with_extension("took.json")).ok();
+        Ok(Some(EncodedObject { embeddings, times, from_cache: true }))
+    }
+
+    /// Renders the objects, has them encoded, and keeps what comes out.
+    fn make(
+        &self,
+        objects: &[Drawable<'_>],
+        coloring: Coloring,
+        task: &Task,
+    ) -> Result<Vec<EncodedObject>> {
+        let settings = self.encoder.wants().settings(coloring);
+        let (mut rendered, mut views_ms) = (Vec::new(), Vec::new());
+        for &object in objects {
+            let start = Instant::now();
+            // By the CPU on every machine: what is kept must not depend on the driver that was there.
+            rendered.push(RenderedObject::new(object, &settings, &Renderer::cpu(), task)?);
+            views_ms.push(milliseconds_since(start));
+        }
+        let start = Instant::now();
+        let encoded = self.encoder.encode(&rendered, self.rolls, task)?;
+        let embed_ms = milliseconds_since(start) / objects.len() as f64;
+        let hash = match &self.folder {
+            Some(_) => self.encoder.hash_of_last_run()?,
+            None => None,
+        };
+        let mut made = Vec::new();
+        for (((encoded, rendered), &object), views_ms) in
+            encoded.into_iter().zip(&rendered).zip(objects).zip(views_ms)
+        {
+            let times = EncodingTimes { views_ms, embed_ms };
+            let embeddings = encoded.into_file(rendered);
+            if let (Some(folder), Some(hash)) = (&self.folder, &hash) {
+                let path = self.kept_at(folder, hash.clone(), object, coloring);
+                keep(folder, &path, &embeddings, &times);
+            }
+            made.push(EncodedObject { embeddings, times: Some(times), from_cache: false });
+        }
+        Ok(made)
+    }
+
+    /// Where the embeddings of an object are kept: under a hash of everything that they depend on.
+    fn kept_at(
+        &self,
+        folder: &Path,
+        encoder: String,
+        object: Drawable<'_>,
+        coloring: Coloring,
+    ) -> PathBuf {
+        let Look { mesh, colors } = self.look(object, coloring);
+        let views = self.encoder.wants().settings(coloring);
+        let version = env!("CARGO_PKG_VERSION");
+        let key = CacheKey { mesh, colors, encoder, version, rolls: self.rolls, views };
+        let key = blake3::hash(crate::files::to_json(&key).to_string().as_bytes());
+        folder.join(format!("{}.emb.mcap", key.to_hex()))
+    }
+
+    /// The object as the encoder sees it.
+    fn look(&self, object: Drawable<'_>, coloring: Coloring) -> Look {
+        let coloring = self.encoder.wants().settings(coloring).coloring;
+        let colors = (coloring == Coloring::Own).then(|| object.hash_of_colors()).flatten();
+        Look { mesh: object.mesh().hash(), colors }
+    }
+}
+
+/// An object as an encoder sees it.
+#[derive(PartialEq)]
+struct Look {
+    mesh: MeshHash,
+    /// Hash of the object's colours, where they are shown.
+    colors: Option<String>,
+}
+
+/// Keeps embeddings to the last bit, so that the next run gives the same answer. What cannot be kept
+/// is made again the next time.
+fn keep(folder: &Path, path: &Path, embeddings: &EmbeddingsFile, times: &EncodingTimes) {
+    let kept = std::fs::create_dir_all(folder).is_ok()
+        && embeddings.write(path, exact_dtype(&embeddings.views)).is_ok();
+    if kept {
+        let _ = write_json(path.with_extension("took.json"), times);
+    }
+}
+
+/// The smallest type that holds every number as it is: programs hand over half precision.
+fn exact_dtype(views: &[EmbeddedView]) -> Dtype {
+    let mut numbers = views.iter().flat_map(|view| view.patches.data());
+    if numbers.all(|&x| f16::from_f32(x).to_f32() == x) { Dtype::F16 } else { Dtype::F32 }
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
