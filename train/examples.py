@@ -69,9 +69,9 @@ class Examples:
     def __len__(self) -> int:
         return sum(len(pictures) for pictures in self.pictures)
 
-    def load_new(self, paths: list[Path], axes: Axes) -> int:
-        """Adds the files that were not among those of earlier calls; how many."""
-        new = [path for path in paths if path.name not in self.files]
+    def load_new(self, paths: list[Path], axes: Axes, limit: int | None = None) -> int:
+        """Adds files that were not among those of earlier calls, at most `limit`; how many."""
+        new = [path for path in paths if path.name not in self.files][:limit]
         for path in new:
             with np.load(path) as arrays:
                 field = axes.project(arrays["features"])

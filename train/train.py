@@ -204,6 +204,7 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--load", type=int, help="objects that are read at once: start sooner")
     parser.add_argument("--report", type=int, default=150, help="steps between reports")
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
@@ -219,7 +220,7 @@ def main() -> None:
     before = start.provenance if start else {"pictures": 0, "cpu_minutes": 0.0, "pieces": []}
 
     def load_new() -> None:
-        seen.load_new(workers.mine(sorted(arguments.data.glob("train_*.npz"))), axes)
+        seen.load_new(workers.mine(sorted(arguments.data.glob("train_*.npz"))), axes, arguments.load)
         if workers.rank() == 0:
             left_out.load_new(sorted(arguments.data.glob("left_*.npz"))[:32], axes)
 
