@@ -1,4 +1,4 @@
-"""Pictures as the net may meet them: turned, mirrored, with more or less contrast, on other grounds.
+"""Pictures as the net may meet them: turned, mirrored, of other contrast, on other grounds.
 
 Turns are by quarters, so that patches stay patches. Mirrored pictures keep their target: the
 teacher's features tell left from right too weakly to be worth keeping.

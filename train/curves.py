@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 
-def arc(radius: float, start: float, stop: float, n: int = 12, *, stretch: float = 1.0) -> np.ndarray:
+def arc(
+    radius: float, start: float, stop: float, n: int = 12, *, stretch: float = 1.0
+) -> np.ndarray:
     """Points (n, 3) of a circle's arc in the x, z plane, angles in radians; z is stretched."""
     t = np.linspace(start, stop, n)
     return np.stack([radius * np.cos(t), 0 * t, stretch * radius * np.sin(t)], 1)
@@ -25,8 +27,9 @@ def smooth(points, n: int = 12) -> np.ndarray:
     t = np.linspace(0, len(p) - 3 - 1e-9, n)
     i, s = t.astype(int), (t % 1)[:, None]
     a, b, c, d = p[i], p[i + 1], p[i + 2], p[i + 3]
-    return 0.5 * (2 * b + (c - a) * s + (2 * a - 5 * b + 4 * c - d) * s**2
-                  + (3 * b - a - 3 * c + d) * s**3)  # fmt: skip
+    return 0.5 * (
+        2 * b + (c - a) * s + (2 * a - 5 * b + 4 * c - d) * s**2 + (3 * b - a - 3 * c + d) * s**3
+    )
 
 
 def between(values, n: int) -> np.ndarray:
@@ -38,8 +41,9 @@ def between(values, n: int) -> np.ndarray:
 def vessel_profile(radii, height: float, wall: float, *, base: float | None = None) -> np.ndarray:
     """Outline (n, 2) of (radius, z) of a vessel that is open at the top.
 
-    `radii` are the outer radii from the bottom up, at even heights; the floor lies at the first of
-    these heights above `base`, the thickness of the wall (at most half the height) where none is given.
+    `radii` are the outer radii from the bottom up, at even heights. The floor lies at the first of
+    these heights above `base`; where none is given that is the wall's thickness, or half the height
+    where that is less.
     """
     radii = np.asarray(radii, float)
     z = np.linspace(0, height, len(radii))

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
-
 import semfm
+from scipy.spatial import cKDTree
 
 from .families import FAMILIES, LEFT_OUT, WEIGHTS
 from .objects import TrainingObject, make_object

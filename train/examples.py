@@ -134,5 +134,7 @@ def fit_axes(folder: Path, pattern: str, per_object: int = 150) -> Axes:
             features = arrays["features"]
         chosen.append(features[:: max(1, len(features) // per_object)].astype(np.float32))
     if not chosen:
-        raise SystemExit(f"{folder}: expected training objects {pattern}, found none: run train.dataset")
+        raise SystemExit(
+            f"{folder}: expected training objects {pattern}, found none: run train.dataset"
+        )
     return Axes.fit(np.concatenate(chosen))

@@ -8,8 +8,8 @@ A `.net` file:
     u32         version of the format, 1 (little-endian, as all numbers)
     u32         length of the JSON in bytes
     JSON        name, version, size, patch, channels, mean, std, background, layers, provenance
-    float16     weights: for each convolution, in order, (out, in / groups, kernel, kernel) row-major,
-                then its bias (out,)
+    float16     for each convolution, in order, its weights (out, in / groups, kernel, kernel)
+                row-major, then its bias (out,)
     32 bytes    BLAKE3 of everything before
 
 Layers: {"op": "conv", "in", "out", "kernel", "stride", "padding", "dilation", "groups", "relu"},
@@ -128,7 +128,14 @@ def read_net(content: bytes) -> tuple[dict, list[Layer]]:
             bias = torch.from_numpy(numbers[at + n : at + n + shape[0]].copy())
             at += n + shape[0]
             layers.append(
-                Conv(weight, bias, entry["stride"], entry["padding"], entry["dilation"], entry["relu"])
+                Conv(
+                    weight,
+                    bias,
+                    entry["stride"],
+                    entry["padding"],
+                    entry["dilation"],
+                    entry["relu"],
+                )
             )
     if at != len(numbers):
         raise ValueError(f"expected {at} weights, found {len(numbers)}")

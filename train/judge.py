@@ -20,7 +20,7 @@ from semfm.sidecar.onnx_encoder import OnnxEncoder
 
 
 def embed_objects(data: Path, encoder_json: str, folder: Path, rolls: int, count: int) -> None:
-    """Writes `NAME.emb.mcap` of every labelled object; views are kept in the folder for next time."""
+    """Writes `NAME.emb.mcap` of every labelled object; views are kept for the next encoder."""
     pairs = json.loads((data / "pairs.json").read_text())
     names = sorted({name for group in pairs.values() for pair in group for name in pair})
     encoder = OnnxEncoder(encoder_json, "cpu", 1)
@@ -67,11 +67,29 @@ def main() -> None:
     )
     report = arguments.output / "report"
     run_command(
-        ["eval", str(arguments.data), "--embeddings", str(arguments.output / "embeddings"),
-         "--methods", arguments.methods, "--gallery", "0", "--no-predictions", "--fresh", "--quiet",
-         "--threads", str(arguments.threads), "-o", str(report)]  # fmt: skip
+        [
+            "eval",
+            str(arguments.data),
+            "--embeddings",
+            str(arguments.output / "embeddings"),
+            "--methods",
+            arguments.methods,
+            "--gallery",
+            "0",
+            "--no-predictions",
+            "--fresh",
+            "--quiet",
+            "--threads",
+            str(arguments.threads),
+            "-o",
+            str(report),
+        ]
     )
-    print(table(json.loads((report / "results.json").read_text())["rows"], arguments.methods.split(",")))
+    print(
+        table(
+            json.loads((report / "results.json").read_text())["rows"], arguments.methods.split(",")
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 """The student: a small convolutional net from one grey picture to a grid of tokens.
 
-    picture (n, 1, 224, 224) → 4×4/4, 32 → 3×3/2, 64 → residual → 2×2/2, 104 → 4 residuals → 1×1 → 64
+    picture (n, 1, 224, 224)
+      → 4×4/4, 32 → 3×3/2, 64 → residual → 2×2/2, 104 → 4 residuals → 1×1, 64 →
     tokens (n, 64, 14, 14), one for each patch of 16 × 16 pixels
 
 Residual blocks are two 3×3 convolutions; the last four have dilations 1, 2, 1, 2, so that a token
 sees the whole object. At first every convolution but the last is followed by a batch norm; later
-pieces of training, and the exported net, have convolutions, ReLU and additions alone: `without_norms`
-merges each norm into its convolution.
+pieces of training, and the exported net, have convolutions, ReLU and additions alone:
+`without_norms` merges each norm into its convolution.
 """
 
 from __future__ import annotations

@@ -65,11 +65,17 @@ def surface(solid: Solid, resolution: int = RESOLUTION) -> tuple[np.ndarray, np.
     coarse = solid.distance(_grid(low, step * _COARSE, coarse_shape)).reshape(coarse_shape)
     # a cell of side s holds surface only if its corners are within its diagonal, √3 s
     near = np.abs(coarse) < 1.74 * step * _COARSE
-    corner = [near[i:, j:, k:][: near.shape[0] - 1, : near.shape[1] - 1, : near.shape[2] - 1]
-              for i in (0, 1) for j in (0, 1) for k in (0, 1)]  # fmt: skip
+    corner = [
+        near[i:, j:, k:][: near.shape[0] - 1, : near.shape[1] - 1, : near.shape[2] - 1]
+        for i in (0, 1)
+        for j in (0, 1)
+        for k in (0, 1)
+    ]
     cells = np.logical_or.reduce(corner)
     shape = (coarse_shape - 1) * _COARSE
-    fine = np.repeat(np.repeat(np.repeat(coarse[:-1, :-1, :-1], _COARSE, 0), _COARSE, 1), _COARSE, 2)
+    fine = np.repeat(
+        np.repeat(np.repeat(coarse[:-1, :-1, :-1], _COARSE, 0), _COARSE, 1), _COARSE, 2
+    )
     wanted = np.repeat(np.repeat(np.repeat(cells, _COARSE, 0), _COARSE, 1), _COARSE, 2)
     where = np.argwhere(wanted)
     fine[wanted] = solid.distance((low + where * step).astype(np.float32))
@@ -123,7 +129,10 @@ def _warped(v: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     if rng.random() < 0.15:
         angle = rng.normal(0, 0.7) * v[:, a]
         x, y = v[:, b].copy(), v[:, c].copy()
-        v[:, b], v[:, c] = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+        v[:, b], v[:, c] = (
+            np.cos(angle) * x - np.sin(angle) * y,
+            np.sin(angle) * x + np.cos(angle) * y,
+        )
     return v
 
 
@@ -163,7 +172,9 @@ def _coarse(vertices, faces, cell: float, rng) -> tuple[np.ndarray, np.ndarray]:
     Where that would pinch thin parts into edges of three triangles, the mesh stays as it is.
     """
     key = np.floor((vertices + rng.uniform(0, cell, 3)) / cell).astype(np.int64)
-    _, first, cluster, counts = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    _, first, cluster, counts = np.unique(
+        key, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
     cluster = cluster.ravel()
     means = np.stack([np.bincount(cluster, vertices[:, k]) for k in range(3)], 1) / counts[:, None]
     f = cluster[faces]

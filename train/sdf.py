@@ -56,7 +56,7 @@ def tube(curve, radii, *, closed: bool = False, flat=None) -> Solid:
     curve : (n, 3) points of the curve, joined by straight pieces.
     radii : one radius, or n of them; it changes linearly along each piece.
     closed : whether the last point joins the first.
-    flat : (direction (3,), share): squeeze the section along a direction to that share of its width.
+    flat : (direction (3,), share): squeeze the section along a direction to that share.
     """
     curve = np.asarray(curve, np.float32)
     radii = np.broadcast_to(np.asarray(radii, np.float32), (len(curve),))

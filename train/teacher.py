@@ -7,7 +7,6 @@ Any ENCODER.json of docs/encoders.md will do. The shipped net was taught by Mobi
 from __future__ import annotations
 
 import numpy as np
-
 import semfm
 from semfm.sidecar.coverage import patch_coverage
 from semfm.sidecar.onnx_encoder import OnnxEncoder

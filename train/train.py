@@ -142,7 +142,7 @@ class Trainer:
         return found
 
     def _update_mean(self) -> None:
-        """mean ← mean + (weights − mean) / n, n = min(steps / 10, _MEAN_STEPS): young means are short."""
+        """mean ← mean + (weights − mean) / n for n = min(1 + steps / 10, _MEAN_STEPS)."""
         steps = self.steps_before + self.step_of_piece
         share = 1 / min(1 + steps / 10, _MEAN_STEPS)
         with torch.no_grad():
@@ -213,14 +213,20 @@ def main() -> None:
     axes = start.axes if start else fit_axes(arguments.data, "train_*.npz")
     seen, left_out = Examples.empty(), Examples.empty()
     settings = Settings(
-        arguments.pictures, arguments.decay, arguments.rate, arguments.batch, arguments.seed,
+        arguments.pictures,
+        arguments.decay,
+        arguments.rate,
+        arguments.batch,
+        arguments.seed,
         arguments.minutes,
-    )  # fmt: skip
+    )
     trainer = Trainer(settings, start, arguments.merge_norms)
     before = start.provenance if start else {"pictures": 0, "cpu_minutes": 0.0, "pieces": []}
 
     def load_new() -> None:
-        seen.load_new(workers.mine(sorted(arguments.data.glob("train_*.npz"))), axes, arguments.load)
+        seen.load_new(
+            workers.mine(sorted(arguments.data.glob("train_*.npz"))), axes, arguments.load
+        )
         if workers.rank() == 0:
             left_out.load_new(sorted(arguments.data.glob("left_*.npz"))[:32], axes)
 
@@ -254,8 +260,11 @@ def main() -> None:
 
     load_new()
     if workers.rank() == 0:
-        print(f"{len(seen.pictures)} objects a process, {len(left_out.pictures)} left out, "
-              f"{axes.kept:.3f} of the variance on the axes", flush=True)  # fmt: skip
+        print(
+            f"{len(seen.pictures)} objects a process, {len(left_out.pictures)} left out, "
+            f"{axes.kept:.3f} of the variance on the axes",
+            flush=True,
+        )
     recent = []
     seed = (settings.seed + before["pictures"]) * workers.count() + workers.rank()
     source = batches(seen, settings, seed)
@@ -269,10 +278,13 @@ def main() -> None:
         if workers.rank() == 0:
             squared, cosine = np.mean(recent, axis=0)
             kept_back = trainer.validate(left_out)
-            print(f"step {trainer.step_of_piece} of {settings.steps}: squared {squared:.3f}, cosine "
-                  f"{cosine:.3f}; left out: squared {kept_back.squared:.3f}, cosine "
-                  f"{kept_back.cosine:.3f}; {len(seen.pictures) * workers.count()} objects, "
-                  f"{cpu_minutes():.1f} CPU min", flush=True)  # fmt: skip
+            print(
+                f"step {trainer.step_of_piece} of {settings.steps}: squared {squared:.3f}, cosine "
+                f"{cosine:.3f}; left out: squared {kept_back.squared:.3f}, cosine "
+                f"{kept_back.cosine:.3f}; {len(seen.pictures) * workers.count()} objects, "
+                f"{cpu_minutes():.1f} CPU min",
+                flush=True,
+            )
             checkpoint().write(arguments.output)
         recent.clear()
         load_new()
