@@ -1,4 +1,4 @@
-"""Pictures of a transfer, and the same in trimesh's hands: `pip install 'semfm[viz]' trimesh`."""
+"""Pictures of a transfer, and the same in trimesh's hands: `pip install matplotlib trimesh`."""
 
 import matplotlib
 

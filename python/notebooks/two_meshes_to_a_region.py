@@ -6,7 +6,7 @@
 # SemFM finds semantic parts that two objects share, lays a *functional map* between their surfaces
 # through those anchors, and transfers the demonstrated region along it. This notebook does so
 # with two procedural objects and simulated embeddings, so that it runs anywhere within a minute:
-# `pip install 'semfm[viz]' notebook`. With your own objects only the first two cells change.
+# `pip install matplotlib notebook`. With your own objects only the first two cells change.
 
 # %%
 import matplotlib.pyplot as plt

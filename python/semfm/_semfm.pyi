@@ -2028,6 +2028,16 @@ def camera_towards(mesh: _MeshLike, direction: ArrayLike, up: ArrayLike, *, size
     """
     ...
 
+def check_output(output: _Path, inputs: Iterable[_Path]) -> None:
+    """Refuses an output that would replace one of the inputs, or that cannot be written as a file.
+
+    Parameters
+    ----------
+    output : path
+    inputs : list of path
+    """
+    ...
+
 def cotan_laplacian(mesh: _MeshLike) -> Laplacian:
     """The cotangent Laplacian of the triangles as they are.
 
@@ -2387,6 +2397,32 @@ def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings
     >>> prepared = semfm.prepare(demo.mesh, features=demo.part_features(), k=20)
     >>> prepared.cloud.dim == len(demo.part_names)
     True
+    """
+    ...
+
+def printable(text: str) -> str:
+    """The text without what a terminal would obey (escape sequences of others).
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+    """
+    ...
+
+def read_file(path: _Path) -> bytes:
+    """Reads a regular file whole; a device, a pipe, a folder or a stand-in of Git LFS is refused.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    bytes
     """
     ...
 

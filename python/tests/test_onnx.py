@@ -258,7 +258,7 @@ def test_a_class_that_is_no_encoder_is_refused(tmp_path, views, monkeypatch, cap
 def test_a_missing_runtime_is_named_with_what_to_install(tmp_path, views, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
     monkeypatch.setitem(sys.modules, "torch", None)
-    for model, hint in ((write_encoder(tmp_path), "semfm[onnx]"), (tmp_path, "semfm[embed]")):
+    for model, hint in ((write_encoder(tmp_path), "pip install onnxruntime"), (tmp_path, "pip install torch transformers")):
         assert main([str(views), "-o", str(tmp_path / "e.mcap"), "--model", str(model)]) == 2
         error = capsys.readouterr().err
         assert f"pip install '{hint}'" in error and error.count("\n") == 1

@@ -1,3 +1,4 @@
-//! Tests of the built binary, and what they share.
+//! Tests of the built binary and of the readers: what they share.
 
+pub mod sample;
 pub mod shell;

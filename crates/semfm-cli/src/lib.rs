@@ -1,11 +1,13 @@
 //! SemFM at the shell: arguments in, facade calls, files out.
 //!
 //! stdout is data, stderr is messages. Exit codes: 0 success, 1 a sound run without an answer (verdict
-//! `refuse`), 2 bad input or failure.
+//! `refuse`), 2 bad input or failure, a bug of ours included; 130 after Ctrl-C.
 
 mod commands;
 mod console;
 mod options;
+mod output;
+mod process;
 
 use std::ffi::OsString;
 
@@ -16,6 +18,7 @@ use commands::{
     views,
 };
 use options::Common;
+pub use process::own_process;
 
 /// Transfer a demonstrated region from one object to another.
 ///
@@ -47,13 +50,38 @@ enum Command {
 }
 
 /// Runs one command line, the program's name first, and returns the exit code: 0 success, 1 a sound
-/// run without an answer, 2 bad input or failure. The binary and the Python package call it.
+/// run without an answer, 2 bad input or failure, 130 after Ctrl-C. The binary and the Python package
+/// call it.
 pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> u8 {
-    let arguments = match Arguments::try_parse_from(arguments) {
-        Ok(arguments) => arguments,
+    console::begin();
+    let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let code = match process::caught(|| run_words(words)) {
+        Ok(code) => code,
+        Err(bug) => {
+            console::message(format_args!("error: {bug}"));
+            2
+        }
+    };
+    match console::end() {
+        Ok(()) => code,
         Err(error) => {
-            let _ = error.print();
-            return u8::try_from(error.exit_code()).unwrap_or(2);
+            console::message(format_args!("error: stdout: {error}"));
+            2
+        }
+    }
+}
+
+fn run_words(words: Vec<OsString>) -> u8 {
+    let arguments = match Arguments::try_parse_from(&words) {
+        Ok(arguments) => arguments,
+        Err(error) if !error.use_stderr() => {
+            // Help and version are data. `render` leaves colours to the terminal.
+            console::help(&error.render());
+            return 0;
+        }
+        Err(error) => {
+            console::usage(&error, &words);
+            return 2;
         }
     };
     let common = arguments.common;
@@ -76,6 +104,7 @@ pub fn run<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) ->
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NoAnswer) => 1,
         Ok(Outcome::Refused) => 2,
+        Ok(Outcome::Interrupted) => process::INTERRUPTED,
         Err(error) => {
             console::error(&error);
             2

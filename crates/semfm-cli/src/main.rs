@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     quiet_drivers();
+    semfm_cli::own_process();
     ExitCode::from(semfm_cli::run(std::env::args_os()))
 }
 

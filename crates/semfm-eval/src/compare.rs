@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::{write_atomically, write_json_pretty};
+use semfm::geom::io::{printable, write_atomically, write_json_pretty};
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
@@ -115,7 +115,7 @@ impl Comparison {
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let [json, text] = FILES.map(|name| folder.join(name));
         write_json_pretty(&json, self)?;
-        write_atomically(&text, |out| out.write_all(self.render().as_bytes()))?;
+        write_atomically(&text, |out| out.write_all(printable(&self.render()).as_bytes()))?;
         Ok(vec![json, text])
     }
 

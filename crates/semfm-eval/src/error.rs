@@ -39,6 +39,17 @@ pub enum Error {
         /// What was given.
         found: String,
     },
+    /// Another process writes into the output folder.
+    #[error(
+        "{}: another evaluation writes here ({process}): wait for it, or choose another folder",
+        path.display()
+    )]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// Who, as far as the lock file says.
+        process: String,
+    },
     /// The output folder holds an unfinished run of something else.
     #[error(
         "{}: an unfinished run with another {what} (then {before}, now {now}): \
@@ -77,7 +88,7 @@ impl Error {
     /// Wraps what the system said about `path`.
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
-        move |source| Self::Io { path, source }
+        move |source| Self::Io { path: semfm::geom::io::shown_path(path), source }
     }
 
     /// Whether the caller asked the work to stop.
@@ -99,6 +110,7 @@ impl Error {
             Self::Io { .. } => "io",
             Self::Format(_) => "format",
             Self::Invalid { .. } => "invalid",
+            Self::Busy { .. } => "busy",
             Self::OtherRun { .. } => "other-run",
         }
     }

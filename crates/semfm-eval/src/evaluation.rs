@@ -322,7 +322,7 @@ impl Progress {
             }
             total += objects.len();
         }
-        Self { task: task.clone(), quiet: Task::default(), done: AtomicUsize::new(0), total }
+        Self { task: task.clone(), quiet: task.silent(), done: AtomicUsize::new(0), total }
     }
 
     fn quiet(&self) -> &Task {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{read_json, write_atomically};
 use semfm::{Region, Transfer, Verdict};
 use serde::{Deserialize, Serialize};
 
@@ -127,9 +127,12 @@ impl PairPredictions {
         Ok(())
     }
 
-    /// Reads a file; none where there is none of this format.
-    pub fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`Error::Facade`] where it cannot be read or is not of this format.
+    pub fn read(path: &Path) -> Result<Self> {
+        Ok(read_json(path)?)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_json_pretty;
+use semfm::geom::io::{read_json, write_json_pretty};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -124,11 +124,7 @@ pub(crate) fn read_results<T: DeserializeOwned>(
     format_of: fn(&T) -> &str,
 ) -> Result<T> {
     let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
-    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
-    let results: T = serde_json::from_slice(&bytes).map_err(|error| {
-        let place = format!("line {}, column {}", error.line(), error.column());
-        Error::format(&path, place, "results of an evaluation", error.to_string())
-    })?;
+    let results: T = read_json(&path)?;
     let found = format_of(&results);
     if found == format { Ok(results) } else { Err(Error::format(&path, "format", format, found)) }
 }

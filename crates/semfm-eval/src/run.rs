@@ -13,28 +13,27 @@ use crate::journal::{FORMAT, Journal, Line, RunIdentity, RunSettings};
 use crate::results::{About, Results};
 use crate::row::Row;
 use crate::settings::EvalSettings;
-use crate::{Error, Result};
+use crate::{OutputFolder, Result};
 
 /// Runs every method on every pair and gives the results, which the caller writes with
-/// [`Results::write`]. In `folder`, which is made, stands the journal until
-/// [`Finished::close`]: an interrupted run goes on where it stopped. Progress is counted in
+/// [`Results::write`]. In `folder` stands the journal until [`Finished::close`]: an interrupted run goes on where it stopped. Progress is counted in
 /// objects and pairs.
 ///
 /// # Errors
-/// [`Error::OtherRun`] where the folder holds an unfinished run of something else,
-/// [`Error::Invalid`] for impossible settings, [`Error::Io`] for files that cannot be written,
-/// cancellation. What goes wrong with one object or pair stands in its rows.
+/// [`Error::OtherRun`](crate::Error::OtherRun) where the folder holds an unfinished run of something else,
+/// [`Error::Invalid`](crate::Error::Invalid) for impossible settings, [`Error::Io`](crate::Error::Io)
+/// for files that cannot be written, cancellation. What goes wrong with one object or pair stands in
+/// its rows.
 pub fn run(
     dataset: &Dataset,
     embeddings: &EmbeddingSource,
     settings: &EvalSettings,
-    folder: &Path,
+    folder: OutputFolder,
     task: &Task,
 ) -> Result<Finished> {
     let methods = settings.methods()?;
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let identity = identity(dataset, embeddings, settings);
-    let (journal, lines) = Journal::open(folder, &identity, settings.fresh)?;
+    let (journal, lines) = Journal::open(folder.path(), &identity, settings.fresh)?;
     let (mut done, mut objects) = (BTreeMap::new(), Vec::new());
     for line in lines {
         match line {
@@ -52,19 +51,19 @@ pub fn run(
         settings,
         methods: &methods,
         journal: Some(&journal),
-        predictions: settings.keep_predictions.then_some(folder),
+        predictions: settings.keep_predictions.then_some(folder.path()),
         done,
         objects,
     };
     let results = results(evaluation, identity, task)?;
-    Ok(Finished { results, resumed, journal })
+    Ok(Finished { results, resumed, journal, folder })
 }
 
 /// The same in memory: no file is written, nothing can be gone on with.
 ///
 /// # Errors
-/// [`Error::Invalid`] for impossible settings, cancellation. What goes wrong with one object or pair
-/// stands in its rows.
+/// [`Error::Invalid`](crate::Error::Invalid) for impossible settings, cancellation. What goes wrong
+/// with one object or pair stands in its rows.
 pub fn evaluate(
     dataset: &Dataset,
     embeddings: &EmbeddingSource,
@@ -101,13 +100,20 @@ pub struct Finished {
     /// Pairs that an interrupted run had done before.
     pub resumed: usize,
     journal: Journal,
+    /// Held: nobody else writes there meanwhile.
+    folder: OutputFolder,
 }
 
 impl Finished {
+    /// The folder that the results belong into.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// Removes the journal: call it once the results are written.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`](crate::Error::Io).
     pub fn close(self) -> Result<Results> {
         self.journal.close()?;
         Ok(self.results)

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{printable, write_atomically};
 
 use crate::Result;
 use crate::dataset::DatasetOrigin;
@@ -27,7 +27,7 @@ pub fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// The whole page as Markdown.
+/// The whole page as Markdown, safe for a terminal: names and failures are other people's text.
 pub fn render(results: &Results) -> String {
     let table = ScoreTable::new(&results.rows);
     let page = Markdown {
@@ -47,7 +47,7 @@ pub fn render(results: &Results) -> String {
         page.failures(),
     ];
     let sections: Vec<String> = sections.into_iter().filter(|text| !text.is_empty()).collect();
-    sections.join("\n")
+    printable(&sections.join("\n")).into_owned()
 }
 
 struct Markdown<'a> {

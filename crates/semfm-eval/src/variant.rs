@@ -5,6 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use semfm::fmap::ViewFeatures;
+use semfm::geom::suggestion::unknown_name;
 use semfm::views::LiftSettings;
 use semfm::{Method, PipelineSettings, Rule, TransferSettings};
 use serde::{Deserialize, Serialize};
@@ -198,7 +199,8 @@ impl FromStr for Variant {
         let all = Self::all();
         all.iter().find(|variant| variant.name == text).copied().ok_or_else(|| {
             let names: Vec<&str> = all.iter().map(|variant| variant.name).collect();
-            Error::invalid("method", names.join(", "), text)
+            let given = unknown_name(text, names.iter().copied());
+            Error::invalid("method", names.join(", "), given)
         })
     }
 }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use semfm::Region;
+use semfm::geom::io::read_json;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -118,11 +119,7 @@ pub fn read(path: &Path, dataset: &Dataset) -> Result<Vec<Row>> {
 }
 
 fn read_file(path: &Path) -> Result<RowsFile> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    let file: RowsFile = serde_json::from_slice(&bytes).map_err(|error| {
-        let place = format!("line {}, column {}", error.line(), error.column());
-        Error::format(path, place, "rows of a vision-language model", error.to_string())
-    })?;
+    let file: RowsFile = read_json(path)?;
     if file.format == FORMAT {
         Ok(file)
     } else {

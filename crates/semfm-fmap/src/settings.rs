@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use semfm_geom::suggestion::unknown_name;
 use serde::{Deserialize, Serialize};
 
 use crate::clusters::ClusterSettings;
@@ -57,7 +58,10 @@ impl FromStr for Rule {
         match text {
             "preimage" => Ok(Self::Preimage),
             "image" => Ok(Self::Image),
-            _ => Error::out_of_range("rule", "preimage, image", text),
+            _ => {
+                let given = unknown_name(text, ["preimage", "image"]);
+                Error::out_of_range("rule", "preimage, image", given)
+            }
         }
     }
 }

@@ -145,10 +145,11 @@ impl Error {
         if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }
     }
 
-    /// [`Error::Io`] about `path`, for `map_err`.
+    /// [`Error::Io`] about `path`, for `map_err`; a file in a temporary folder is named by the place
+    /// that it will have.
     pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self {
         let path = path.to_owned();
-        move |source| Self::Io { path: path.clone(), source }
+        move |source| Self::Io { path: crate::io::shown_path(&path), source }
     }
 
     /// A stable name for the kind of failure, for scripts: kebab-case, one per variant.

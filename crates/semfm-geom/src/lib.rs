@@ -30,6 +30,7 @@ mod semantic_cloud;
 mod sequential_faer;
 mod shape;
 mod simplify;
+pub mod suggestion;
 mod surface;
 mod task;
 mod verdict;

@@ -41,6 +41,13 @@ impl Task {
         Self { cancelled: Arc::default(), listener: Some(Arc::new(listener)) }
     }
 
+    /// A task with the same cancel flag that reports nothing: for work inside other work that counts
+    /// its own steps.
+    #[must_use]
+    pub fn silent(&self) -> Self {
+        Self { cancelled: self.cancelled.clone(), listener: None }
+    }
+
     /// The same task with somebody else's cancel flag (a signal handler's, say).
     pub fn with_cancel_flag(mut self, flag: Arc<AtomicBool>) -> Self {
         self.cancelled = flag;

@@ -312,7 +312,10 @@ impl Embeddings {
             }
         };
         let shared = self.inner.clone();
-        run(py, None, move |_| Ok(shared.write(&path, dtype)?))
+        run(py, None, move |_| {
+            semfm::geom::io::refuse_input(&path)?;
+            Ok(shared.write(&path, dtype)?)
+        })
     }
 
     /// int: number of views.

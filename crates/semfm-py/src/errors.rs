@@ -5,6 +5,7 @@
 
 use pyo3::prelude::*;
 use semfm::geom;
+use semfm::geom::io::printable;
 
 /// The exception of an error of any crate, with its code and place.
 pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
@@ -24,7 +25,9 @@ pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
             _ => "InvalidInput",
         },
     };
-    exception(py, class, &error.to_string(), error.code(), error.place().as_deref())
+    // A traceback prints the message to a terminal, and parts of it may be a file's.
+    let message = error.to_string();
+    exception(py, class, &printable(&message), error.code(), error.place().as_deref())
 }
 
 /// An argument of the right type that holds what it may not: `semfm.InvalidInput`, a ValueError.

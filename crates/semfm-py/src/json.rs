@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use semfm::geom::io::write_atomically;
+use semfm::geom::io;
 use serde_json::Value;
 
 use crate::errors;
@@ -49,7 +49,10 @@ pub fn write_npz(py: Python<'_>, path: PathBuf, arrays: &Bound<'_, PyDict>) -> P
     let buffer = py.import("io")?.getattr("BytesIO")?.call0()?;
     py.import("numpy")?.call_method("savez", (&buffer,), Some(arrays))?;
     let bytes: Vec<u8> = buffer.call_method0("getvalue")?.extract()?;
-    run(py, None, move |_| Ok(write_atomically(&path, |out| out.write_all(&bytes))?))
+    run(py, None, move |_| {
+        io::refuse_input(&path)?;
+        Ok(io::write_atomically(&path, |out| out.write_all(&bytes))?)
+    })
 }
 
 /// The named arrays of an .npz file.
@@ -58,7 +61,15 @@ pub fn read_npz<'py, const N: usize>(
     path: &std::path::Path,
     names: [&str; N],
 ) -> PyResult<[Bound<'py, PyAny>; N]> {
-    let file = py.import("numpy")?.call_method1("load", (path,))?; // without pickles
+    let path_of = path.to_owned();
+    let bytes = run(py, None, move |_| Ok(io::read_file(&path_of)?))?;
+    let foreign = io::foreign_kind(&bytes).filter(|kind| !kind.contains("ZIP"));
+    if let Some(kind) = foreign {
+        let place = path.display().to_string();
+        return Err(errors::invalid(py, &place, "an .npz file", kind));
+    }
+    let buffer = py.import("io")?.getattr("BytesIO")?.call1((PyBytes::new(py, &bytes),))?;
+    let file = py.import("numpy")?.call_method1("load", (buffer,))?; // without pickles
     let found = names.map(|name| file.get_item(name));
     file.call_method0("close")?;
     let mut arrays = Vec::with_capacity(N);
@@ -80,6 +91,51 @@ pub fn read_npz<'py, const N: usize>(
 #[pyfunction]
 pub fn write_file(py: Python<'_>, path: PathBuf, content: &Bound<'_, PyBytes>) -> PyResult<()> {
     let content = content.as_bytes();
-    let written = py.detach(|| write_atomically(&path, |out| out.write_all(content)));
+    let written = py.detach(|| io::write_atomically(&path, |out| out.write_all(content)));
     written.map_err(|error| errors::raise(py, &error.into()))
+}
+
+/// Reads a regular file whole; a device, a pipe, a folder or a stand-in of Git LFS is refused.
+///
+/// Parameters
+/// ----------
+/// path : path
+///
+/// Returns
+/// -------
+/// bytes
+#[pyfunction]
+pub fn read_file(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyBytes>> {
+    let bytes = py.detach(|| io::read_file(&path));
+    let bytes = bytes.map_err(|error| errors::raise(py, &error.into()))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// Refuses an output that would replace one of the inputs, or that cannot be written as a file.
+///
+/// Parameters
+/// ----------
+/// output : path
+/// inputs : list of path
+#[pyfunction]
+pub fn check_output(py: Python<'_>, output: PathBuf, inputs: Vec<PathBuf>) -> PyResult<()> {
+    let inputs: Vec<&std::path::Path> = inputs.iter().map(PathBuf::as_path).collect();
+    let outputs = [output];
+    let checked =
+        io::refuse_to_overwrite(&outputs, &inputs).and_then(|()| io::check_output(&outputs[0]));
+    checked.map_err(|error| errors::raise(py, &error.into()))
+}
+
+/// The text without what a terminal would obey (escape sequences of others).
+///
+/// Parameters
+/// ----------
+/// text : str
+///
+/// Returns
+/// -------
+/// str
+#[pyfunction]
+pub fn printable(text: &str) -> std::borrow::Cow<'_, str> {
+    io::printable(text)
 }

@@ -125,7 +125,7 @@ impl Laplacian {
 
 fn sparse(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     py.import("scipy.sparse").map(Bound::into_any).map_err(|error| {
-        let message = "sparse matrices need SciPy: pip install 'semfm[scipy]'";
+        let message = "sparse matrices need SciPy: pip install scipy";
         let missing = errors::missing_package(py, "scipy", message);
         missing.set_cause(py, Some(error));
         missing

@@ -74,7 +74,7 @@ mod _semfm {
     #[pymodule_export]
     use crate::interruptible::{_work_for_tests, get_num_threads, set_num_threads};
     #[pymodule_export]
-    use crate::json::write_file;
+    use crate::json::{check_output, printable, read_file, write_file};
     #[pymodule_export]
     use crate::laplacian::{
         Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,

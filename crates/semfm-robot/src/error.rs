@@ -44,12 +44,14 @@ pub enum Error {
         found: String,
     },
     /// A name that is neither a built-in gripper nor a URDF file.
-    #[error("gripper `{name}`: expected {known} or a .urdf file")]
+    #[error("gripper `{name}`: expected {known} or a .urdf file{meant}")]
     UnknownGripper {
         /// The name.
         name: String,
         /// The built-in ones.
         known: String,
+        /// A question after the one that was probably meant; empty where none is close.
+        meant: String,
     },
     /// A file cannot be read.
     #[error("{}: {source}", path.display())]

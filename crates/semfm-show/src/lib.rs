@@ -23,4 +23,4 @@ pub use page::{
     Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors, groups_of_paths, write_page,
 };
 pub use pictures::{TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_sheet};
-pub use transfer_files::{TransferFiles, write_transfer};
+pub use transfer_files::{TRANSFER_FILES, TransferFiles, write_transfer};

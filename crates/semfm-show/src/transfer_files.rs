@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use semfm::Task;
 use semfm::files::{self, TransferResult};
+use semfm::geom::io::StagedFolder;
 
 use crate::{Result, TransferFigure};
 
@@ -19,14 +20,13 @@ pub enum TransferFiles {
     Region,
 }
 
-/// What a transfer leaves behind beside `region.json` and `report.json`, files for programs first.
-const DATA: [&str; 4] = ["point_map.json", "source.ply", "target.ply", "target.glb"];
-const PICTURES: [&str; 3] = ["transfer.png", "features.png", "transfer.mcap"];
+/// Every file that the folder of a transfer can have.
+pub const TRANSFER_FILES: &[&str] = files::TRANSFER_FILES;
 
 /// Writes a transfer into `folder`, which is made if it is not there: the files of
-/// [`files::write_transfer`], then `transfer.png`, `features.png` and (feature `mcap`)
-/// `transfer.mcap`; or as many of them as `which` says, and then none of an earlier transfer stays
-/// beside them. Each file is written whole or not at all. Returns the paths.
+/// [`files::write_transfer`], `transfer.png`, `features.png` and (feature `mcap`) `transfer.mcap`; or
+/// as many of them as `which` says, and then none of an earlier transfer stays beside them. The folder
+/// has all of them or, where something fails, what it had before. Returns the paths.
 ///
 /// # Errors
 /// [`Error::Semfm`](crate::Error::Semfm) for the first file that cannot be written or drawn.
@@ -36,42 +36,24 @@ pub fn write_transfer(
     which: TransferFiles,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
-    match which {
-        TransferFiles::All => {}
-        TransferFiles::WithoutPictures => {
-            remove(folder, &PICTURES)?;
-            return Ok(files::write_transfer(folder, result, task)?);
-        }
-        TransferFiles::Region => {
-            remove(folder, &PICTURES)?;
-            remove(folder, &DATA)?;
-            return Ok(files::write_answer(folder, result)?);
-        }
+    let staged = StagedFolder::new(folder)?;
+    if which == TransferFiles::Region {
+        files::write_answer(staged.path(), result)?;
+        return Ok(files::put_transfer(staged)?);
     }
-    let mut files = files::write_transfer(folder, result, task)?;
+    files::write_transfer(staged.path(), result, task)?;
+    if which == TransferFiles::WithoutPictures {
+        return Ok(files::put_transfer(staged)?);
+    }
     let figure = TransferFigure::new(result, task)?;
-    let [transfer, features] = ["transfer.png", "features.png"].map(|name| folder.join(name));
+    let [transfer, features] =
+        ["transfer.png", "features.png"].map(|name| staged.path().join(name));
     figure.write_transfer_picture(&transfer, task)?;
     figure.write_features_picture(&features, task)?;
-    files.extend([transfer, features]);
     #[cfg(feature = "mcap")]
     {
-        let scene = folder.join("transfer.mcap");
+        let scene = staged.path().join("transfer.mcap");
         crate::foxglove::write_transfer_scene(&scene, &figure, &result.report().to_json(), task)?;
-        files.push(scene);
     }
-    Ok(files)
-}
-
-/// Removes files of an earlier transfer, where they are there.
-fn remove(folder: &Path, names: &[&str]) -> Result<()> {
-    for path in names.iter().map(|name| folder.join(name)) {
-        match std::fs::remove_file(&path) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(semfm::Error::from(semfm::geom::Error::Io { path, source }).into());
-            }
-            _ => {}
-        }
-    }
-    Ok(())
+    Ok(files::put_transfer(staged)?)
 }

@@ -11,6 +11,7 @@ use std::str::FromStr;
 
 use rayon::prelude::*;
 use semfm_geom::math::DVec3;
+use semfm_geom::suggestion::unknown_name;
 use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid, View};
 
 use crate::object::SynthObject;
@@ -63,7 +64,7 @@ impl FromStr for Level {
         Self::ALL.into_iter().find(|level| level.name() == text).ok_or_else(|| Error::Unknown {
             what: "level",
             expected: Self::ALL.map(Self::name).join(", "),
-            found: text.into(),
+            found: unknown_name(text, Self::ALL.map(Self::name)),
         })
     }
 }

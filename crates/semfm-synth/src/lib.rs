@@ -18,6 +18,8 @@ mod shapes;
 use std::fmt;
 use std::str::FromStr;
 
+use semfm_geom::suggestion::unknown_name;
+
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};
 pub use files::{ObjectFiles, render_views, write_labelled_mesh, write_object};
@@ -78,7 +80,7 @@ impl FromStr for Category {
             Error::Unknown {
                 what: "category",
                 expected: Self::ALL.map(Self::name).join(", "),
-                found: text.into(),
+                found: unknown_name(text, Self::ALL.map(Self::name)),
             }
         })
     }

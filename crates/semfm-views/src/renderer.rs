@@ -5,6 +5,7 @@ use std::str::FromStr;
 #[cfg(feature = "gpu")]
 use std::sync::{Mutex, PoisonError};
 
+use semfm_geom::suggestion::unknown_name;
 use semfm_geom::{Mesh, Pinhole, Task};
 
 #[cfg(feature = "gpu")]
@@ -42,9 +43,10 @@ impl FromStr for RendererChoice {
 
     fn from_str(text: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|(_, name)| *name == text);
-        found
-            .map(|entry| entry.0)
-            .ok_or_else(|| Error::invalid("renderer", "auto, gpu or cpu", format!("`{text}`")))
+        found.map(|entry| entry.0).ok_or_else(|| {
+            let given = unknown_name(text, Self::ALL.map(|(_, name)| name));
+            Error::invalid("renderer", "auto, gpu or cpu", given)
+        })
     }
 }
 

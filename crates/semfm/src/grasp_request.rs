@@ -11,7 +11,7 @@ use semfm_geom::{Mesh, Task};
 use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, find_grasps};
 use semfm_robot::Gripper;
 
-use crate::{GraspResult, Result};
+use crate::{GraspResult, ObjectSize, Result};
 
 /// Metres that a gripper keeps from the points of a cloud, unless said otherwise: the noise of a
 /// depth camera at arm's length.
@@ -69,8 +69,13 @@ impl GraspRequest {
     /// Everything turned into the frame of `mesh` and made ready for the search.
     ///
     /// # Errors
-    /// [`semfm_grasp::Error::OutOfRange`] for a scale, a table or points that make no sense.
+    /// [`semfm_grasp::Error::OutOfRange`] for a scale, a table or points that make no sense;
+    /// [`Error::Invalid`](crate::Error::Invalid) for an object that no gripper could hold at this
+    /// scale, with a question about its unit.
     pub fn prepare(self, mesh: Arc<Mesh>, gripper: Gripper) -> Result<GraspProblem> {
+        if self.object_scale > 0.0 && self.object_scale.is_finite() {
+            ObjectSize::of(&mesh, self.object_scale).check()?; // what is no scale is refused below
+        }
         let object_from_answer = self.camera_from_object.map_or(Pose::IDENTITY, |p| p.inverse());
         Ok(GraspProblem {
             object: GraspObject::from_mesh(&mesh, self.object_scale)?,
@@ -159,6 +164,11 @@ impl GraspProblem {
     pub fn mesh_in_metres(&self) -> Result<Mesh> {
         let vertices = self.mesh.vertices().iter().map(|&p| p * self.object_scale).collect();
         Ok(Mesh::new(vertices, self.mesh.faces().to_vec())?)
+    }
+
+    /// How large the object is.
+    pub fn size(&self) -> ObjectSize {
+        ObjectSize::of(&self.mesh, self.object_scale)
     }
 
     /// The gripper.

@@ -59,6 +59,7 @@ mod grasp_request;
 mod grasp_result;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
+mod object_size;
 mod pipeline;
 pub mod weight_colors;
 
@@ -70,6 +71,7 @@ pub use geom::{Mesh, Task};
 pub use grasp::find_grasps;
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
+pub use object_size::ObjectSize;
 pub use pipeline::{
     EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
     prepare, semantic_cloud,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Optional
 
-from .._semfm import TransferSettings
-from ..errors import FileError, FormatError, SemfmError
+from .._command import finish
+from .._files import read_json
+from .._semfm import TransferSettings, printable
+from ..errors import FormatError
 from . import shards
 from .library import Summary, transfer
 
@@ -28,23 +29,22 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     int
         0 every object has an answer, 1 some failed in this run, 2 bad input or failure, 130 Ctrl-C.
     """
+    return finish(
+        "error", lambda: _run(arguments), "stopped; the same command goes on from here"
+    )
+
+
+def _run(arguments: Optional[Sequence[str]]) -> int:
     options = vars(_parser().parse_args(arguments))
     as_json = options.pop("json")
     quiet = options.pop("quiet")
-    try:
-        chosen = options.pop("settings")
-        summary = transfer(
-            **options,
-            settings=None if chosen is None else _settings(chosen),
-            progress=None if quiet else True,
-        )
-    except KeyboardInterrupt:
-        print("stopped; the same command goes on from here", file=sys.stderr)
-        return 130
-    except (SemfmError, ImportError, TypeError, ValueError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    print(json.dumps(asdict(summary)) if as_json else _words(summary))
+    chosen = options.pop("settings")
+    summary = transfer(
+        **options,
+        settings=None if chosen is None else _settings(chosen),
+        progress=None if quiet else True,
+    )
+    print(printable(json.dumps(asdict(summary)) if as_json else _words(summary)))
     return 1 if summary.n_failed else 0
 
 
@@ -61,13 +61,7 @@ def _words(summary: Summary) -> str:
 
 
 def _settings(path: str) -> TransferSettings:
-    try:
-        with open(path, encoding="utf-8") as file:
-            found: Any = json.load(file)
-    except OSError as error:
-        raise FileError(f"{path}: {error.strerror}", code="io", place=path) from error
-    except ValueError as error:
-        raise FormatError(f"{path}: not JSON: {error}", place=path) from error
+    found: Any = read_json(path)
     if not isinstance(found, dict):
         raise FormatError(f"{path}: expected an object of settings", place=path)
     return TransferSettings(**found)

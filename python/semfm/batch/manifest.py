@@ -21,8 +21,11 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO, StringIO
 from typing import Any, Optional, Union
 
+from .._files import read_text
+from .._semfm import read_file
 from ..errors import FileError, FormatError, InvalidInput, InvalidType
 
 #: The columns that name files.
@@ -90,10 +93,8 @@ def read_manifest(path: _Path) -> list[Row]:
                 f"manifest {path}: expected .csv, .jsonl or .parquet, found {kind or 'no'} extension",
                 place="manifest",
             )
-    except OSError as error:
-        raise FileError(f"manifest {path}: {error}", code="io", place=path) from error
-    except UnicodeDecodeError as error:
-        raise FormatError(f"manifest {path}: not UTF-8: {error}", place=path) from error
+    except FileError as error:
+        raise FileError(f"manifest {error}", code="io", place=path) from error
     return checked(entries, os.path.dirname(os.path.abspath(path)), path)
 
 
@@ -184,34 +185,32 @@ def _wrong(manifest: str, place: str, expected: str, found: str) -> FormatError:
 
 
 def _csv(path: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        reader = csv.DictReader(file)
-        try:
-            for entry in reader:
-                yield f"line {reader.line_num}", entry
-        except csv.Error as error:
-            raise _wrong(path, f"line {reader.line_num}", "CSV", str(error)) from error
+    reader = csv.DictReader(StringIO(read_text(path), newline=""))
+    try:
+        for entry in reader:
+            yield f"line {reader.line_num}", entry
+    except csv.Error as error:
+        raise _wrong(path, f"line {reader.line_num}", "CSV", str(error)) from error
 
 
 def _jsonl(path: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    with open(path, encoding="utf-8-sig") as file:
-        for number, line in enumerate(file, 1):
-            if not line.strip():
-                continue
-            try:
-                entry = json.loads(line)
-            except ValueError as error:
-                raise _wrong(path, f"line {number}", "JSON", str(error)) from error
-            if not isinstance(entry, dict):
-                raise _wrong(path, f"line {number}", "an object", type(entry).__name__)
-            yield f"line {number}", entry
+    for number, line in enumerate(read_text(path).split("\n"), 1):
+        if not line.strip():
+            continue
+        try:
+            entry = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise _wrong(path, f"line {number}", "JSON", str(error)) from error
+        if not isinstance(entry, dict):
+            raise _wrong(path, f"line {number}", "an object", type(entry).__name__)
+        yield f"line {number}", entry
 
 
 def _parquet(path: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     from .shards import arrow
 
     try:
-        with arrow().parquet.ParquetFile(path) as file:
+        with arrow().parquet.ParquetFile(BytesIO(read_file(path))) as file:
             columns = [c for c in ("name", *FILES) if c in file.schema_arrow.names]
             number = 0
             for batch in file.iter_batches(columns=columns):

@@ -128,7 +128,7 @@ def _ray() -> Any:
         import ray
         import ray.data
     except ImportError as error:
-        message = "runner='ray' needs Ray Data: pip install 'semfm[ray]'"
+        message = "runner='ray' needs Ray Data: pip install 'ray[data]' pyarrow"
         raise MissingPackage(message, "missing-package", "ray") from error
     return ray
 

@@ -29,7 +29,7 @@ def arrow() -> Any:
         import pyarrow
         import pyarrow.parquet
     except ImportError as error:
-        message = "Parquet needs pyarrow: pip install 'semfm[batch]'"
+        message = "Parquet needs pyarrow: pip install pyarrow"
         raise MissingPackage(message, "missing-package", "pyarrow") from error
     return pyarrow
 

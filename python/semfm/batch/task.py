@@ -10,6 +10,7 @@ from typing import Any, Callable, Optional, Union
 
 import numpy as np
 
+from .._files import load_arrays
 from .._semfm import (
     Matching,
     Mesh,
@@ -20,7 +21,7 @@ from .._semfm import (
     __version__,
     prepare,
 )
-from ..errors import Cancelled, FileError, FormatError
+from ..errors import Cancelled, FormatError
 from .manifest import Row
 from .record import Record, answer, failure
 
@@ -167,9 +168,4 @@ def _cloud(path: str) -> SemanticCloud:
 
 
 def _load(path: str) -> Any:
-    try:
-        return np.load(path, allow_pickle=False)
-    except OSError as error:
-        raise FileError(f"{path}: {error.strerror or error}", code="io", place=path) from error
-    except (ValueError, EOFError) as error:
-        raise FormatError(f"{path}: not a NumPy file: {error}", place=path) from error
+    return load_arrays(path)

@@ -1,4 +1,4 @@
-"""Pictures of meshes, regions, maps and transfers with matplotlib: ``pip install 'semfm[viz]'``.
+"""Pictures of meshes, regions, maps and transfers with matplotlib: ``pip install matplotlib``.
 
 Surfaces are drawn by `semfm.render`, which hides what is hidden and shades what is curved, and
 shown in axes of matplotlib, so that titles, legends, colour bars and ``savefig`` work as ever::
@@ -18,7 +18,7 @@ try:
     import matplotlib as _matplotlib  # noqa: F401
 except ImportError as error:
     raise MissingPackage(
-        "semfm.plot needs matplotlib, which is not installed: pip install 'semfm[viz]'",
+        "semfm.plot needs matplotlib, which is not installed: pip install matplotlib",
         "missing-package",
         "matplotlib",
     ) from error

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from .._files import read_json
 from .errors import SidecarError, expected
 
-_INSTALL = "needs torch and transformers: pip install 'semfm[embed]'"
+_INSTALL = "needs torch and transformers: pip install torch transformers"
 _CONFIGS = ["config.json", "preprocessor_config.json", "processor_config.json"]
 _WEIGHTS = ["*.safetensors", "*.safetensors.index.json"]
 #: Patterns of the files that decide the embeddings.
@@ -165,12 +166,7 @@ def present_snapshot(model: str) -> Path:
 
 def _model_type(model: str, folder: Path) -> str:
     path = folder / "config.json"
-    try:
-        config = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise SidecarError(f"{model}: config.json: {error.strerror or error}") from error
-    except ValueError as error:
-        raise expected(model, "config.json", "JSON", error) from error
+    config = read_json(path)
     if not isinstance(config, dict) or not isinstance(config.get("model_type"), str):
         raise expected(model, "config.json", "a model_type", "none")
     return config["model_type"]

@@ -10,7 +10,8 @@ import time
 from collections.abc import Sequence
 
 from .. import __version__
-from ..errors import SemfmError
+from .._command import finish
+from .._semfm import check_output, printable
 from .embed import DTYPES, EmbedSettings, embed_file
 from .errors import SidecarError, expected
 from .inputs import encoder_inputs
@@ -91,33 +92,31 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
+    return finish("semfm-embed", lambda: _main(argv), "interrupted; only whole files are written")
+
+
+def _main(argv: Sequence[str] | None) -> int:
     arguments = parser()
     args = arguments.parse_args(argv)
-    if not args.list_inputs:
-        if not args.views:
-            arguments.error("the following arguments are required: V.views.mcap")
-        if args.output is None and args.output_folder is None:
-            arguments.error("one of the arguments -o/--output --output-folder is required")
-    try:
-        if args.list_inputs:
-            print(json.dumps(encoder_inputs(args.model)))
-        else:
-            _run(args)
-    except SemfmError as error:
-        print(f"semfm-embed: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("semfm-embed: interrupted; only whole files are written", file=sys.stderr)
-        return 130
-    return 0
+    if args.list_inputs:
+        print(json.dumps(encoder_inputs(args.model)))
+        return 0
+    if not args.views:
+        arguments.error("the following arguments are required: V.views.mcap")
+    if args.output is None and args.output_folder is None:
+        arguments.error("one of the arguments -o/--output --output-folder is required")
+    return _run(args)
 
 
-def _run(args: argparse.Namespace) -> None:
+def _run(args: argparse.Namespace) -> int:
     settings = EmbedSettings(args.rolls, args.batch, args.dtype)
     outputs = _outputs(args)
-    for path in (*args.views, *{os.path.dirname(os.path.abspath(path)) for path in outputs}):
-        if not os.path.exists(path):  # before minutes go into loading a model
+    inputs = [*args.views, args.model]
+    for path in args.views:  # before minutes go into loading a model
+        if not os.path.exists(path):
             raise SidecarError(f"{path}: No such file or directory")
+    for path in outputs:
+        check_output(path, inputs)
     encoder = open_encoder(args.model, args.device, args.threads)
     for views, output in zip(args.views, outputs):
         start = time.perf_counter()
@@ -129,7 +128,8 @@ def _run(args: argparse.Namespace) -> None:
         if not args.quiet and args.progress != "json":
             took = time.perf_counter() - start
             print(f"semfm-embed: {encoder.name}, {took:.1f} s", file=sys.stderr)
-        print(output, flush=True)
+        print(printable(output), flush=True)
+    return 0
 
 
 def _outputs(args: argparse.Namespace) -> list[str]:

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -31,11 +30,17 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from .._files import read_json
+from .._semfm import read_file
 from .encoder import Grid
 from .errors import SidecarError, expected
 from .onnx_files import external_files
 
 FORMAT = "semfm.encoder/1"
+#: No number of a description is larger: pictures have some hundred pixels.
+LARGEST = 4096
+#: A smaller standard deviation is a mistake.
+SMALLEST = 1e-6
 _LAYOUTS = ("NCHW", "NHWC")
 
 
@@ -56,15 +61,9 @@ class OnnxDescription:
 
 
 def read_description(path: str | os.PathLike[str]) -> OnnxDescription:
-    """Read and check a ``semfm.encoder/1`` file; raises SidecarError naming the field at fault."""
+    """Read and check a ``semfm.encoder/1`` file; the SemfmError names the field at fault."""
     path = os.fspath(path)
-    try:
-        with open(path, encoding="utf-8") as file:
-            found = json.load(file)
-    except OSError as error:
-        raise SidecarError(f"{path}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise expected(path, "encoder", "JSON", error) from error
+    found = read_json(path)
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         what = found.get("format") if isinstance(found, dict) else type(found).__name__
         raise expected(path, "format", f"'{FORMAT}'", repr(what))
@@ -83,26 +82,27 @@ def read_description(path: str | os.PathLike[str]) -> OnnxDescription:
         return check(key, isinstance(found[key], str) and found[key] != "", "a non-empty string")
 
     def whole(key: str) -> int:
-        ok = isinstance(found[key], int) and not isinstance(found[key], bool) and found[key] > 0
-        return check(key, ok, "a positive whole number")
+        ok = type(found[key]) is int and 0 < found[key] <= LARGEST
+        return check(key, ok, f"a whole number from 1 to {LARGEST}")
 
     def rgb(key: str) -> tuple[float, float, float]:
         value = found[key]
         ok = isinstance(value, list) and len(value) == 3
-        ok = ok and all(type(v) in (int, float) and math.isfinite(v) for v in value)
-        return tuple(check(key, ok, "three finite numbers"))  # type: ignore[return-value]
+        ok = ok and all(type(v) in (int, float) and abs(v) <= LARGEST for v in value)
+        return tuple(check(key, ok, f"three numbers of at most {LARGEST}"))  # type: ignore[return-value]
 
     std = rgb("std")
-    check("std", min(std) > 0, "three positive numbers")
+    check("std", min(std) >= SMALLEST, f"three numbers of at least {SMALLEST:g}")
     names = found["outputs"]
     ok = isinstance(names, list) and len(names) > 0 and all(isinstance(n, str) for n in names)
+    check("input", isinstance(found["input"], str), "the name of the input")
     check("outputs", ok and len(set(names)) == len(names), "a list of different names")
     check("layout", found["layout"] in _LAYOUTS, " or ".join(_LAYOUTS))
     check("output_layout", found["output_layout"] in _LAYOUTS, " or ".join(_LAYOUTS))
     check("size_multiple", whole("size_multiple") % whole("patch") == 0, "a multiple of the patch")
     return OnnxDescription(
         path=path,
-        onnx=os.path.join(os.path.dirname(path), text("onnx")),
+        onnx=_beside(path, text("onnx")),
         input=text("input"),
         layout=found["layout"],
         size_multiple=found["size_multiple"],
@@ -124,6 +124,18 @@ def open_onnx(path: str, device: str = "cpu", threads: int = 1) -> OnnxEncoder:
     """
     description = read_description(path)
     return OnnxEncoder(description, description.onnx, device, threads)
+def _beside(path: str, name: str) -> str:
+    """The network's path: a file of the JSON's folder, wherever links lead."""
+    folder = os.path.dirname(path) or "."
+    network = os.path.join(folder, name)
+    try:
+        real_folder, real = os.path.realpath(folder), os.path.realpath(network)
+        inside = os.path.commonpath([real_folder, real]) == real_folder
+    except ValueError:  # a zero byte, or another drive
+        inside = False
+    if not inside or os.path.isabs(name):
+        raise expected(path, "onnx", "a file inside the folder of the JSON", repr(name))
+    return network
 
 
 class OnnxEncoder:
@@ -149,7 +161,7 @@ class OnnxEncoder:
         network: str | bytes,
         device: str = "cpu",
         threads: int = 1,
-        install: str = "pip install 'semfm[onnx]'",
+        install: str = "pip install onnxruntime",
     ) -> None:
         self.description = description
         content = network if isinstance(network, bytes) else read_network(network)
@@ -228,23 +240,14 @@ def _resize(pictures: np.ndarray, height: int, width: int) -> np.ndarray:
 
 def read_network(path: str) -> bytes:
     """The bytes of an ONNX file."""
-    try:
-        with open(path, "rb") as file:
-            return file.read()
-    except OSError as error:
-        raise SidecarError(f"{path}: {error.strerror or error}") from error
+    return read_file(path)
 
 
 def _revision(path: str, network: bytes) -> str:
     """SHA-256 over the network and the files beside it that hold its weights."""
     digest = hashlib.sha256(network)
     for weights in external_files(path, network):
-        try:
-            with open(weights, "rb") as file:
-                while block := file.read(1 << 20):
-                    digest.update(block)
-        except OSError as error:
-            raise SidecarError(f"{weights}: {error.strerror or error}") from error
+        digest.update(read_file(weights))
     return f"sha256:{digest.hexdigest()}"
 
 

@@ -46,13 +46,18 @@ def external_files(network: str | os.PathLike[str], content: bytes) -> list[str]
     Raises
     ------
     SidecarError
-        If the file is no ONNX network.
+        If the file is no ONNX network, or names weights outside of its folder.
     """
     try:
         found = set(_locations(memoryview(content), "Model", 0))
     except (IndexError, ValueError) as error:  # UnicodeDecodeError is a ValueError
         raise expected(os.fspath(network), "model", "an ONNX network", error) from error
     folder = os.path.dirname(network)
+    for location in sorted(found):
+        parts = location.replace("\\", "/").split("/")
+        if os.path.isabs(location) or ".." in parts or "\0" in location:
+            wanted = "weights inside the folder of the network"
+            raise expected(os.fspath(network), "external data", wanted, repr(location))
     return [os.path.join(folder, location) for location in sorted(found)]
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import threading
 from collections.abc import Sequence
 from typing import Any
 
 from .. import __version__
-from .._semfm import write_file
-from ..errors import SemfmError
+from .._command import complain, finish
+from .._semfm import check_output, printable, write_file
 from ..sidecar.errors import expected
 from ..sidecar.progress import MODES as PROGRESS_MODES
 from ..sidecar.progress import open_progress
@@ -163,17 +162,19 @@ def _add_endpoint(p: argparse.ArgumentParser) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code."""
+    return finish("semfm-vlm", lambda: _run(argv), "interrupted")
+
+
+def _run(argv: Sequence[str] | None) -> int:
     args = parser().parse_args(argv)
+    inputs = [args.source, args.target, args.region, args.truth, args.pairs]
+    check_output(args.output, [path for path in inputs if path])
     stop = threading.Event()
     try:
         return _run_pairs(args, stop) if args.pairs else _run_one(args, stop)
-    except SemfmError as error:
-        print(f"semfm-vlm: {error}", file=sys.stderr)
-        return 2
     except KeyboardInterrupt:
         stop.set()
-        print("semfm-vlm: interrupted", file=sys.stderr)
-        return 130
+        raise
 
 
 def _settings(args: argparse.Namespace) -> BaselineSettings:
@@ -233,7 +234,7 @@ def _run_one(args: argparse.Namespace, stop: threading.Event) -> int:
     if args.json:
         print(json.dumps(row))
     if failure := outcome.failure:
-        print(f"semfm-vlm: {failure.kind}: {failure.reason}: {failure.text}", file=sys.stderr)
+        complain("semfm-vlm", f"{failure.kind}: {failure.reason}: {failure.text}")
         return 2 if failure.of_endpoint else 1
     extra = {key: row[key] for key in ("model", "real_model", "mode", "n_views", "inconsistency")}
     head = {"format": REGION_FORMAT, "mesh": row["mesh"], **row["region"], "method": "vlm"}
@@ -242,7 +243,7 @@ def _run_one(args: argparse.Namespace, stop: threading.Event) -> int:
     took = sum(outcome.stages_ms.values()) / 1000
     _say(args, f"{took:.1f} s, {tokens['prompt']} + {tokens['completion']} tokens")
     if not args.json:
-        print(args.output)
+        print(printable(args.output))
     return 0
 
 
@@ -293,18 +294,15 @@ def _report(args: argparse.Namespace, file: RowsFile) -> int:
         "failures": dict(sorted(kinds.items())),
         "tokens": total_tokens(rows),
     }
-    print(json.dumps(totals) if args.json else args.output)
+    print(printable(json.dumps(totals) if args.json else args.output))
     counts = ", ".join(f"{n} {kind}" for kind, n in totals["failures"].items()) or "none"  # type: ignore[attr-defined]
     _say(args, f"{totals['regions']} regions, failures: {counts}, tokens: {totals['tokens']}")
     if unanswered := sum(failure["of_endpoint"] for failure in failures):
-        print(
-            f"semfm-vlm: {unanswered} rows without a reply; run again to ask for them",
-            file=sys.stderr,
-        )
+        complain("semfm-vlm", f"{unanswered} rows without a reply; run again to ask for them")
         return 2
     return 0 if totals["regions"] else 1
 
 
 def _say(args: argparse.Namespace, text: str) -> None:
     if not args.quiet and args.progress != "json":
-        print(f"semfm-vlm: {text}", file=sys.stderr)
+        complain("semfm-vlm", text)

@@ -26,7 +26,7 @@ SIMULATED = "simulated/"
 #: How an answer's form is asked for: a JSON schema, any JSON object, or by the prompt alone.
 RESPONSE_FORMATS = ("schema", "object", "text")
 _OPENAI_URL = "https://api.openai.com/v1"
-_INSTALL = "needs the openai client: pip install 'semfm[vlm]'"
+_INSTALL = "needs the openai client: pip install openai"
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .._files import read_json
 from ..sidecar.errors import expected
-from .region import read_json
 
 
 @dataclass(frozen=True)

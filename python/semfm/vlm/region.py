@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
-from typing import Any
 
 import numpy as np
 
 from .. import Region
-from ..sidecar.errors import SidecarError, expected
 from .object_views import ObjectViews
 
 REGION_FORMAT = "semfm.region/1"
 #: A vertex belongs to a region where its weight is this or more.
 COUNTS = 0.5
-
-
-def read_json(path: str | os.PathLike[str]) -> Any:
-    """The value in a JSON file; raises SidecarError with file and place."""
-    name = os.fspath(path)
-    try:
-        with open(name, encoding="utf-8") as file:
-            return json.load(file)
-    except OSError as error:
-        raise SidecarError(f"{name}: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise expected(name, "content", "JSON", error) from error
 
 
 def read_region(path: str | os.PathLike[str], of: ObjectViews) -> np.ndarray:

@@ -30,9 +30,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from .._files import read_json
 from .._semfm import write_file
 from ..sidecar.errors import SidecarError, expected
-from .region import read_json
 
 ROWS_FORMAT = "semfm.vlm/1"
 
@@ -84,8 +84,6 @@ class RowsFile:
 
     def _read(self) -> dict[RowName, dict[str, Any]]:
         if not self.path.exists():
-            if not self.path.absolute().parent.is_dir():
-                raise SidecarError(f"{self.path}: No such file or directory")
             return {}
         value = read_json(self.path)
         if not isinstance(value, dict) or value.get("format") != ROWS_FORMAT:

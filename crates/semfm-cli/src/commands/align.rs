@@ -1,6 +1,6 @@
 //! `semfm-cli align`: the pose and the metres of a reconstruction in what a camera sees.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -13,8 +13,10 @@ use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
 
 use super::Outcome;
+use super::size::size_in_metres;
 use crate::console;
 use crate::options::{Common, numbers};
+use crate::output::OutputFile;
 
 /// Find a mesh of unknown scale in a depth image or a point cloud
 #[derive(Debug, Args)]
@@ -27,7 +29,7 @@ use crate::options::{Common, numbers};
 pub struct AlignCommand {
     /// The mesh, in any frame and any unit
     mesh: PathBuf,
-    /// Where to write the pose (JSON)
+    /// Where to write the pose (JSON); `-` is stdout
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
@@ -74,6 +76,10 @@ struct ObservedOptions {
 
 impl AlignCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let mut inputs = vec![self.mesh.as_path()];
+        inputs.extend(self.init.as_deref());
+        inputs.extend(self.observed.files());
+        let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         let start = Instant::now();
         let observed = self.observed.read()?;
@@ -85,26 +91,35 @@ impl AlignCommand {
             n_starts: self.starts,
             seed: self.seed,
         };
+        output.check_again()?;
         let task = console::progress(common.quiet);
         let mut found = align(&file.mesh, &observed, &settings, &task)
             .with_context(|| self.mesh.display().to_string())?;
         found.stages_ms.insert(0, ("observe", read));
         let aligned = AlignedFile::new(&found, &file.mesh, &settings);
-        aligned.write(&self.output)?;
+        aligned.write(output.path())?;
         if !common.quiet {
             print_alignment(&found);
+            let scale = found.camera_from_object.scale;
+            console::message(size_in_metres(&file.mesh, scale));
         }
         if common.json {
             console::data(aligned.to_json());
-        } else {
-            console::data(self.output.display());
         }
+        output.finish(common)?;
         let refused = found.verdict == Verdict::Refuse;
         Ok(if refused { Outcome::NoAnswer } else { Outcome::Done })
     }
 }
 
 impl ObservedOptions {
+    /// The files it reads.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        [&self.cloud, &self.depth, &self.intrinsics, &self.mask]
+            .into_iter()
+            .filter_map(|f| f.as_deref())
+    }
+
     fn read(&self) -> Result<Observation> {
         if let (Some(depth), Some(intrinsics)) = (&self.depth, &self.intrinsics) {
             let image = read_depth_image(depth, self.depth_scale)?;

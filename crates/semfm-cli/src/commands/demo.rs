@@ -21,6 +21,7 @@ use super::grasp::GraspOptions;
 use super::transfer_output::TransferOutput;
 use crate::console;
 use crate::options::Common;
+use crate::output::check_folder;
 
 /// The gripper that grasps at the end, and how large the object is made for it: from corner to
 /// corner of its box, in metres.
@@ -52,6 +53,7 @@ impl DemoCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let task = console::progress(common.quiet);
         let settings = PipelineSettings::default();
+        check_folder(&self.output, &[], &[])?;
         std::fs::create_dir_all(&self.output).with_context(|| self.output.display().to_string())?;
         let source = self.make(0, &task, common)?;
         let target = self.make(1, &task, common)?;

@@ -1,24 +1,29 @@
 //! `semfm-cli eval`: how well regions are transferred, measured.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::Method;
 use semfm::geom::ShapeCache;
+use semfm::geom::io::StagedFolder;
 use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
 use semfm_eval::workers::Workers;
-use semfm_eval::{EmbeddingSource, EvalSettings, Override, Results, Variant, report, table, vlm};
+use semfm_eval::{
+    EmbeddingSource, EvalSettings, OutputFolder, Override, Results, Variant, report, table, vlm,
+};
 use semfm_synth::Level;
 use serde_json::json;
 
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
-use super::report_options::ReportOptions;
+use super::report_options::{ReportOptions, print_notes};
 use crate::console;
 use crate::options::Common;
+use crate::output::check_folder;
+use crate::process::CtrlC;
 
 /// Measure how well regions are transferred: every method, every ordered pair
 ///
@@ -32,7 +37,7 @@ use crate::options::Common;
     semfm-cli eval objects -o report\n  \
     semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
     semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
-    Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured.")]
+    Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured. 130: interrupted; what is done is kept.")]
 pub struct EvalCommand {
     /// Folder of labelled objects
     dataset: Option<PathBuf>,
@@ -124,18 +129,41 @@ struct WorkOptions {
 
 impl EvalCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let compared = self.work.compare.as_deref().map(results_file);
+        let inputs: Vec<&Path> =
+            compared.iter().chain(&self.methods.vlm).map(PathBuf::as_path).collect();
+        check_folder(&self.output, OUTPUTS, &inputs)?;
+        // Locked before anything is read: another run that goes on for hours is known at once.
+        let folder = OutputFolder::open(&self.output)?;
         if self.report.report_only {
             return self.report.write_again(&self.output, common);
         }
+        let ctrl_c = CtrlC::listen();
+        let outcome = self.evaluate(folder, &ctrl_c, common);
+        if outcome.is_err() && ctrl_c.was_pressed() {
+            console::message(format_args!(
+                "interrupted: what is done is kept in {}; the same command goes on from there",
+                self.output.display()
+            ));
+            return Ok(Outcome::Interrupted);
+        }
+        outcome
+    }
+
+    fn evaluate(&self, folder: OutputFolder, ctrl_c: &CtrlC, common: &Common) -> Result<Outcome> {
         // What cannot be compared with should be known before the work is done.
         let before = self.work.compare.as_deref().map(Results::read).transpose()?;
         let dataset = self.dataset()?;
+        check_folder(&self.output, OUTPUTS, &dataset.files())?;
+        if !common.quiet {
+            dataset.notes.iter().for_each(|note| console::message(format_args!("note: {note}")));
+        }
         let embeddings = self.embeddings(&dataset, common)?;
         let settings = self.settings(common)?;
         self.announce(&dataset, &embeddings, &settings, common);
-        let task = console::progress_with_time_left(common.quiet);
+        let task = console::progress_with_time_left(common.quiet).with_cancel_flag(ctrl_c.flag());
         let vlm = self.methods.vlm.as_deref().map(|path| vlm::read(path, &dataset)).transpose()?;
-        let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, &self.output, &task)?;
+        let mut finished = semfm_eval::run(&dataset, &embeddings, &settings, folder, &task)?;
         if finished.resumed > 0 && !common.quiet {
             console::message(format_args!("went on after {} pairs done before", finished.resumed));
         }
@@ -146,13 +174,19 @@ impl EvalCommand {
             finished.results = finished.results.with_rows(rows);
         }
         let results = &finished.results;
-        let mut files = vec![results.write(&self.output)?, table::write(results, &self.output)?];
+        // All of it appears together, the results last.
+        let staged = StagedFolder::new(&self.output)?;
+        results.write(staged.path())?;
+        table::write(results, staged.path())?;
         let comparison = before.map(|before| Comparison::new(&before, results));
         if let Some(comparison) = &comparison {
-            files.extend(comparison.write(&self.output)?);
+            comparison.write(staged.path())?;
         }
         let settings = self.report.settings();
-        files.push(report::write(results, &dataset, &self.output, &settings, &task)?);
+        let page =
+            report::write(results, &dataset, finished.folder(), staged.path(), &settings, &task)?;
+        print_notes(&page, common);
+        let files = staged.put(&["results.json"], &[])?;
         let results = finished.close()?;
         print_results(&results, comparison.as_ref(), &files, common);
         outcome_of(&results, common)
@@ -242,6 +276,15 @@ impl EvalCommand {
             ));
         }
     }
+}
+
+/// The files in the folder of results.
+const OUTPUTS: &[&str] =
+    &["results.json", "table.md", "index.html", "compare.json", "compare.md", "journal.jsonl"];
+
+/// The file itself, or the results in a folder.
+fn results_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("results.json") } else { path.to_owned() }
 }
 
 /// Names of methods, read.

@@ -6,13 +6,14 @@ use anyhow::{Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::geom::ShapeCache;
 use semfm_eval::workers::Workers;
-use semfm_eval::{CorrespondenceDataset, MapResults, MapSettings, report, run_maps};
+use semfm_eval::{CorrespondenceDataset, MapSettings, OutputFolder, report, run_maps};
 use serde_json::json;
 
 use super::Outcome;
 use super::eval::{parsed, print_files};
 use crate::console;
 use crate::options::Common;
+use crate::output::check_folder;
 
 /// Measure point maps against true correspondences: functional maps beside another library
 ///
@@ -50,15 +51,17 @@ pub struct EvalMapsCommand {
 
 impl EvalMapsCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        check_folder(&self.output, &["results.json", "table.md", "index.html"], &[])?;
+        let folder = OutputFolder::open(&self.output)?;
         let Some(sets) = &self.sets else {
-            let files = report::write_maps(&MapResults::read(&self.output)?, &self.output)?;
+            let files = report::maps_again(folder.path())?;
             files.iter().for_each(|file| console::data(file.display()));
             return Ok(Outcome::Done);
         };
         let dataset = CorrespondenceDataset::open(sets)?;
         let task = console::progress_with_time_left(common.quiet);
         let results = run_maps(&dataset, &self.settings(common)?, &task)?;
-        let files = report::write_maps(&results, &self.output)?;
+        let files = report::write_maps(&results, folder.path())?;
         if common.json {
             let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
             console::data(json!({ "summaries": results.summaries, "files": files }));

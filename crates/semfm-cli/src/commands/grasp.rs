@@ -9,7 +9,7 @@ use semfm::files::{
     GraspSettingsRecord, GraspsFile, read_aligned, read_obstacle, read_region, write_isaac_grasps,
     write_ros2_grasps,
 };
-use semfm::geom::io::read_mesh;
+use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
 use semfm::grasp::{ApproachCone, GraspSettings, Grasps};
 use semfm::robot::{BuiltinGripper, Gripper, GripperSettings};
@@ -18,8 +18,10 @@ use semfm_show::write_grasp_picture;
 use serde_json::{Map, Value, json};
 
 use super::Outcome;
+use super::size::print_size;
 use crate::console;
 use crate::options::{Common, numbers, parse_package};
+use crate::output::{OutputFile, check_distinct, check_file};
 
 /// Degrees.
 const APPROACH_CONE: f64 = 45.0;
@@ -37,7 +39,7 @@ pub struct GraspCommand {
     /// The region in which the pads shall close (JSON)
     #[arg(long, value_name = "FILE")]
     region: PathBuf,
-    /// Where to write
+    /// Where to write; `-` is stdout
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[arg(long, value_name = "NAME|URDF", help = gripper_help("The gripper"))]
@@ -133,25 +135,41 @@ pub fn gripper_help(what: &str) -> String {
 
 impl GraspCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let mut inputs = vec![self.mesh.as_path(), self.region.as_path(), Path::new(&self.gripper)];
+        inputs.extend(self.options.files());
+        let output = OutputFile::new(&self.output, &inputs, common)?;
+        if let Some(picture) = &self.picture {
+            check_file(picture, &inputs)?;
+            check_distinct(&self.output, picture)?;
+        }
         let task = console::progress(common.quiet);
         let mesh = read_mesh(&self.mesh)?.mesh;
         let region = read_region(&self.region, &mesh)?;
         let problem = self.options.prepare(&self.gripper, self.seed, mesh)?;
+        output.check_again()?;
+        self.picture.iter().try_for_each(refuse_input)?;
+        if !common.quiet {
+            print_size(&problem.size());
+        }
         let found = problem.find(region.weights(), &task)?;
         let result = problem.result(&found);
-        match self.format {
-            Format::Json => write_grasps(&self.output, &problem, &found)?,
-            Format::Ros2 => write_ros2_grasps(&self.output, &result)?,
-            Format::Isaac => write_isaac_grasps(&self.output, &result)?,
-        }
+        // The answer comes last: where the picture fails, there is none.
         if let Some(picture) = &self.picture {
             draw_grasps(picture, &problem, region.weights(), &found, &task)?;
+        }
+        let path = output.path();
+        match self.format {
+            Format::Json => write_grasps(path, &problem, &found)?,
+            Format::Ros2 => write_ros2_grasps(path, &result)?,
+            Format::Isaac => write_isaac_grasps(path, &result)?,
         }
         if common.json {
             console::data(summary(&found));
         } else {
             print_grasps(&found, common);
-            console::data(self.output.display());
+        }
+        output.finish(common)?;
+        if !common.json {
             self.picture.iter().for_each(|picture| console::data(picture.display()));
         }
         Ok(if found.grasps.is_empty() { Outcome::NoAnswer } else { Outcome::Done })
@@ -178,6 +196,11 @@ impl GraspOptions {
             clearance: limits.clearance,
             pad_in_region: limits.pad_in_region,
         }
+    }
+
+    /// The files it reads.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.scene.iter().chain(&self.metric.aligned).map(PathBuf::as_path)
     }
 
     /// Reads everything that grasps of `mesh` need.

@@ -1,13 +1,12 @@
 //! `semfm-cli info`: what is in a file, or why it is refused.
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
-use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::geom::io::{MeshFormat, printable_name, read_at_most, read_mesh};
 use semfm::robot::{MeshPaths, MeshPlace, RobotDescription};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
@@ -82,6 +81,7 @@ fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Valu
     value["hash"] = json!(file.mesh.hash().to_string());
     value["area"] = json!(file.mesh.area());
     value["bounds"] = json!([low.to_array(), high.to_array()]);
+    value["size"] = json!((high - low).to_array());
     value["format"] = json!(file.format.name());
     value["has_colors"] = json!(!file.appearance.is_plain());
     value["notes"] = json!(file.appearance.notes);
@@ -121,15 +121,11 @@ fn is_urdf(path: &Path) -> bool {
     if extension.eq_ignore_ascii_case("urdf") || extension.eq_ignore_ascii_case("xacro") {
         return true;
     }
-    MeshFormat::from_path(path).is_none() && {
-        let mut start = Vec::new();
-        std::fs::File::open(path).and_then(|file| file.take(64).read_to_end(&mut start)).is_ok_and(
-            |_| {
-                let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
-                text.starts_with(b"<?xml") || text.starts_with(b"<robot")
-            },
-        )
-    }
+    MeshFormat::from_path(path).is_none()
+        && read_at_most(path, 64).is_ok_and(|start| {
+            let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
+            text.starts_with(b"<?xml") || text.starts_with(b"<robot")
+        })
 }
 
 /// MCAP by its extension or by its first bytes; a mesh's extension wins over the bytes.
@@ -138,10 +134,8 @@ fn is_mcap(path: &Path) -> bool {
     if extension.eq_ignore_ascii_case("mcap") {
         return true;
     }
-    let mut start = [0; 8];
     MeshFormat::from_path(path).is_none()
-        && std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok()
-        && start == *b"\x89MCAP0\r\n"
+        && read_at_most(path, 8).is_ok_and(|start| start == b"\x89MCAP0\r\n")
 }
 
 fn with_kind(kind: &str, report: Value) -> Value {
@@ -154,7 +148,7 @@ fn with_kind(kind: &str, report: Value) -> Value {
 
 /// The report as a table for people.
 fn show(path: &Path, report: &Value) {
-    console::data(path.display());
+    console::data(printable_name(&path.display().to_string()));
     for (key, value) in report.as_object().into_iter().flatten() {
         match value {
             Value::Array(items) if items.is_empty() => {}
@@ -164,6 +158,14 @@ fn show(path: &Path, report: &Value) {
                 items.iter().for_each(|item| console::data(format_args!("    {item}")));
             }
             Value::String(text) => console::data(format_args!("  {key:24} {text}")),
+            Value::Array(sides) if key == "size" => {
+                let sides: Vec<String> = sides
+                    .iter()
+                    .map(|x| format!("{:.4}", x.as_f64().unwrap_or_default()))
+                    .collect();
+                // A mesh has no unit of its own: metres matter where one is said.
+                console::data(format_args!("  {key:24} {} in the mesh's unit", sides.join(" × ")));
+            }
             other => console::data(format_args!("  {key:24} {other}")),
         }
     }

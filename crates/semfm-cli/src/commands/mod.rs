@@ -12,6 +12,7 @@ pub mod info;
 pub mod region;
 mod report_options;
 pub mod show;
+mod size;
 pub mod transfer;
 mod transfer_output;
 pub mod views;
@@ -25,4 +26,6 @@ pub enum Outcome {
     NoAnswer,
     /// With a verdict against the input, already printed: exit 2.
     Refused,
+    /// By Ctrl-C, which was answered: exit 130.
+    Interrupted,
 }

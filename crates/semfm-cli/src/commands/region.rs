@@ -14,6 +14,7 @@ use semfm::{Mesh, Region};
 use super::Outcome;
 use crate::console;
 use crate::options::{Common, numbers};
+use crate::output::OutputFile;
 
 /// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids
 #[derive(Debug, Args)]
@@ -25,7 +26,7 @@ use crate::options::{Common, numbers};
 pub struct RegionCommand {
     /// The mesh
     mesh: PathBuf,
-    /// Where to write the region (JSON)
+    /// Where to write the region (JSON); `-` is stdout
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// A contact point in the mesh's frame and units; needs --radius
@@ -62,7 +63,13 @@ pub struct RegionCommand {
 
 impl RegionCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let view =
+            self.view.as_deref().map(|view| Path::new(view.rsplit_once('#').map_or(view, |v| v.0)));
+        let mut inputs = vec![self.mesh.as_path()];
+        inputs.extend(self.mask.as_deref().into_iter().chain(view));
+        let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
+        output.check_again()?;
         let region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
             let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
             region_around_contact(&file.mesh, DVec3::new(x, y, z), radius)
@@ -80,12 +87,12 @@ impl RegionCommand {
             let ids = self.vertices.unwrap_or_default();
             Region::from_vertices(file.mesh.n_vertices(), &ids).context("--vertices")?
         };
-        write_region(&self.output, &region, &file.mesh)?;
+        write_region(output.path(), &region, &file.mesh)?;
         if !common.quiet {
             let (inside, of) = (region.vertices().len(), region.n_vertices());
             console::message(format_args!("{inside} of {of} vertices"));
         }
-        console::data(self.output.display());
+        output.finish(common)?;
         Ok(Outcome::Done)
     }
 }

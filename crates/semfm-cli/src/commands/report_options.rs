@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use semfm_eval::{ReportSettings, Results, report, table};
+use semfm_eval::report::{self, WrittenReport};
+use semfm_eval::{ReportSettings, Results, table};
 
 use super::Outcome;
 use crate::console;
@@ -28,6 +29,13 @@ pub struct ReportOptions {
     vlm_pictures: Option<PathBuf>,
 }
 
+/// Why a page has fewer pictures than it could have.
+pub fn print_notes(page: &WrittenReport, common: &Common) {
+    if !common.quiet {
+        page.notes.iter().for_each(|note| console::message(format_args!("note: {note}")));
+    }
+}
+
 impl ReportOptions {
     /// As settings.
     pub fn settings(&self) -> ReportSettings {
@@ -43,7 +51,9 @@ impl ReportOptions {
     pub fn write_again(&self, folder: &Path, common: &Common) -> Result<Outcome> {
         let task = console::progress(common.quiet);
         let table = table::write(&Results::read(folder)?, folder)?;
-        let files = [table, report::again(folder, &self.settings(), &task)?];
+        let page = report::again(folder, &self.settings(), &task)?;
+        print_notes(&page, common);
+        let files = [table, page.path];
         files.iter().for_each(|file| console::data(file.display()));
         Ok(Outcome::Done)
     }

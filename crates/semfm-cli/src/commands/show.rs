@@ -1,6 +1,6 @@
 //! `semfm-cli show`: results as one HTML page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
@@ -10,6 +10,7 @@ use serde_json::json;
 use super::Outcome;
 use crate::console;
 use crate::options::Common;
+use crate::output::OutputFile;
 
 /// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
 ///
@@ -22,7 +23,7 @@ pub struct ShowCommand {
     /// Folders that `transfer -o` wrote, meshes, regions and grasps (after their mesh), views files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
-    /// Where to write the page
+    /// Where to write the page; `-` is stdout
     #[arg(short, long, value_name = "PAGE.html")]
     output: PathBuf,
     /// Heading of the page
@@ -32,14 +33,29 @@ pub struct ShowCommand {
 
 impl ShowCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let read = files_of(&self.paths);
+        let inputs: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+        let page = OutputFile::new(&self.output, &inputs, common)?;
         let groups = groups_of_paths(&self.paths, &console::progress(common.quiet))?;
-        write_page(&self.output, &self.title, &groups)?;
-        let output = self.output.display();
+        write_page(page.path(), &self.title, &groups)?;
         if common.json {
-            console::data(json!({ "page": output.to_string(), "n_groups": groups.len() }));
-        } else {
-            console::data(output);
+            let output = self.output.display().to_string();
+            console::data(json!({ "page": output, "n_groups": groups.len() }));
         }
+        page.finish(common)?;
         Ok(Outcome::Done)
     }
+}
+
+/// The files themselves and those in folders: `show` reads a folder of `transfer`, or of `demo` with
+/// one inside.
+fn files_of(paths: &[PathBuf]) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for path in paths {
+        let folders = [path.clone(), path.join("transfer")];
+        let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
+        files.extend(entries.flatten().map(|entry| entry.path()));
+        files.push(path.clone());
+    }
+    files
 }

@@ -2,23 +2,29 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use semfm::files::{
-    Provenance, Seeds, TransferInputs, read_embeddings, read_region, read_vertex_features,
+    Provenance, RegionFile, Seeds, TransferInputs, read_embeddings, read_region,
+    read_vertex_features,
 };
 use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, read_mesh};
 use semfm::object_encoder::EncodedPair;
-use semfm::{FeatureSource, Method, PipelineSettings, Prepared, Rule, Task, prepare, transfer};
-use semfm_show::TransferFiles;
+use semfm::views::{self, mcap::EmbeddingsFile};
+use semfm::{
+    FeatureSource, Mesh, Method, PipelineSettings, Prepared, Rule, Task, prepare, transfer,
+};
+use semfm_show::{TRANSFER_FILES, TransferFiles};
 
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
 use super::grasp::{GraspOptions, gripper_help};
+use super::size::print_size;
 use super::transfer_output::TransferOutput;
 use crate::console;
 use crate::options::Common;
+use crate::output::{check_folder, check_folder_again};
 
 /// Transfer a region from one object to another
 ///
@@ -144,10 +150,12 @@ struct Pair<T> {
 
 impl TransferCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        check_folder(&self.output, TRANSFER_FILES, &self.inputs())?;
         let task = console::progress(common.quiet);
         let settings = self.matching.settings(self.features.features);
         let files = Pair { source: read_mesh(&self.source)?, target: read_mesh(&self.target)? };
-        let region = read_region(&self.region, &files.source.mesh)?;
+        let region = read_region(&self.region, &files.source.mesh)
+            .map_err(|error| self.or_region_of_target(error, &files.target.mesh))?;
         let grasps = match &self.gripper {
             Some(gripper) => {
                 let (mesh, seed) = (files.target.mesh.clone(), self.matching.seed);
@@ -155,6 +163,10 @@ impl TransferCommand {
             }
             None => None,
         };
+        check_folder_again(&self.output, TRANSFER_FILES)?;
+        if let Some(problem) = grasps.as_ref().filter(|_| !common.quiet) {
+            print_size(&problem.size());
+        }
         let Pair { source, target } = self.prepare(files, &settings, &task, common)?;
         for (name, prepared) in [("source", &source), ("target", &target)] {
             if let Some(encoder) = prepared.report.encoder.as_ref().filter(|_| common.verbose) {
@@ -179,6 +191,58 @@ impl TransferCommand {
         output.write(&self.output, &task, common)
     }
 
+    /// The files that it reads; the encoder and the gripper may be files, too.
+    fn inputs(&self) -> Vec<&Path> {
+        let features = &self.features;
+        let files = [
+            &features.source_embeddings,
+            &features.target_embeddings,
+            &features.source_features,
+            &features.target_features,
+        ];
+        let named = [&features.encoder.encoder, &self.gripper];
+        [&self.source, &self.target, &self.region]
+            .into_iter()
+            .chain(files.into_iter().flatten())
+            .map(PathBuf::as_path)
+            .chain(named.into_iter().flatten().map(Path::new))
+            .chain(self.grasps.files())
+            .collect()
+    }
+
+    /// The error of a region that does not fit the source, or, where it fits the target, one that
+    /// says so.
+    fn or_region_of_target(&self, error: semfm::Error, target: &Mesh) -> anyhow::Error {
+        if RegionFile::read(&self.region).is_ok_and(|file| file.names(target)) {
+            return anyhow!(
+                "{}: this is a region of the target {}, but expected one of the source: are source and \
+                 target swapped?",
+                self.region.display(),
+                self.target.display()
+            );
+        }
+        error.into()
+    }
+
+    /// Embeddings of both objects.
+    fn read_both(&self, a: &Path, b: &Path, files: &Pair<MeshFile>) -> Result<[EmbeddingsFile; 2]> {
+        let read = read_embeddings(a, &files.source.mesh)
+            .and_then(|a| Ok([a, read_embeddings(b, &files.target.mesh)?]));
+        if let Err(semfm::Error::Views(views::Error::OtherMesh { .. })) = &read {
+            let swapped = read_embeddings(a, &files.target.mesh).is_ok()
+                && read_embeddings(b, &files.source.mesh).is_ok();
+            if swapped {
+                bail!(
+                    "the embeddings are swapped: {} is of the target and {} of the source; \
+                     exchange --source-embeddings and --target-embeddings",
+                    a.display(),
+                    b.display()
+                );
+            }
+        }
+        Ok(read?)
+    }
+
     /// Both objects, with features from wherever the caller said.
     fn prepare(
         &self,
@@ -196,8 +260,7 @@ impl TransferCommand {
             return self.prepare_both(files, features, settings, task);
         }
         if let (Some(a), Some(b)) = (&options.source_embeddings, &options.target_embeddings) {
-            let a = read_embeddings(a, &files.source.mesh)?;
-            let b = read_embeddings(b, &files.target.mesh)?;
+            let [a, b] = self.read_both(a, b, &files)?;
             let features =
                 Pair { source: FeatureSource::from(&a), target: FeatureSource::from(&b) };
             return self.prepare_both(files, features, settings, task);

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
-use semfm::files::{Provenance, TransferResult, stages_ms};
+use anyhow::Result;
+use semfm::files::{Provenance, TransferResult, put_transfer, stages_ms};
 use semfm::fmap::Stages;
+use semfm::geom::io::StagedFolder;
 use semfm::grasp::Grasps;
 use semfm::{GraspProblem, Prepared, Region, Task, Transfer, Verdict};
 use semfm_show::{TransferFiles, write_transfer};
@@ -34,25 +35,23 @@ impl TransferOutput<'_> {
     /// grasped.
     pub fn write(&self, folder: &Path, task: &Task, common: &Common) -> Result<Outcome> {
         let start = Instant::now();
-        let mut files = write_transfer(folder, &self.result(), self.files, task)?;
+        // Grasps included, the folder has all files or none.
+        let staged = StagedFolder::new(folder)?;
+        write_transfer(staged.path(), &self.result(), self.files, task)?;
         let write_ms = start.elapsed().as_secs_f64() * 1e3;
         let refused = self.transfer.verdict == Verdict::Refuse;
         let mut grasps = None;
         if let Some(problem) = self.grasps.as_ref().filter(|_| !refused) {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
-            let (file, picture) = (folder.join("grasps.json"), folder.join("grasps.png"));
-            remove_old_grasps(folder)?;
+            let [file, picture] = GRASPS.map(|name| staged.path().join(name));
             write_grasps(&file, problem, &found)?;
-            files.push(file);
             if self.files == TransferFiles::All {
                 draw_grasps(&picture, problem, weights, &found, task)?;
-                files.push(picture);
             }
             grasps = Some(found);
-        } else {
-            remove_old_grasps(folder)?;
         }
+        let files = put_transfer(staged)?;
         let mut stages = stages_ms(self.source, self.target, self.transfer);
         stages.push("write", write_ms);
         if common.json {
@@ -111,15 +110,5 @@ impl TransferOutput<'_> {
     }
 }
 
-/// Removes the grasps of an earlier run from the folder: they belong to a region that is gone.
-fn remove_old_grasps(folder: &Path) -> Result<()> {
-    for path in ["grasps.json", "grasps.png"].map(|name| folder.join(name)) {
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(error).with_context(|| path.display().to_string());
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
+/// Grasps and their picture.
+const GRASPS: [&str; 2] = ["grasps.json", "grasps.png"];

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use semfm::encoder::rendered_views::{Coloring, RenderedObject, ViewSettings};
-use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::geom::io::{MeshFormat, read_mesh, refuse_input};
 use semfm::views::{RenderSettings, Renderer, RendererChoice, RigSettings};
 use semfm_show::write_sheet;
 
 use super::Outcome;
 use crate::console;
 use crate::options::Common;
+use crate::output::{OutputFile, check_distinct, check_file};
 
 /// Render the views of an object that an encoder is shown
 #[derive(Debug, Args)]
@@ -20,7 +21,7 @@ use crate::options::Common;
 pub struct ViewsCommand {
     #[arg(help = format!("The mesh: {}", MeshFormat::readable_names()))]
     mesh: PathBuf,
-    /// Where to write (`NAME.views.mcap`)
+    /// Where to write (`NAME.views.mcap`); `-` is stdout
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
@@ -137,6 +138,13 @@ impl LookOptions {
 
 impl ViewsCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
+        let mut inputs = vec![self.mesh.as_path()];
+        inputs.extend(self.texture.as_deref());
+        let output = OutputFile::new(&self.output, &inputs, common)?;
+        if let Some(sheet) = &self.sheet {
+            check_file(sheet, &inputs)?;
+            check_distinct(&self.output, sheet)?;
+        }
         let mut file = read_mesh(&self.mesh)?;
         if let Some(texture) = &self.texture {
             file.appearance.attach_image(texture)?;
@@ -145,6 +153,8 @@ impl ViewsCommand {
             let notes = file.appearance.notes.iter();
             notes.for_each(|note| console::message(format_args!("note: {note}")));
         }
+        output.check_again()?;
+        self.sheet.iter().try_for_each(refuse_input)?;
         let renderer = Renderer::open(self.renderer).context("--renderer")?;
         let settings = ViewSettings {
             rig: self.rig.settings(),
@@ -158,11 +168,11 @@ impl ViewsCommand {
         let task = console::progress(common.quiet);
         let rendered = RenderedObject::new(&file, &settings, &renderer, &task)
             .with_context(|| self.mesh.display().to_string())?;
-        rendered.write(&self.output)?;
+        rendered.write(output.path())?;
         if let Some(note) = renderer.note().filter(|_| !common.quiet) {
             console::message(format_args!("note: {note}"));
         }
-        console::data(self.output.display());
+        output.finish(common)?;
         if let Some(sheet) = &self.sheet {
             let columns = (rendered.views.len() as f64).sqrt().ceil() as usize;
             write_sheet(sheet, &rendered.views, columns)?;

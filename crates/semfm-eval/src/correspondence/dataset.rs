@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use semfm::geom::io::read_file;
 use serde_json::json;
 
 use crate::{Error, Result};
@@ -60,7 +61,11 @@ impl CorrespondenceDataset {
 impl CorrespondenceSet {
     fn open(folder: PathBuf) -> Result<Self> {
         let path = folder.join(PAIRS);
-        let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+        let text = String::from_utf8(read_file(&path)?).map_err(|error| {
+            let byte = format!("byte {}", error.utf8_error().valid_up_to());
+            Error::format(&path, byte, "text in UTF-8", "another byte")
+        })?;
+        let text = text.trim_start_matches('\u{feff}');
         let mut pairs = Vec::new();
         for (line, number) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
             let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
@@ -92,7 +97,7 @@ fn hash(sets: &[CorrespondenceSet]) -> Result<String> {
         hasher.update(json!([set.name, set.pairs]).to_string().as_bytes());
         for name in set.shapes() {
             let path = set.file(name);
-            let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+            let bytes = read_file(&path)?;
             hasher.update(blake3::hash(&bytes).as_bytes());
         }
     }

@@ -12,6 +12,7 @@ use semfm::fmap::{FunctionalMap, PointMap};
 use semfm::geom::descriptors::{WksSettings, landmark_wks, wks};
 use semfm::geom::math::DVec3;
 use semfm::geom::sampling::farthest_points;
+use semfm::geom::suggestion::unknown_name;
 use semfm::geom::{Eigenbasis, PointIndex};
 
 use super::annotated_shape::{AnnotatedShape, K};
@@ -139,7 +140,10 @@ impl FromStr for MapMethod {
 
     fn from_str(text: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|method| method.name() == text);
-        found.ok_or_else(|| Error::invalid("method", Self::ALL.map(Self::name).join(", "), text))
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name);
+            Error::invalid("method", names.join(", "), unknown_name(text, names))
+        })
     }
 }
 

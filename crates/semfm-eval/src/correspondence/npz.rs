@@ -7,6 +7,8 @@
 use std::io::Read;
 use std::path::Path;
 
+use semfm::geom::io::{foreign_kind, read_file};
+
 use crate::{Error, Result};
 
 /// No array of a shape is larger than this when unpacked.
@@ -40,13 +42,14 @@ impl<'a> Archive<'a> {
     /// Reads the archive and its central directory (PKWARE's APPNOTE 4.3.12 and 4.3.16; no ZIP64, no
     /// encryption).
     pub fn read(path: &'a Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(Error::io(path))?;
+        let bytes = read_file(path)?;
         // The end record is 22 bytes and a comment of at most 65535.
         let from = bytes.len().saturating_sub(22 + 0xffff);
         let end = (from..bytes.len().saturating_sub(21))
             .rev()
             .find(|&i| bytes[i..].starts_with(b"PK\x05\x06"));
-        let end = end.ok_or_else(|| broken(path, "no end record"))?;
+        let foreign = || foreign_kind(&bytes).filter(|kind| !kind.contains("ZIP"));
+        let end = end.ok_or_else(|| broken(path, foreign().unwrap_or("no end record")))?;
         let count = u16_at(&bytes, end + 10).ok_or_else(|| broken(path, "a short end record"))?;
         let mut at =
             u32_at(&bytes, end + 16).ok_or_else(|| broken(path, "a short end record"))? as usize;

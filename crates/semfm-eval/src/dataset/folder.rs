@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use semfm::files::read_region;
-use semfm::geom::io::{MeshFormat, read_mesh};
+use semfm::geom::io::{MeshFormat, TEMPORARY_PREFIX, read_file, read_json, read_mesh};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -27,9 +27,11 @@ const PAIRS: &str = "pairs.json";
 /// [`Error::Io`] for what cannot be read, [`Error::Format`] where `pairs.json` is not what it should
 /// be or names an object without a label, or where the folder has no pair to score.
 pub fn open(path: &Path) -> Result<Dataset> {
-    let mut objects = Vec::new();
+    let (mut objects, mut notes) = (Vec::new(), Vec::new());
     for folder in entries(path)?.into_iter().filter(|entry| entry.is_dir()) {
-        objects.extend(labelled(&folder)?);
+        let found = labelled(&folder)?;
+        objects.extend(found.objects);
+        notes.extend(found.notes);
     }
     let chosen = path.join(PAIRS);
     let groups =
@@ -42,7 +44,7 @@ pub fn open(path: &Path) -> Result<Dataset> {
     let (objects, groups) = only_used(objects, groups);
     let hash = hash(&objects, &groups)?;
     let origin = DatasetOrigin::Folder { path: path.to_owned() };
-    Ok(Dataset { origin, hash, objects, groups })
+    Ok(Dataset { notes, origin, hash, objects, groups })
 }
 
 /// Mesh, region and parts of one object.
@@ -59,10 +61,7 @@ fn read_parts(label: &Path, n_vertices: usize) -> Result<BTreeMap<String, Vec<u3
         #[serde(default)]
         parts: BTreeMap<String, Vec<u32>>,
     }
-    let bytes = std::fs::read(label).map_err(Error::io(label))?;
-    let expected = "part names with lists of vertex ids";
-    let Label { parts } = serde_json::from_slice(&bytes)
-        .map_err(|error| Error::format(label, "parts", expected, error.to_string()))?;
+    let Label { parts } = read_json(label)?;
     for (name, ids) in &parts {
         if let Some(at) = ids.iter().position(|&id| id as usize >= n_vertices) {
             let expected = format!("ids below {n_vertices}, the mesh's vertex count");
@@ -80,29 +79,50 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
             entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>()
         })
         .map_err(Error::io(folder))?;
+    let is_temporary = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default();
+        name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
+    };
+    paths.retain(|path| !is_temporary(path));
     paths.sort();
     Ok(paths)
 }
 
+/// What a category folder holds.
+struct Category {
+    objects: Vec<ObjectEntry>,
+    notes: Vec<String>,
+}
+
 /// The objects of a category folder that have a label.
-fn labelled(folder: &Path) -> Result<Vec<ObjectEntry>> {
+fn labelled(folder: &Path) -> Result<Category> {
     let category =
         folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut objects: Vec<ObjectEntry> = Vec::new();
+    let mut notes = Vec::new();
     for mesh in entries(folder)? {
         let label = mesh.with_extension("json");
         let Some(name) = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()) else {
             continue;
         };
         let is_mesh = mesh.is_file() && MeshFormat::from_path(&mesh).is_some();
-        // One object in two formats counts once.
-        let known = objects.last().is_some_and(|last| last.name == name);
-        if is_mesh && label.is_file() && !known {
-            let source = ObjectSource::Files { mesh, label };
-            objects.push(ObjectEntry { name, category: category.clone(), source });
+        if !is_mesh || !label.is_file() {
+            continue;
         }
+        // One object in two formats counts once. Sorted, they need not be neighbours.
+        let known = objects.iter().find(|known| known.name == name);
+        if let Some(ObjectSource::Files { mesh: used, .. }) = known.map(|known| &known.source) {
+            notes.push(format!(
+                "{} is passed over: {} has the same name and the same label",
+                mesh.display(),
+                used.display()
+            ));
+            continue;
+        }
+        let source = ObjectSource::Files { mesh, label };
+        objects.push(ObjectEntry { name, category: category.clone(), source });
     }
-    Ok(objects)
+    Ok(Category { objects, notes })
 }
 
 fn all_pairs(objects: &[ObjectEntry]) -> Vec<Group> {
@@ -118,12 +138,8 @@ fn all_pairs(objects: &[ObjectEntry]) -> Vec<Group> {
 }
 
 fn chosen_pairs(path: &Path, objects: &[ObjectEntry]) -> Result<Vec<Group>> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    let listed: BTreeMap<String, Vec<[String; 2]>> =
-        serde_json::from_slice(&bytes).map_err(|error| {
-            let expected = "group → [[source, target], …]";
-            Error::format(path, format!("line {}", error.line()), expected, error.to_string())
-        })?;
+    // group → [[source, target], …]
+    let listed: BTreeMap<String, Vec<[String; 2]>> = read_json(path)?;
     let names = NamedPlaces::new(objects);
     let mut groups = Vec::new();
     for (name, listed) in listed {
@@ -191,7 +207,7 @@ fn hash(objects: &[ObjectEntry], groups: &[Group]) -> Result<String> {
         hasher.update(json!([object.category, object.name]).to_string().as_bytes());
         if let ObjectSource::Files { mesh, label } = &object.source {
             for path in [mesh, label] {
-                let bytes = std::fs::read(path).map_err(Error::io(path))?;
+                let bytes = read_file(path)?;
                 hasher.update(blake3::hash(&bytes).as_bytes());
             }
         }
@@ -251,6 +267,21 @@ mod tests {
         let pair = Pair { source: 0, target: 1 };
         assert_eq!((&*fewer.groups[1].name, &fewer.groups[1].pairs[..]), ("mugs", &[pair][..]));
         assert_ne!(dataset.hash, fewer.hash);
+    }
+
+    #[test]
+    fn two_meshes_of_one_name_are_one_object_and_the_other_is_named() {
+        let folder = three_cups();
+        assert!(open(folder.path()).unwrap().notes.is_empty());
+        let cups = folder.path().join("cups");
+        std::fs::copy(cups.join("b.obj"), cups.join("b-2.obj")).unwrap();
+        std::fs::rename(cups.join("b-2.obj"), cups.join("b.ply.obj")).unwrap();
+        write_mesh(cups.join("b.ply"), &read_mesh(cups.join("b.obj")).unwrap().mesh).unwrap();
+        std::fs::write(cups.join(".semfm-b.obj.1-0-0.tmp"), "half a mesh").unwrap();
+        std::fs::create_dir(folder.path().join(".semfm-out.1-0-0.tmp")).unwrap();
+        let dataset = open(folder.path()).unwrap();
+        assert_eq!((dataset.objects.len(), dataset.notes.len()), (3, 1), "{:?}", dataset.notes);
+        assert!(dataset.notes[0].contains("b.ply") && dataset.notes[0].contains("b.obj"));
     }
 
     #[test]

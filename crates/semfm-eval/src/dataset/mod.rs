@@ -5,7 +5,7 @@ pub mod synthetic;
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use semfm::geom::io::MeshFile;
 use semfm::{Mesh, Region};
@@ -17,6 +17,8 @@ use crate::Result;
 /// Objects, and groups of ordered pairs among them.
 #[derive(Clone, Debug)]
 pub struct Dataset {
+    /// What was passed over, and why.
+    pub notes: Vec<String>,
     /// Where it came from; enough to open it again.
     pub origin: DatasetOrigin,
     /// Hash of everything that a score depends on but the features: meshes, labels, pairs.
@@ -140,6 +142,17 @@ impl LabelledObject {
 }
 
 impl Dataset {
+    /// The files of the objects: meshes and labels.
+    pub fn files(&self) -> Vec<&Path> {
+        let mut files = Vec::new();
+        for object in &self.objects {
+            if let ObjectSource::Files { mesh, label } = &object.source {
+                files.extend([mesh.as_path(), label.as_path()]);
+            }
+        }
+        files
+    }
+
     /// Opens again what results were made of. The objects may have changed since:
     /// compare [`Dataset::hash`].
     ///

@@ -67,7 +67,7 @@ pub fn make(settings: &SyntheticSettings) -> Result<Dataset> {
     // The generator is part of the program, and a journal names the program.
     let made_by = json!([origin, env!("CARGO_PKG_VERSION")]).to_string();
     let hash = format!("blake3:{}", blake3::hash(made_by.as_bytes()).to_hex());
-    Ok(Dataset { origin, hash, objects, groups })
+    Ok(Dataset { notes: Vec::new(), origin, hash, objects, groups })
 }
 
 pub(super) fn load(category: Category, instance: usize, seed: u64) -> Result<LabelledObject> {

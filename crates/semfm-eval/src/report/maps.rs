@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{StagedFolder, printable, write_atomically};
 use semfm_show::colors::SERIES;
 
 use super::html::{Cell, Table, escape, plot};
@@ -11,21 +11,37 @@ use super::{FILE, Section, cannot_draw, shell};
 use crate::correspondence::{
     MapMethod, MapResults, MapRow, MapSummary, PYFM, interval, one_digit, percent, whole,
 };
-use crate::{Error, Result, table};
+use crate::{Result, results, table};
 
-/// Writes `results.json`, `table.md` and `index.html` into `folder`, which is made.
+/// Writes `results.json`, `table.md` and `index.html` into `folder`, which is made: all of them or
+/// none.
 ///
 /// # Errors
-/// [`Error::Io`], [`Error::Facade`] for what cannot be written.
+/// [`Error::Facade`](crate::Error::Facade) for what cannot be written.
 pub fn write_maps(results: &MapResults, folder: &Path) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let json = results.write(folder)?;
-    let text = folder.join(table::FILE);
-    write_atomically(&text, |out| out.write_all(results.to_markdown().as_bytes()))?;
+    let staged = StagedFolder::new(folder)?;
+    results.write(staged.path())?;
+    write_pages(results, staged.path())?;
+    Ok(staged.put(&[results::FILE], &[])?)
+}
+
+/// Makes `table.md` and `index.html` in a folder anew from its results.
+///
+/// # Errors
+/// As [`MapResults::read`]; [`Error::Facade`](crate::Error::Facade) for what cannot be written.
+pub fn maps_again(folder: &Path) -> Result<Vec<PathBuf>> {
+    let staged = StagedFolder::new(folder)?;
+    write_pages(&MapResults::read(folder)?, staged.path())?;
+    Ok(staged.put(&[], &[])?)
+}
+
+fn write_pages(results: &MapResults, folder: &Path) -> Result<()> {
     let page = page(results).map_err(cannot_draw)?;
-    let html = folder.join(FILE);
-    write_atomically(&html, |out| out.write_all(page.as_bytes()))?;
-    Ok(vec![json, text, html])
+    let markdown = results.to_markdown();
+    let markdown = printable(&markdown);
+    write_atomically(folder.join(table::FILE), |out| out.write_all(markdown.as_bytes()))?;
+    write_atomically(folder.join(FILE), |out| out.write_all(page.as_bytes()))?;
+    Ok(())
 }
 
 fn page(results: &MapResults) -> std::result::Result<String, DrawError> {
@@ -214,8 +230,10 @@ mod tests {
         results.write(folder.path()).unwrap();
         let read = MapResults::read(folder.path()).unwrap();
         assert_eq!(read, results);
-        let files = write_maps(&read, folder.path()).unwrap();
-        let page = std::fs::read_to_string(&files[2]).unwrap();
+        assert_eq!(write_maps(&read, folder.path()).unwrap().len(), 3);
+        let files = maps_again(folder.path()).unwrap();
+        assert_eq!(files, [FILE, table::FILE].map(|name| folder.path().join(name)));
+        let page = std::fs::read_to_string(&files[0]).unwrap();
         for word in ["FAUST_r", "quoted", "17.5", "no &lt;map&gt;", "<svg", "a → c"] {
             assert!(page.contains(word), "{word}");
         }

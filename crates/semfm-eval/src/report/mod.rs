@@ -32,7 +32,7 @@ use context::Context;
 use html::{escape, section};
 use thumbnails::Thumbnails;
 
-pub use maps::write_maps;
+pub use maps::{maps_again, write_maps};
 
 /// The file in the output folder.
 pub const FILE: &str = "index.html";
@@ -57,7 +57,7 @@ impl Default for ReportSettings {
     }
 }
 
-/// Writes the page into `folder`, where the predictions of `results` are. Progress is counted in
+/// Writes the page into `out`; `folder` is where the predictions of `results` are. Progress is counted in
 /// pictures of the gallery.
 ///
 /// # Errors
@@ -67,15 +67,16 @@ pub fn write(
     results: &Results,
     dataset: &Dataset,
     folder: &Path,
+    out: &Path,
     settings: &ReportSettings,
     task: &Task,
-) -> Result<PathBuf> {
+) -> Result<WrittenReport> {
     let thumbnails = if dataset.hash == results.about.identity.dataset {
         Thumbnails::draw(dataset, results, folder, settings, task)?
     } else {
         Thumbnails::none("the objects have changed since they were evaluated")
     };
-    write_with(results, &thumbnails, folder, settings, task)
+    write_with(results, &thumbnails, out, settings, task)
 }
 
 /// Makes the page in a folder anew from its results. Objects that are gone or have changed leave
@@ -84,10 +85,10 @@ pub fn write(
 /// # Errors
 /// [`Error::Io`], [`Error::Format`] for the results; [`Error::Facade`] where the page cannot be
 /// written, cancellation.
-pub fn again(folder: &Path, settings: &ReportSettings, task: &Task) -> Result<PathBuf> {
+pub fn again(folder: &Path, settings: &ReportSettings, task: &Task) -> Result<WrittenReport> {
     let results = Results::read(folder)?;
     match Dataset::open(&results.about.origin) {
-        Ok(dataset) => write(&results, &dataset, folder, settings, task),
+        Ok(dataset) => write(&results, &dataset, folder, folder, settings, task),
         Err(error) => {
             let thumbnails = Thumbnails::none(&format!("the objects cannot be opened ({error})"));
             write_with(&results, &thumbnails, folder, settings, task)
@@ -101,11 +102,20 @@ fn write_with(
     folder: &Path,
     settings: &ReportSettings,
     task: &Task,
-) -> Result<PathBuf> {
+) -> Result<WrittenReport> {
     let page = page(&Context::new(results), thumbnails, settings, task)?;
     let path = folder.join(FILE);
     write_atomically(&path, |out| out.write_all(page.as_bytes()))?;
-    Ok(path)
+    Ok(WrittenReport { path, notes: thumbnails.notes() })
+}
+
+/// A page that was written.
+#[derive(Clone, Debug)]
+pub struct WrittenReport {
+    /// Where.
+    pub path: PathBuf,
+    /// Why it has fewer pictures than it could have; empty where nothing is missing.
+    pub notes: Vec<String>,
 }
 
 fn page(
@@ -196,7 +206,9 @@ mod tests {
     fn results_without_objects_still_make_a_page_that_says_so() {
         let folder = tempfile::tempdir().unwrap();
         some_results().write(folder.path()).unwrap();
-        let path = again(folder.path(), &ReportSettings::default(), &Task::default()).unwrap();
+        let WrittenReport { path, notes } =
+            again(folder.path(), &ReportSettings::default(), &Task::default()).unwrap();
+        assert!(notes[0].contains("the objects cannot be opened"), "{notes:?}");
         let page = std::fs::read_to_string(path).unwrap();
         assert!(page.contains("the objects cannot be opened"), "{page}");
         for word in ["fused", "nearest", "<svg", "no file", "cups"] {
@@ -227,8 +239,8 @@ mod tests {
         };
         let dataset = Dataset::open(&origin).unwrap();
         results.about.identity.dataset = dataset.hash.clone();
-        let error = write(&results, &dataset, folder.path(), &ReportSettings::default(), &task)
-            .unwrap_err();
+        let (at, settings) = (folder.path(), ReportSettings::default());
+        let error = write(&results, &dataset, at, at, &settings, &task).unwrap_err();
         assert!(error.is_cancelled(), "{error}");
         assert!(!folder.path().join(FILE).exists());
     }
@@ -269,8 +281,10 @@ mod tests {
         let (results, dataset) = answered(folder.path(), &pictures);
         let settings =
             ReportSettings { vlm_pictures: Some(pictures), picture_side: 48, ..Default::default() };
-        let path = write(&results, &dataset, folder.path(), &settings, &Task::default()).unwrap();
-        let page = std::fs::read_to_string(path).unwrap();
+        let at = folder.path();
+        let made = write(&results, &dataset, at, at, &settings, &Task::default()).unwrap();
+        assert!(made.notes.is_empty(), "{:?}", made.notes);
+        let page = std::fs::read_to_string(made.path).unwrap();
         for words in [
             "stand-in “m”, 1 view, IoU 1.00, inconsistency .25",
             "alt=\"answer in view 1 of tools_1_s0\"",
@@ -280,10 +294,22 @@ mod tests {
             assert!(page.contains(words), "{words}");
         }
         // Another set of objects: scores stay, pictures go, and the page says why.
-        let mut other = results;
+        let mut other = results.clone();
         other.about.identity.dataset = "blake3:0".into();
-        let path = write(&other, &dataset, folder.path(), &settings, &Task::default()).unwrap();
-        let page = std::fs::read_to_string(path).unwrap();
+        let made = write(&other, &dataset, at, at, &settings, &Task::default()).unwrap();
+        let page = std::fs::read_to_string(made.path).unwrap();
         assert!(page.contains("the objects have changed") && !page.contains("<img"));
+        // A file of predictions that is broken, or gone, is named.
+        let kept = at.join(results.rows[0].prediction.as_deref().unwrap());
+        for (text, word) in [(Some("{\"format\": 3"), "line 1"), (None, "No such file")] {
+            match text {
+                Some(text) => std::fs::write(&kept, text).unwrap(),
+                None => std::fs::remove_file(&kept).unwrap(),
+            }
+            let made = write(&results, &dataset, at, at, &settings, &Task::default()).unwrap();
+            let said = made.notes.join("; ");
+            assert!(said.contains("1 file of predictions") && said.contains(word), "{said}");
+            assert!(std::fs::read_to_string(made.path).unwrap().contains("of predictions cannot"));
+        }
     }
 }

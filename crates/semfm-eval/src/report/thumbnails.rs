@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use semfm::geom::Pinhole;
@@ -30,6 +31,8 @@ pub(super) struct Thumbnails<'a> {
     objects: BTreeMap<(&'a str, &'a str), DrawnObject>,
     /// Why there are fewer pictures than there could be.
     missing: Vec<String>,
+    /// Files of predictions that rows name and that cannot be read, with the reason.
+    unread: Mutex<BTreeMap<PathBuf, String>>,
     task: Task,
 }
 
@@ -64,7 +67,13 @@ impl<'a> Thumbnails<'a> {
     /// No pictures, for this reason.
     pub fn none(reason: &str) -> Self {
         let missing = vec![reason.to_owned()];
-        Self { folder: Path::new(""), objects: BTreeMap::new(), missing, task: Task::default() }
+        Self {
+            folder: Path::new(""),
+            objects: BTreeMap::new(),
+            missing,
+            unread: Mutex::default(),
+            task: Task::default(),
+        }
     }
 
     /// Loads and draws the objects that rows name. An object that cannot be loaded or drawn is left
@@ -108,7 +117,7 @@ impl<'a> Thumbnails<'a> {
         if !results.rows.iter().any(|row| row.prediction.is_some()) {
             missing.push("the predictions were not kept".into());
         }
-        Ok(Self { folder, objects, missing, task: quiet })
+        Ok(Self { folder, objects, missing, unread: Mutex::default(), task: quiet })
     }
 
     /// A style class for the picture of each object.
@@ -119,12 +128,25 @@ impl<'a> Thumbnails<'a> {
         })
     }
 
-    /// What is not in the page, and why.
+    /// What is not in the page, and why. Files of predictions are known once sections were made.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.missing.clone();
+        let unread = self.unread.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(reason) = unread.values().next() {
+            let n = unread.len();
+            let files = if n == 1 { "file" } else { "files" };
+            notes.push(format!("{n} {files} of predictions cannot be read ({reason})"));
+        }
+        notes
+    }
+
+    /// The notes as a paragraph; empty without any.
     pub fn missing(&self) -> String {
-        if self.missing.is_empty() {
+        let notes = self.notes();
+        if notes.is_empty() {
             return String::new();
         }
-        let words = self.missing.iter().map(|reason| escape(reason)).collect::<Vec<_>>().join("; ");
+        let words = notes.iter().map(|reason| escape(reason)).collect::<Vec<_>>().join("; ");
         format!("<p class=\"note\">Pictures are missing: {words}.</p>\n")
     }
 
@@ -143,9 +165,17 @@ impl<'a> Thumbnails<'a> {
 
     /// What each of the methods answered on the pair of `row`; empty where nobody kept it.
     pub fn answers(&self, row: &Row) -> BTreeMap<String, Prediction> {
-        let path = row.prediction.as_ref().and_then(|name| self.inside(name));
-        let predictions = path.and_then(|path| PairPredictions::read(&path));
-        predictions.map_or_else(BTreeMap::new, |predictions| predictions.methods)
+        let Some(path) = row.prediction.as_ref().and_then(|name| self.inside(name)) else {
+            return BTreeMap::new();
+        };
+        match PairPredictions::read(&path) {
+            Ok(predictions) => predictions.methods,
+            Err(error) => {
+                let mut unread = self.unread.lock().unwrap_or_else(PoisonError::into_inner);
+                unread.insert(path, error.to_string());
+                BTreeMap::new()
+            }
+        }
     }
 
     /// What the method of `row` answered.

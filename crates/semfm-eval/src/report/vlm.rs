@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::FilterType;
 use semfm::Task;
+use semfm::geom::io::read_file;
 use semfm_show::html::jpeg_data_uri;
 
 use super::ReportSettings;
@@ -108,7 +109,8 @@ fn is_kept(c: char) -> bool {
 
 /// The answer in one view, made small.
 fn overlay(folder: &Path, view: usize, side: u32) -> Option<String> {
-    let picture = image::open(folder.join(format!("answer-T{view}.png"))).ok()?;
+    let bytes = read_file(folder.join(format!("answer-T{view}.png"))).ok()?;
+    let picture = image::load_from_memory(&bytes).ok()?;
     let small = picture.resize(side, side, FilterType::Triangle).to_rgb8();
     jpeg_data_uri(small.as_raw(), small.width(), small.height())
 }

@@ -17,6 +17,8 @@ mod wks;
 use std::fmt;
 use std::str::FromStr;
 
+use semfm_geom::suggestion::unknown_name;
+
 use crate::method::Method;
 use crate::{Error, Result};
 
@@ -70,7 +72,8 @@ impl FromStr for Method {
     fn from_str(text: &str) -> Result<Self> {
         let names = Self::ALL.map(Self::name).join(", ");
         let found = Self::ALL.into_iter().find(|method| method.name() == text);
-        found.map_or_else(|| Error::out_of_range("method", names, text), Ok)
+        let given = || unknown_name(text, Self::ALL.map(Self::name));
+        found.map_or_else(|| Error::out_of_range("method", names, given()), Ok)
     }
 }
 

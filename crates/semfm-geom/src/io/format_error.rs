@@ -33,7 +33,7 @@ impl FormatError {
         found: impl Into<String>,
     ) -> Self {
         Self {
-            path: path.as_ref().to_owned(),
+            path: super::shown_path(path),
             place: place.to_string(),
             expected: expected.into(),
             found: found.into(),

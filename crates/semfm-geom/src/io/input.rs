@@ -2,9 +2,10 @@
 
 use std::fmt::Display;
 use std::fs;
+use std::io::Read;
 use std::path::Path;
 
-use super::FormatError;
+use super::{FormatError, contents, input_files};
 use crate::{Error, Result};
 
 /// A file in memory with its path, so that every complaint can name where it stands.
@@ -38,14 +39,80 @@ impl Input<'_> {
     }
 }
 
-/// Reads a regular file whole: a device or a pipe could go on for ever.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let io = Error::io(path);
-    if !fs::metadata(path).map_err(&io)?.is_file() {
-        let (expected, found) = ("a regular file", "a folder or a device");
-        return Err(FormatError::new(path, "file system", expected, found).into());
+/// Reads a regular file whole. Folders, devices, pipes and sockets are refused before they are
+/// opened: opening one could block, and reading one go on for ever. Every reader of files starts here.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] for what is no regular file and for what only stands for one (a
+/// pointer of Git LFS, the HTML page of a server).
+pub fn read_file(path: impl AsRef<Path>) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    let bytes = read_at_most(path, u64::MAX)?;
+    match contents::stand_in(&bytes) {
+        Some(kind) => Err(FormatError::new(path, "first bytes", "the file itself", kind).into()),
+        None => Ok(bytes),
     }
-    fs::read(path).map_err(io)
+}
+
+/// The first `most` bytes of a regular file, or all where it has less.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Format`] for what is no regular file.
+pub fn read_at_most(path: impl AsRef<Path>, most: u64) -> Result<Vec<u8>> {
+    let path = path.as_ref();
+    let io = Error::io(path);
+    check_regular(path, &fs::metadata(path).map_err(&io)?)?;
+    let file = fs::File::open(path).map_err(&io)?;
+    // Another thing may have taken its place in between.
+    let about = file.metadata().map_err(&io)?;
+    check_regular(path, &about)?;
+    let size = about.len().min(most);
+    let mut bytes = Vec::new();
+    let room = usize::try_from(size).unwrap_or(usize::MAX);
+    bytes.try_reserve_exact(room).map_err(|_| out_of_memory(path, size))?;
+    file.take(most).read_to_end(&mut bytes).map_err(&io)?;
+    input_files::remember_read(path, &about);
+    Ok(bytes)
+}
+
+fn out_of_memory(path: &Path, size: u64) -> Error {
+    let source = std::io::Error::new(
+        std::io::ErrorKind::OutOfMemory,
+        format!("no memory for its {size} bytes"),
+    );
+    Error::io(path)(source)
+}
+
+fn check_regular(path: &Path, about: &fs::Metadata) -> Result<()> {
+    match kind_of_special(about) {
+        None => Ok(()),
+        Some(kind) => Err(FormatError::new(path, "file system", "a regular file", kind).into()),
+    }
+}
+
+/// What is no regular file, in words.
+pub(super) fn kind_of_special(about: &fs::Metadata) -> Option<&'static str> {
+    if about.is_file() {
+        return None;
+    }
+    if about.is_dir() {
+        return Some("a folder");
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = about.file_type();
+        if kind.is_fifo() {
+            return Some("a pipe (write what it holds into a file first)");
+        }
+        if kind.is_socket() {
+            return Some("a socket");
+        }
+        if kind.is_block_device() {
+            return Some("a block device");
+        }
+    }
+    Some("a device")
 }
 
 /// A piece of the file for a message: printable, and short whatever stands there.

@@ -5,14 +5,17 @@ use std::path::Path;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::contents::kind_of;
+use super::input::read_file;
 use super::{FormatError, write_atomically};
-use crate::{Error, Result};
+use crate::Result;
 
-/// Reads a JSON file as a `T`.
+/// Reads a JSON file as a `T`. A byte-order mark before it is no part of it.
 ///
 /// # Errors
-/// [`Error::Io`] where it cannot be read; [`Error::Format`] with the line where it is not JSON or
-/// not a `T`, and with serde's words (field, type, line and column) as what was found.
+/// [`Error::Io`](crate::Error::Io) where it cannot be read; [`Error::Format`](crate::Error::Format) where it is no regular file, with the
+/// line where it is not JSON or not a `T`, and with serde's words (field, type, line and column) as
+/// what was found.
 ///
 /// ```
 /// # let folder = tempfile::tempdir()?;
@@ -24,8 +27,27 @@ use crate::{Error, Result};
 /// ```
 pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    serde_json::from_slice(&bytes).map_err(|error| {
+    let bytes = read_file(path)?;
+    json_of(path, &bytes)
+}
+
+/// As [`read_json`], of bytes that are in memory already; `path` is for messages.
+///
+/// # Errors
+/// [`Error::Format`](crate::Error::Format).
+pub fn json_of<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        let found = "a UTF-16 byte-order mark (save the file as UTF-8)";
+        return Err(FormatError::new(path, "byte 0", "JSON in UTF-8", found).into());
+    }
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    serde_json::from_slice(text).map_err(|error| {
+        if let Some(kind) = kind_of(bytes) {
+            return FormatError::new(path, "first bytes", "JSON", kind).into();
+        }
+        if text.trim_ascii().is_empty() {
+            return FormatError::new(path, "whole file", "JSON", "an empty file").into();
+        }
         let expected = if error.is_data() { "the fields of this format" } else { "JSON" };
         FormatError::new(path, format!("line {}", error.line()), expected, error.to_string()).into()
     })
@@ -34,7 +56,7 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 /// Writes `value` as JSON on one line, whole or not at all.
 ///
 /// # Errors
-/// [`Error::Io`] with the target's path.
+/// [`Error::Io`](crate::Error::Io) with the target's path.
 pub fn write_json(path: impl AsRef<Path>, value: &(impl Serialize + ?Sized)) -> Result<()> {
     write_atomically(path, |out| {
         serde_json::to_writer(&mut *out, value)?;
@@ -45,7 +67,7 @@ pub fn write_json(path: impl AsRef<Path>, value: &(impl Serialize + ?Sized)) -> 
 /// As [`write_json`], indented for people who read the file.
 ///
 /// # Errors
-/// [`Error::Io`] with the target's path.
+/// [`Error::Io`](crate::Error::Io) with the target's path.
 pub fn write_json_pretty(path: impl AsRef<Path>, value: &(impl Serialize + ?Sized)) -> Result<()> {
     write_atomically(path, |out| {
         serde_json::to_writer_pretty(&mut *out, value)?;
@@ -56,6 +78,7 @@ pub fn write_json_pretty(path: impl AsRef<Path>, value: &(impl Serialize + ?Size
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
 
     #[test]
     fn what_is_wrong_is_named_with_its_line() {
@@ -75,5 +98,26 @@ mod tests {
         }
         std::fs::remove_file(&path).unwrap();
         assert_eq!(read_json::<Vec<f64>>(&path).unwrap_err().code(), "io");
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_passed_over_and_other_files_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.json");
+        std::fs::write(&path, b"\xef\xbb\xbf[1.5]").unwrap();
+        assert_eq!(read_json::<Vec<f64>>(&path).unwrap(), [1.5]);
+        for (bytes, word) in [
+            (&b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n"[..], "git lfs pull"),
+            (b"<!DOCTYPE html><html>", "HTML"),
+            (b"\x89PNG\r\n\x1a\n", "PNG"),
+            (b"\xff\xfe[\0", "UTF-16"),
+            (b" \n", "empty"),
+        ] {
+            std::fs::write(&path, bytes).unwrap();
+            let error = read_json::<Vec<f64>>(&path).unwrap_err().to_string();
+            assert!(error.contains("list.json") && error.contains(word), "{error}");
+        }
+        let error = read_json::<Vec<f64>>(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("a regular file") && error.contains("a folder"), "{error}");
     }
 }

@@ -10,6 +10,7 @@ use std::str::FromStr;
 use super::format_row::FormatRow;
 use super::input::{Input, quote};
 use super::{gltf, obj, off, ply, stl};
+use crate::suggestion::unknown_name;
 use crate::{Error, Result};
 
 /// A format that meshes are read from and, mostly, written to.
@@ -88,10 +89,27 @@ impl MeshFormat {
             (Some(format), _) | (None, Some(format)) => Ok(format),
             (None, None) => {
                 let expected = format!("a mesh file: {}", Self::readable_names());
+                if let Some(error) = input.misnamed(&expected, "none of these") {
+                    return Err(error);
+                }
                 let found = quote(&input.bytes[..input.bytes.len().min(16)]);
                 Err(input.error("byte 0", expected, found))
             }
         }
+    }
+
+    /// The error of a file that this format cannot read because it is another, by its first bytes:
+    /// another format of this table, or none. `None` where nothing shows.
+    pub(super) fn misnamed(self, input: Input<'_>) -> Option<Error> {
+        let expected = format!("a mesh in the format {self}, as the name says");
+        input.misnamed(&expected, self.name()).or_else(|| {
+            let shown = Self::from_content(input.bytes).filter(|shown| *shown != self)?;
+            let found = match shown.name() {
+                "gltf" => "JSON".to_owned(), // any: only its reader knows whether it is a mesh
+                name => format!("a mesh in the format {name}: name the file accordingly"),
+            };
+            Some(input.error("first bytes", expected, found))
+        })
     }
 
     pub(super) fn row(self) -> &'static FormatRow {
@@ -106,7 +124,8 @@ impl FromStr for MeshFormat {
     /// [`Error::OutOfRange`] for another name.
     fn from_str(text: &str) -> Result<Self> {
         Self::ALL.iter().copied().find(|format| format.name() == text).ok_or_else(|| {
-            let (expected, found) = (Self::readable_names(), format!("`{text}`"));
+            let names = Self::ALL.iter().map(|format| format.name());
+            let (expected, found) = (Self::readable_names(), unknown_name(text, names));
             Error::OutOfRange { what: "mesh format", expected, found }
         })
     }

@@ -12,11 +12,13 @@
 pub mod appearance;
 mod atomic;
 mod blocks;
+mod contents;
 mod format_error;
 mod format_row;
 mod gltf;
 mod image;
 mod input;
+mod input_files;
 mod json;
 mod mesh_format;
 mod obj;
@@ -24,7 +26,11 @@ mod off;
 mod pcd;
 mod ply;
 mod polygon;
+mod printable;
+mod staged_folder;
 mod stl;
+mod target;
+mod temporary;
 mod text;
 mod vertex_attributes;
 mod write;
@@ -33,11 +39,18 @@ use std::path::Path;
 
 pub use self::appearance::{Appearance, Material};
 pub use self::atomic::{replace_atomically, write_atomically};
+pub use self::contents::foreign_kind;
 pub use self::format_error::FormatError;
 pub use self::image::{Texture, Wrap};
-use self::input::{Input, read_file};
-pub use self::json::{read_json, write_json, write_json_pretty};
+use self::input::Input;
+pub use self::input::{read_at_most, read_file};
+pub use self::input_files::{is_same_file, refuse_input, refuse_to_overwrite};
+pub use self::json::{json_of, read_json, write_json, write_json_pretty};
 pub use self::mesh_format::MeshFormat;
+pub use self::printable::{printable, printable_name};
+pub use self::staged_folder::{StagedFolder, shown_path};
+pub use self::target::{check_output, is_stdout};
+pub use self::temporary::TEMPORARY_PREFIX;
 pub use self::vertex_attributes::VertexAttributes;
 pub use self::write::{write_mesh, write_mesh_with_attributes};
 use crate::math::DVec3;
@@ -82,14 +95,18 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<MeshFile> {
 }
 
 fn mesh_of(input: Input<'_>, format: MeshFormat) -> Result<MeshFile> {
-    let parts = (format.row().read)(input)?;
-    let mesh = Mesh::new(parts.vertices, parts.faces).map_err(|cause| input.wrap(cause))?;
-    Ok(MeshFile { mesh, n_faces: parts.n_faces, appearance: parts.appearance, format })
+    let read = |input: Input<'_>| {
+        let parts = (format.row().read)(input)?;
+        let mesh = Mesh::new(parts.vertices, parts.faces).map_err(|cause| input.wrap(cause))?;
+        Ok(MeshFile { mesh, n_faces: parts.n_faces, appearance: parts.appearance, format })
+    };
+    read(input).map_err(|error| format.misnamed(input).unwrap_or(error))
 }
 
 /// Reads the vertices of a file as points: a file without faces is fine here. PLY, OBJ and OFF give
 /// all their vertices; of the other formats the mesh is read. PCD files (ascii, binary, compressed) hold
-/// nothing but points; those marked as no return (NaN) are left out.
+/// nothing but points. A point with a coordinate that is no number (NaN) is where a camera saw nothing: it
+/// is left out, in every format.
 ///
 /// # Errors
 /// As [`read_mesh`]; [`Error::InFile`] for a file without a point or with one that is not finite.
@@ -130,7 +147,13 @@ pub fn read_mesh_or_points(path: impl AsRef<Path>) -> Result<MeshOrPoints> {
 }
 
 fn points_of(input: Input<'_>) -> Result<PointCloud> {
-    let cloud = if pcd::is_pcd(input) { pcd::read_points(input)? } else { vertices_of(input)? };
+    let cloud = if pcd::is_pcd(input) {
+        let named = |error| input.misnamed("a point cloud (.pcd)", "pcd").unwrap_or(error);
+        pcd::read_points(input).map_err(named)?
+    } else {
+        vertices_of(input)?
+    };
+    let cloud = without_nan(cloud);
     if cloud.points.is_empty() {
         return Err(input.error("whole file", "at least one point", "none"));
     }
@@ -141,10 +164,28 @@ fn points_of(input: Input<'_>) -> Result<PointCloud> {
     Ok(cloud)
 }
 
+/// The points of which every coordinate is a number, with their colours.
+fn without_nan(mut cloud: PointCloud) -> PointCloud {
+    let is_seen: Vec<bool> = cloud.points.iter().map(|p| !p.is_nan()).collect();
+    if is_seen.contains(&false) {
+        let mut keep = is_seen.iter();
+        cloud.points.retain(|_| keep.next().is_some_and(|seen| *seen));
+        if let Some(colors) = &mut cloud.colors {
+            let mut keep = is_seen.iter();
+            colors.retain(|_| keep.next().is_some_and(|seen| *seen));
+        }
+    }
+    cloud
+}
+
 fn vertices_of(input: Input<'_>) -> Result<PointCloud> {
     let format = MeshFormat::of(input)?;
     if let Some(read_points) = format.row().read_points {
-        return read_points(input);
+        let cloud = read_points(input).and_then(|cloud| match cloud.points.is_empty() {
+            true => Err(input.error("whole file", "at least one point", "none")),
+            false => Ok(cloud),
+        });
+        return cloud.map_err(|error| format.misnamed(input).unwrap_or(error));
     }
     let file = mesh_of(input, format)?;
     Ok(PointCloud { points: file.mesh.vertices().to_vec(), colors: file.appearance.vertex_colors })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::vertex_attributes::refused;
-use super::{MeshFormat, VertexAttributes, write_atomically};
+use super::{MeshFormat, VertexAttributes, refuse_input, write_atomically};
 use crate::{Mesh, Result};
 
 /// Writes a mesh in the format that the extension names, one of [`MeshFormat::writable_names`].
@@ -13,7 +13,8 @@ use crate::{Mesh, Result};
 ///
 /// # Errors
 /// [`Error::OutOfRange`](crate::Error::OutOfRange) for another extension or for coordinates that the format cannot hold;
-/// [`Error::Io`](crate::Error::Io).
+/// [`Error::Format`](crate::Error::Format) for a file that was read as an input
+/// ([`refuse_input`]); [`Error::Io`](crate::Error::Io).
 pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     write_mesh_with_attributes(path, mesh, &VertexAttributes::default())
 }
@@ -42,6 +43,7 @@ pub fn write_mesh_with_attributes(
     if writer.is_single_precision {
         check_single_precision(mesh)?;
     }
+    refuse_input(path)?;
     write_atomically(path, |out| (writer.write)(out, mesh, attributes))
 }
 

@@ -1,15 +1,16 @@
 //! A URDF file as it was found: sound in itself, perhaps not yet a tree.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
+
+use semfm_geom::io::{foreign_kind, read_at_most};
 
 use super::check::{self, Findings};
 use super::fault::{Fault, short};
 use super::mesh_paths::{MeshPaths, MeshPlace};
 use super::xml::{MAX_BYTES, XmlElements};
 use super::{schema, tree};
+use crate::Result;
 use crate::robot::Robot;
-use crate::{Error, Result};
 
 /// A robot description that passed the checks of its text, numbers and references.
 #[derive(Clone, Debug)]
@@ -35,26 +36,20 @@ impl RobotDescription {
     /// Reads a URDF file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Urdf`] with code, line and element where the file is too large, is
+    /// [`Error::Geom`](crate::Error::Geom) where it cannot be read or is no regular file; [`Error::Urdf`](crate::Error::Urdf) with code, line and element where the file is too large, is
     /// not plain XML in UTF-8, is not a URDF (SDF, xacro source), holds a number that is not
     /// finite, a negative size or mass, an inverted limit, an axis without direction, a name that
     /// occurs twice among joints, a joint into a link that is not there, a cycle, a mimic of
     /// nothing or of itself, or several unconnected robots.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = read_limited(path)
-            .map_err(|source| Error::Io { path: path.to_owned(), source })?
-            .ok_or_else(|| {
-                let found = "a folder or a device";
-                Fault::new("io", "file system", "a regular file", found).in_file(path)
-            })?;
-        Self::parse(&bytes, path)
+        Self::parse(&read_at_most(path, MAX_BYTES + 1)?, path)
     }
 
     /// Reads the bytes of a URDF; `path` names it in messages and is where relative meshes start.
     ///
     /// # Errors
-    /// [`Error::Urdf`], see [`RobotDescription::read`].
+    /// [`Error::Urdf`](crate::Error::Urdf), see [`RobotDescription::read`].
     pub fn parse(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let Parsed { robot, findings, notes } =
@@ -107,7 +102,7 @@ impl RobotDescription {
     /// Every mesh that a visual or collision names, each name once for a link.
     ///
     /// # Errors
-    /// [`Error::Urdf`] where a name leads out of the folders that are allowed or has another
+    /// [`Error::Urdf`](crate::Error::Urdf) where a name leads out of the folders that are allowed or has another
     /// protocol.
     pub fn meshes(&self, paths: &MeshPaths) -> Result<Vec<MeshUse>> {
         let mut uses: Vec<MeshUse> = Vec::new();
@@ -132,7 +127,7 @@ impl RobotDescription {
     /// The kinematic tree.
     ///
     /// # Errors
-    /// [`Error::Urdf`] with the first of [`RobotDescription::tree_findings`]: a fragment is no tree.
+    /// [`Error::Urdf`](crate::Error::Urdf) with the first of [`RobotDescription::tree_findings`]: a fragment is no tree.
     pub fn tree(&self) -> Result<Robot> {
         if let Some(finding) = self.findings.tree.first() {
             let fault = Fault::new("tree", "robot", "one tree of links", finding);
@@ -140,17 +135,6 @@ impl RobotDescription {
         }
         tree::build(&self.robot).map_err(|fault| fault.in_file(&self.path))
     }
-}
-
-/// A file's bytes, one more than allowed at most; `None` for what is no regular file.
-fn read_limited(path: &Path) -> std::io::Result<Option<Vec<u8>>> {
-    let file = std::fs::File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Ok(None);
-    }
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
-    Ok(Some(bytes))
 }
 
 /// What the checks left of a description.
@@ -164,6 +148,9 @@ fn parse(bytes: &[u8]) -> std::result::Result<Parsed, Fault> {
     if bytes.len() as u64 > MAX_BYTES {
         let expected = format!("at most {} MB", MAX_BYTES >> 20);
         return Err(Fault::new("size", "whole file", expected, "more"));
+    }
+    if let Some(kind) = foreign_kind(bytes).filter(|kind| *kind != "XML") {
+        return Err(Fault::new("urdf", "first bytes", "a URDF", kind));
     }
     let elements = XmlElements::read(bytes)?;
     let mut notes = check::before(&elements)?;

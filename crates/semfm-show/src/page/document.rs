@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use semfm::Verdict;
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{refuse_input, write_atomically};
 
 use super::data::PageData;
 use super::group::Group;
@@ -26,6 +26,7 @@ const VIEWER: [&str; 4] = [
 /// [`Error::Semfm`](crate::Error::Semfm) where the file cannot be written.
 pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
     groups.iter().try_for_each(Group::check)?;
+    refuse_input(path)?;
     let script = format!("\"use strict\";\n{}", VIEWER.concat());
     let page = fill(
         include_str!("viewer/page.html"),

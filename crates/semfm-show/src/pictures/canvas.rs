@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use semfm::geom::io::write_atomically;
+use semfm::geom::io::{refuse_input, write_atomically};
 
 use crate::Result;
 
@@ -82,6 +82,7 @@ impl Canvas {
     /// [`semfm::geom::Error::Io`].
     pub(super) fn write_png(&self, path: &Path) -> Result<()> {
         let (width, height) = (self.width as u32, self.height as u32);
+        refuse_input(path)?;
         write_atomically(path, |out| {
             // Time counts more than size: most pictures are looked at once.
             PngEncoder::new_with_quality(out, CompressionType::Fast, FilterType::Up)

@@ -12,6 +12,7 @@ use super::contents::Schema;
 use super::metadata::METADATA_NAME;
 use super::writer::{ChunkCompression, write_mcap};
 use crate::Result;
+use semfm_geom::io::refuse_input;
 use semfm_geom::math::{DQuat, DVec3};
 
 /// Topic of the poses.
@@ -59,6 +60,7 @@ pub fn write_pose_array(
     format: &str,
     metadata: &serde_json::Value,
 ) -> Result<()> {
+    refuse_input(path)?;
     write_mcap(path, "ros2", ChunkCompression::Lz4, |file| {
         let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
         file.metadata(METADATA_NAME, BTreeMap::from(entries.map(|(k, v)| (k.to_owned(), v))))?;

@@ -20,13 +20,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use semfm_geom::io::{foreign_kind, read_file};
+
 use super::contents::{Attachment, Channel, Contents, MetadataRecord, TimeRange};
 use super::decompress::decompress;
 use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
 use super::message_index::ChunkMessages;
 use super::record::{MAGIC, Place, Record, Records, check_crc, opcode};
 use super::summary;
-use crate::{Error, Fault, Result};
+use crate::{Fault, Result};
 
 /// A message as it is handed to the visitor of [`read_messages`].
 #[derive(Clone, Copy, Debug)]
@@ -52,13 +54,13 @@ pub struct Message<'a> {
 /// only when this returns `Ok`.
 ///
 /// # Errors
-/// [`Error::Io`], [`Error::Container`] with the record at fault, or whatever `visit` returns.
+/// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is no regular file, [`Error::Container`](crate::Error::Container) with the
+/// record at fault, or whatever `visit` returns.
 pub fn read_messages(
     path: &Path,
     visit: impl FnMut(Message<'_>) -> Result<()>,
 ) -> Result<Contents> {
-    let bytes =
-        std::fs::read(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    let bytes = read_file(path)?;
     read_bytes(path, &bytes, visit)
 }
 
@@ -98,7 +100,10 @@ fn between_magics<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
     if !bytes.starts_with(MAGIC) {
         return Err(match MAGIC.starts_with(bytes) {
             true => start.error(Fault::Truncated, MAGIC_BYTES, "only the first of them"),
-            false => start.error(Fault::Magic, MAGIC_BYTES, "other bytes: this is no MCAP file"),
+            false => {
+                let found = foreign_kind(bytes).unwrap_or("other bytes: this is no MCAP file");
+                start.error(Fault::Magic, MAGIC_BYTES, found)
+            }
         });
     }
     match bytes[MAGIC.len()..].strip_suffix(MAGIC) {

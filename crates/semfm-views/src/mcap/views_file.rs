@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use foxglove::messages::{CompressedImage, RawImage};
+use semfm_geom::io::refuse_input;
 use semfm_geom::{Mesh, Pinhole};
 
 use super::cameras::{Cameras, check_camera};
@@ -33,7 +34,8 @@ pub struct ViewsFile {
 /// # Errors
 /// [`Error::OtherMesh`] where the metadata name another mesh, [`Error::Invalid`] for a view whose
 /// arrays do not have the size of its camera or that names a triangle the mesh has not,
-/// [`Error::Io`].
+/// [`Error::Io`]; [`Error::Geom`] for a file that was read as an input
+/// ([`refuse_input`]).
 pub fn write_views<V: Borrow<View>>(
     path: &Path,
     views: &[V],
@@ -41,6 +43,7 @@ pub fn write_views<V: Borrow<View>>(
     colors: Option<&[[u8; 3]]>,
     metadata: &ViewsMetadata,
 ) -> Result<()> {
+    refuse_input(path)?;
     metadata.check_mesh(mesh, path)?;
     if views.is_empty() {
         return Err(Error::invalid("views", "at least one", "none"));

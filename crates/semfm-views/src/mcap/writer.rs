@@ -6,7 +6,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use foxglove::Encode;
-use semfm_geom::io::replace_atomically;
+use semfm_geom::io::{replace_atomically, shown_path};
 
 use super::contents::Schema;
 use crate::{Error, Result};
@@ -154,5 +154,5 @@ fn failure(path: &Path, error: mcap::McapError) -> Error {
 }
 
 fn io_error(path: &Path, source: std::io::Error) -> Error {
-    Error::Io { path: path.to_path_buf(), source }
+    Error::Io { path: shown_path(path), source }
 }

@@ -7,7 +7,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use semfm_geom::io::write_atomically;
+use semfm_geom::io::{refuse_input, write_atomically};
 use semfm_robot::JointPosition;
 
 use crate::Result;
@@ -19,6 +19,7 @@ use crate::grasp_result::{GraspResult, position_and_rotation};
 /// [`semfm_geom::Error::Io`] where the file cannot be written.
 pub fn write_isaac_grasps(path: &Path, result: &GraspResult<'_>) -> Result<()> {
     let text = isaac_yaml(result);
+    refuse_input(path)?;
     Ok(write_atomically(path, |out| out.write_all(text.as_bytes()))?)
 }
 

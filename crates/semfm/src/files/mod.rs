@@ -39,6 +39,7 @@ mod vertex_features;
 
 use std::path::Path;
 
+use semfm_geom::io::refuse_input;
 use serde::Serialize;
 
 pub use aligned::{AlignSettingsRecord, AlignedFile, AlignedPose, read_aligned, read_pose};
@@ -58,7 +59,8 @@ pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region}
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
 pub use transfer_folder::{
-    AnchorRanks, ObjectAnchors, TransferResult, write_answer, write_transfer,
+    ANSWERS as TRANSFER_ANSWERS, AnchorRanks, FILES as TRANSFER_FILES, ObjectAnchors,
+    TransferResult, put_transfer, write_answer, write_transfer,
 };
 pub use transfer_report::{
     CloudRecord, ObjectRecord, Provenance, Seeds, TransferInputs, TransferReportFile, stages_ms,
@@ -74,7 +76,8 @@ pub(crate) fn to_json(value: &impl Serialize) -> serde_json::Value {
     serde_json::to_value(value).expect("the keys of what is written here are text")
 }
 
-/// Writes [`to_json`], whole or not at all.
+/// Writes [`to_json`], whole or not at all. A file that was read as an input is not replaced.
 fn write_json(path: &Path, file: &impl Serialize) -> crate::Result<()> {
+    refuse_input(path)?;
     Ok(semfm_geom::io::write_json(path, &to_json(file))?)
 }

@@ -68,6 +68,12 @@ impl RegionFile {
         }
     }
 
+    /// Whether the file names `mesh` by its hash.
+    pub fn names(&self, mesh: &Mesh) -> bool {
+        let hash = self.mesh.as_ref().and_then(|identity| identity.hash.as_deref());
+        hash == Some(&*mesh.hash().to_string())
+    }
+
     /// The region, on the mesh that it belongs to. `path` is named in errors.
     ///
     /// # Errors

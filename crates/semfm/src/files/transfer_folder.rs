@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use semfm_fmap::{Anchor, PreparedObject};
-use semfm_geom::io::{VertexAttributes, write_mesh_with_attributes};
+use semfm_geom::io::{StagedFolder, VertexAttributes, write_mesh_with_attributes};
 use semfm_geom::{Mesh, Task};
 
 use super::point_map::{FORMAT as POINT_MAP_FORMAT, PointMapFile};
@@ -102,42 +102,82 @@ pub struct ObjectAnchors {
     pub of_vertex: Vec<i64>,
 }
 
+/// The files that say what came out, with a verdict: they are put into the folder of a transfer last,
+/// so that nothing there has a verdict unless everything is there.
+pub const ANSWERS: &[&str] = &["report.json", "region.json"];
+
+/// Every file that the folder of a transfer can have, with pictures and grasps.
+pub const FILES: &[&str] = &[
+    "region.json",
+    "report.json",
+    "point_map.json",
+    "source.ply",
+    "target.ply",
+    "target.glb",
+    "transfer.png",
+    "features.png",
+    "transfer.mcap",
+    "grasps.json",
+    "grasps.png",
+];
+
 /// Writes a transfer into `folder`, which is made if it is not there: `region.json`, `report.json`,
-/// `point_map.json`, `source.ply`, `target.ply` and `target.glb`. Each file is written whole or not
-/// at all. Returns the paths.
+/// `point_map.json`, `source.ply`, `target.ply` and `target.glb`. The folder has all of them or, where
+/// something fails, what it had before. What an earlier transfer left besides is
+/// removed. Returns the paths.
 ///
 /// # Errors
-/// [`semfm_geom::Error::Io`] for the first file that cannot be written; those of
-/// [`TransferResult::anchor_ranks`].
+/// [`semfm_geom::Error::Io`] for the first file that cannot be written; [`semfm_geom::Error::Format`]
+/// where one would replace a file that was read as an input ([`semfm_geom::io::refuse_input`]); those
+/// of [`TransferResult::anchor_ranks`].
 pub fn write_transfer(
     folder: &Path,
     result: &TransferResult<'_>,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
-    let mut files = write_answer(folder, result)?;
+    let staged = StagedFolder::new(folder)?;
+    answer_files(staged.path(), result)?;
+    data_files(staged.path(), result, task)?;
+    put_transfer(staged)
+}
+
+/// Writes only the answer of a transfer into `folder`, which is made if it is not there:
+/// `region.json` and `report.json`; what an earlier transfer left besides is removed. Returns the
+/// paths.
+///
+/// # Errors
+/// As [`write_transfer`].
+pub fn write_answer(folder: &Path, result: &TransferResult<'_>) -> Result<Vec<PathBuf>> {
+    let staged = StagedFolder::new(folder)?;
+    answer_files(staged.path(), result)?;
+    put_transfer(staged)
+}
+
+/// Puts the files of a transfer that were written into a temporary folder in their places. Those of
+/// [`FILES`] that are not among them are removed: they are of an earlier transfer.
+///
+/// # Errors
+/// As [`StagedFolder::put`].
+pub fn put_transfer(staged: StagedFolder) -> Result<Vec<PathBuf>> {
+    let gone: Vec<&str> =
+        FILES.iter().copied().filter(|name| !staged.path().join(name).exists()).collect();
+    Ok(staged.put(ANSWERS, &gone)?)
+}
+
+fn answer_files(folder: &Path, result: &TransferResult<'_>) -> Result<()> {
+    let [region, report] = ["region.json", "report.json"].map(|name| folder.join(name));
+    TransferredRegionFile::new(result.transfer, result.target_mesh()).write(&region)?;
+    result.report().write(&report)
+}
+
+fn data_files(folder: &Path, result: &TransferResult<'_>, task: &Task) -> Result<()> {
     let (source, target) = (result.source_mesh(), result.target_mesh());
     let names = ["point_map.json", "source.ply", "target.ply", "target.glb"];
     let [point_map, source_ply, target_ply, target_glb] = names.map(|name| folder.join(name));
     point_map_file(result, &result.anchor_ranks(task)?).write(&point_map)?;
     write_weighted(&source_ply, source, result.region.weights())?;
     write_weighted(&target_ply, target, result.transfer.weights())?;
-    write_weighted(&target_glb, target, result.transfer.weights())?;
-    files.extend([point_map, source_ply, target_ply, target_glb]);
-    Ok(files)
-}
-
-/// Writes only the answer of a transfer into `folder`, which is made if it is not there:
-/// `region.json` and `report.json`. Returns the paths.
-///
-/// # Errors
-/// [`semfm_geom::Error::Io`] for the first file that cannot be written.
-pub fn write_answer(folder: &Path, result: &TransferResult<'_>) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder)
-        .map_err(|source| semfm_geom::Error::Io { path: folder.to_owned(), source })?;
-    let [region, report] = ["region.json", "report.json"].map(|name| folder.join(name));
-    TransferredRegionFile::new(result.transfer, result.target_mesh()).write(&region)?;
-    result.report().write(&report)?;
-    Ok(vec![region, report])
+    write_weighted(&target_glb, target, result.transfer.weights())
 }
 
 fn point_map_file(result: &TransferResult<'_>, ranks: &AnchorRanks) -> PointMapFile {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use npyz::{NpyFile, Order};
 use semfm_geom::Mesh;
-use semfm_geom::io::FormatError;
+use semfm_geom::io::{FormatError, foreign_kind, read_file};
 
 use crate::Result;
 
@@ -15,8 +15,7 @@ use crate::Result;
 /// [`semfm_geom::Error::Io`] where the file cannot be read; [`Error::Format`](crate::Error::Format)
 /// for another shape or type, missing values or values that are not finite.
 pub fn read_vertex_features(path: &Path, mesh: &Mesh) -> Result<Vec<f32>> {
-    let bytes = std::fs::read(path)
-        .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
+    let bytes = read_file(path)?;
     let array = open(path, &bytes)?;
     let by_columns = array.order() == Order::Fortran;
     let n = mesh.n_vertices();
@@ -37,7 +36,8 @@ pub fn read_vertex_features(path: &Path, mesh: &Mesh) -> Result<Vec<f32>> {
 
 fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>> {
     NpyFile::new(bytes).map_err(|error| {
-        FormatError::new(path, "header", "a NumPy array", error.to_string()).into()
+        let found = foreign_kind(bytes).map_or_else(|| error.to_string(), Into::into);
+        FormatError::new(path, "header", "a NumPy array", found).into()
     })
 }
 

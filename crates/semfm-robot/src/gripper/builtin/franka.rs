@@ -14,6 +14,7 @@ pub(super) const FRANKA_HAND: BuiltinGripper = BuiltinGripper {
     summary: "Franka Hand of Panda and FR3, 80 mm",
     source: "product manual and flange drawing: stroke 80 mm, hand 204 × 63 mm, fingertips at 112 mm \
              and TCP at 103.4 mm above the flange, hand turned by −45° on it",
+    also_called: &["panda", "panda hand", "fr3", "fer", "emika", "franka hand"],
     known_by: &["pandahand", "fr3hand", "ferhand", "frankahand"],
     make: franka_hand,
 };

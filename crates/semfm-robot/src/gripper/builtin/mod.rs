@@ -10,6 +10,7 @@ mod robotiq;
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::SharedShape;
 use semfm_geom::math::DVec3;
+use semfm_geom::suggestion::closest_name;
 
 use super::Gripper;
 use crate::{Error, Result};
@@ -24,6 +25,8 @@ pub struct BuiltinGripper {
     pub summary: &'static str,
     /// Where its dimensions come from.
     pub source: &'static str,
+    /// Other words that people call it by: for the message about a name that is not known.
+    pub(crate) also_called: &'static [&'static str],
     /// Words that tell it in the names of a robot description, in lower case without `_` and `-`.
     pub(crate) known_by: &'static [&'static str],
     pub(crate) make: fn(&Self) -> Result<Gripper>,
@@ -56,6 +59,15 @@ impl BuiltinGripper {
             .find(|gripper| gripper.known_by.iter().any(|word| plain.contains(word)))
     }
 
+    /// The one that was probably meant by a name that is none.
+    fn closest(name: &str) -> Option<&'static Self> {
+        let names = BUILTIN_GRIPPERS
+            .iter()
+            .flat_map(|g| [g.name].into_iter().chain(g.also_called.iter().copied()));
+        let found = closest_name(name, names)?;
+        BUILTIN_GRIPPERS.iter().find(|g| g.name == found || g.also_called.contains(&found))
+    }
+
     /// The gripper itself.
     ///
     /// # Errors
@@ -75,7 +87,10 @@ impl Gripper {
             Some(gripper) => gripper.gripper(),
             None => {
                 let known = BuiltinGripper::names();
-                Err(Error::UnknownGripper { name: name.into(), known })
+                let meant = BuiltinGripper::closest(name);
+                let meant =
+                    meant.map_or_else(String::new, |m| format!("; did you mean `{}`?", m.name));
+                Err(Error::UnknownGripper { name: name.into(), known, meant })
             }
         }
     }
@@ -110,7 +125,14 @@ mod tests {
 
     #[test]
     fn an_unknown_name_is_told_the_known_ones() {
+        for name in ["panda", "Panda-Hand", "frnka", "fr3", "emika"] {
+            let error = Gripper::builtin(name).unwrap_err().to_string();
+            assert!(error.contains("did you mean `franka`"), "{error}");
+        }
+        let error = Gripper::builtin("2f-140").unwrap_err().to_string();
+        assert!(error.contains("did you mean `robotiq-2f140`"), "{error}");
         let error = Gripper::builtin("barrett").unwrap_err().to_string();
+        assert!(!error.contains("did you mean"), "{error}");
         assert!(BUILTIN_GRIPPERS.iter().all(|row| error.contains(row.name)), "{error}");
     }
 

@@ -12,6 +12,7 @@ pub(super) const ROBOTIQ_2F85: BuiltinGripper = BuiltinGripper {
     name: "robotiq-2f85",
     summary: "Robotiq 2F-85, 85 mm",
     source: SOURCE,
+    also_called: &["2f85", "robotiq", "85"],
     known_by: &["2f85"],
     make: |row| DIMENSIONS_2F85.gripper(row.name),
 };
@@ -20,6 +21,7 @@ pub(super) const ROBOTIQ_2F140: BuiltinGripper = BuiltinGripper {
     name: "robotiq-2f140",
     summary: "Robotiq 2F-140, 140 mm",
     source: SOURCE,
+    also_called: &["2f140", "140"],
     known_by: &["2f140"],
     make: |row| DIMENSIONS_2F140.gripper(row.name),
 };
