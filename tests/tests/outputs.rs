@@ -410,6 +410,18 @@ fn names_that_are_nearly_right_are_answered_by_the_right_ones() {
 }
 
 #[test]
+fn a_region_that_is_too_small_for_a_pad_is_told_so() {
+    let (folder, sample) = sample();
+    let (mesh, out) = (text(&sample.source), text(&folder.path().join("g.json")));
+    let one = folder.path().join("one.json");
+    fs::write(&one, r#"{"vertices": [60]}"#).unwrap();
+    let words = ["grasp", &mesh, "--gripper", "franka", "--metres", "-o", &out, "--region"];
+    let told = run(&[&words[..], &[&text(&one)]].concat());
+    assert_eq!(told.code, Some(1), "{told:?}");
+    assert!(told.err.contains("region of 1 vertices covers"), "{}", told.err);
+}
+
+#[test]
 fn a_size_that_cannot_be_is_asked_about() {
     let (folder, sample) = sample();
     let at = |name: &str| folder.path().join(name);

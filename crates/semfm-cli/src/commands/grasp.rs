@@ -168,6 +168,10 @@ impl GraspCommand {
         } else {
             print_grasps(&found, common);
         }
+        if found.grasps.is_empty() && !common.quiet {
+            let reason = small_region(&problem, region.weights())?;
+            reason.iter().for_each(console::message);
+        }
         output.finish(common)?;
         if !common.json {
             self.picture.iter().for_each(|picture| console::data(picture.display()));
@@ -252,6 +256,23 @@ impl MetricOptions {
             ),
         }
     }
+}
+
+/// Of its own size a region can be too small for grasps: said where none was found.
+fn small_region(problem: &GraspProblem, weights: &[f64]) -> Result<Option<String>> {
+    let areas = problem.mesh_in_metres()?.vertex_areas();
+    let area: f64 = areas.iter().zip(weights).map(|(area, weight)| area * weight).sum();
+    let [x, z] = problem.gripper().pad;
+    let needed = problem.settings().limits.pad_in_region * x * z;
+    let n = weights.iter().filter(|&&weight| weight > 0.0).count();
+    Ok((area < needed).then(|| {
+        format!(
+            "the region of {n} vertices covers {:.1} mm², but each pad must lie on it with {:.1} mm²: \
+             mark more of the object, or lower --pad-in-region",
+            1e6 * area,
+            1e6 * needed
+        )
+    }))
 }
 
 /// Writes `grasps.json` with the settings of the search.

@@ -12,7 +12,7 @@ use super::link_shape::{ConvexPiece, LinkShape, inertia_box};
 use super::{DriveJoint, Gripper, GripperPart, Motion, Role};
 use crate::robot::Robot;
 use crate::urdf::{MeshPaths, RobotDescription};
-use crate::{Error, Result};
+use crate::{Error, JointKind, Result};
 
 /// Samples of the drive between closed and open: see [`Motion`].
 const N_STEPS: usize = 65;
@@ -172,7 +172,8 @@ impl Loader<'_> {
         let found = FingerPair::find(self.robot, shapes, only);
         let Some(best) = found.first() else {
             let expected = "two fingers with flat pads that stay parallel and close on each other";
-            return Err(self.no_gripper(expected, "no such pair"));
+            let found = format!("no such pair{}", self.joints_without_range());
+            return Err(self.no_gripper(expected, found));
         };
         let palm = self.robot.body_of(best.palm);
         if let Some(other) = found.iter().find(|pair| self.robot.body_of(pair.palm) != palm) {
@@ -182,6 +183,28 @@ impl Loader<'_> {
             return Err(self.no_gripper("one pair of fingers, or to be told which", found));
         }
         Ok(best.clone())
+    }
+
+    /// The joints that could drive fingers and lack limits, or have equal ones, in words; empty
+    /// without any.
+    fn joints_without_range(&self) -> String {
+        let names: Vec<String> = self
+            .robot
+            .joints
+            .iter()
+            .filter(|joint| {
+                let may_drive = matches!(joint.kind, JointKind::Prismatic | JointKind::Revolute);
+                let has_range = joint.limits.position.is_some_and(|[low, high]| low < high);
+                may_drive && joint.mimic.is_none() && !has_range
+            })
+            .map(|joint| format!("`{}`", joint.name))
+            .take(4)
+            .collect();
+        if names.is_empty() {
+            return String::new();
+        }
+        let names = names.join(", ");
+        format!("; {names}: no range of motion (`<limit lower=… upper=…>`), which a drive needs")
     }
 
     fn gripper(&self, fingers: &FingerPair, shapes: &[LinkShape]) -> Result<Gripper> {
