@@ -140,6 +140,9 @@ impl FileState {
 }
 
 fn hash_of(path: &Path) -> std::io::Result<blake3::Hash> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("expected a regular file"));
+    }
     let mut file = std::fs::File::open(path)?;
     let (mut hasher, mut block) = (blake3::Hasher::new(), vec![0; BLOCK]);
     loop {

@@ -44,7 +44,7 @@ impl NetEncoder {
             let expected = format!("at most {MAX_FILE} bytes");
             return Err(FormatError::new(path, "size", expected, n_bytes.to_string()).into());
         }
-        Self::parse(path, &std::fs::read(path).map_err(io_error)?)
+        Self::parse(path, &semfm_geom::io::read_file(path)?)
     }
 
     /// The same from a file's bytes; `path` names it in errors.
