@@ -6,17 +6,11 @@ import semfm
 
 
 def main() -> None:
-    # Two procedural tools stand in for scanned ones, with simulated embeddings of their views; a
-    # real object takes `semfm.Mesh.read("mug.obj")` and the file that `semfm-embed` wrote.
+    # Two procedural tools stand in for scanned ones: a real object is `semfm.Mesh.read("mug.obj")`.
+    # The built-in encoder makes the features; `encoder=` names another.
     hammer = semfm.demo_object("tools", instance=0, n_vertices=1500)
     pickaxe = semfm.demo_object("tools", instance=1, n_vertices=1500)
-    result = semfm.transfer(
-        hammer.mesh,
-        pickaxe.mesh,
-        hammer.region,
-        source_embeddings=hammer.embeddings("easy"),
-        target_embeddings=pickaxe.embeddings("easy"),
-    )
+    result = semfm.transfer(hammer.mesh, pickaxe.mesh, hammer.region)
     print(f"{result.verdict} with confidence {result.confidence:.2f}")
     print(f"IoU with the true grip: {result.region.iou(pickaxe.region):.2f}")
 

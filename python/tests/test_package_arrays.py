@@ -147,10 +147,14 @@ def test_other_arguments_are_refused_by_name():
         (lambda: semfm.HeatGeodesics(mesh).distances([7]), ValueError, ["source vertex", "7"]),
         (lambda: semfm.TransferSettings("best"), ValueError, ["method", "fused"]),
         (lambda: semfm.TransferSettings(zoomout={"k": 3}), TypeError, ["zoomout.k", "k_final"]),
-        (lambda: semfm.prepare(mesh), ValueError, ["features", "none"]),
+        (lambda: semfm.prepare(mesh, encoder=""), ValueError, ["encoder", "builtin"]),
         (lambda: semfm.prepare(mesh, features=np.zeros((3, 2))), ValueError, ["(4, d)", "(3, 2)"]),
         (lambda: semfm.Pinhole.with_pixel_centres_at_half(4, 4, 1, 1, 0, 0, -np.eye(4)), ValueError, ["last row"]),
-        (lambda: semfm.transfer(mesh, mesh, "grip"), ValueError, ["source_features", "none"]),
+        (
+            lambda: semfm.transfer(mesh, mesh, "grip", encoder="builtin", source_features=[[1]]),
+            ValueError,
+            ["encoder", "several"],
+        ),
     ]:
         with pytest.raises(error) as caught:
             call()

@@ -98,9 +98,9 @@ fn prepare_both(
 ///
 /// Parameters
 /// ----------
-/// source : mesh_like, MeshFile or PreparedObject
+/// source : mesh_like or MeshFile or PreparedObject
 ///     The demonstrated object.
-/// target : mesh_like, MeshFile or PreparedObject
+/// target : mesh_like or MeshFile or PreparedObject
 ///     The one to act on.
 /// region : Region or path
 ///     Where the demonstration touched the source.
