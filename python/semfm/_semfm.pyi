@@ -1371,6 +1371,10 @@ class PreparedObject:
         """SemanticCloud: surface points with features."""
         ...
     @property
+    def encoder(self) -> Optional[dict[str, Any]]:
+        """dict, optional: name, version, rolls and number of views of the encoder behind the features; None where it is not known."""
+        ...
+    @property
     def from_cache(self) -> bool:
         """bool: whether the shape was read from the cache."""
         ...
@@ -1830,7 +1834,7 @@ class Transfer:
     def weights(self) -> NDArray[numpy.float64]:
         """(n_target,) float64 array: weight of each target vertex, a read-only view."""
         ...
-    def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, progress: Optional[_Progress] = None) -> list[str]:
+    def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, pictures: bool = True, progress: Optional[_Progress] = None) -> list[str]:
         """Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
         meshes, picture and scene.
 
@@ -1840,6 +1844,8 @@ class Transfer:
             Made if it is not there.
         about : dict, optional
             Put into the report as it is.
+        pictures : bool, default True
+            Also draw ``transfer.png``, ``features.png`` and ``transfer.mcap``.
         progress : progress, optional
 
         Returns
@@ -2134,6 +2140,38 @@ def eigenbasis(laplacian: Laplacian, k: int, *, tolerance: float = 1e-08, seed: 
     """
     ...
 
+def embed(mesh: Union[_MeshLike, MeshFile], *, encoder: str = 'builtin', rolls: Optional[int] = None, colors: bool = False, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Embeddings:
+    """Embeddings of an object's views by an encoder, as `transfer` and `prepare` make them.
+
+    Parameters
+    ----------
+    mesh : mesh_like or MeshFile
+    encoder : str, default "builtin"
+        ``builtin``, a ``.net`` file, a Hugging Face name, a local checkpoint, an ONNX encoder's JSON,
+        or ``package.module:Class``.
+    rolls : int, optional
+        Rotations of each view that are averaged, 1, 2 or 4; what the encoder wants where none is
+        given.
+    colors : bool, default False
+        Show the object in its own colours, where the encoder reads colours.
+    cache : cache, optional
+        Where embeddings are kept: a folder, or True for the user's own.
+    progress : progress, optional
+
+    Returns
+    -------
+    Embeddings
+
+    Examples
+    --------
+    >>> import semfm
+    >>> mug = semfm.demo_object("containers", n_vertices=500).mesh
+    >>> embeddings = semfm.embed(mug)
+    >>> embeddings.encoder, embeddings.n_views
+    ('builtin', 14)
+    """
+    ...
+
 def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """Ids of points, each the farthest from those before it, starting with point 0.
 
@@ -2358,18 +2396,24 @@ def point_cloud_laplacian(points: ArrayLike, *, n_neighbors: int = 30, mollify_f
     """
     ...
 
-def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, n_samples: Optional[int] = None, seed: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> PreparedObject:
+def prepare(mesh: Union[_MeshLike, MeshFile], *, features: Optional[ArrayLike] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, cloud: Optional[SemanticCloud] = None, encoder: Optional[str] = None, method: Optional[str] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, n_samples: Optional[int] = None, seed: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> PreparedObject:
     """Makes an object ready to be matched with any number of others.
+
+    Where neither features, embeddings nor a cloud are given, an encoder makes them.
 
     Parameters
     ----------
-    mesh : mesh_like
+    mesh : mesh_like or MeshFile
     features : (n, d) array_like, optional
         A feature vector per vertex, from any network.
     embeddings : Embeddings or path, optional
         Patch embeddings of rendered views of this very mesh.
     cloud : SemanticCloud, optional
         Surface points with features, made by the caller.
+    encoder : str, optional
+        Shown rendered views in grey: ``builtin`` (where nothing of all this is given), a ``.net``
+        file, a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or
+        ``package.module:Class``.
     method : str, optional
         Lift as this method does (``"wks"`` needs no features): ``"fused"`` where neither this nor `settings` is given.
     settings : TransferSettings, optional
@@ -2383,7 +2427,7 @@ def prepare(mesh: _MeshLike, *, features: Optional[ArrayLike] = None, embeddings
     seed : int, optional
         Of everything drawn by chance; 0 where none is given.
     cache : cache, optional
-        Where prepared shapes are kept: a folder, or True for the user's own.
+        Where prepared shapes and embeddings are kept: a folder, or True for the user's own.
     progress : progress, optional
 
     Returns
@@ -2621,14 +2665,16 @@ def torus(n_around: int, n_across: int) -> Mesh:
     """
     ...
 
-def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, second_opinion: Optional[bool] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
+def transfer(source: Union[_MeshLike, MeshFile, PreparedObject], target: Union[_MeshLike, MeshFile, PreparedObject], region: Union[Region, _Path], *, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, source_embeddings: Optional[Union[Embeddings, _Path]] = None, target_embeddings: Optional[Union[Embeddings, _Path]] = None, source_cloud: Optional[SemanticCloud] = None, target_cloud: Optional[SemanticCloud] = None, encoder: Optional[str] = None, method: Optional[str] = None, rule: Optional[str] = None, seed: Optional[int] = None, second_opinion: Optional[bool] = None, settings: Optional[TransferSettings] = None, k: Optional[int] = None, working_vertices: Optional[int] = None, cache: Optional[_Cache] = None, progress: Optional[_Progress] = None) -> Transfer:
     """Transfers a demonstrated region from one object to another.
+
+    Where neither features, embeddings nor clouds are given, an encoder makes them.
 
     Parameters
     ----------
-    source : mesh_like or PreparedObject
+    source : mesh_like or MeshFile or PreparedObject
         The demonstrated object.
-    target : mesh_like or PreparedObject
+    target : mesh_like or MeshFile or PreparedObject
         The one to act on.
     region : Region or path
         Where the demonstration touched the source.
@@ -2641,6 +2687,9 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     source_cloud : SemanticCloud, optional
         Surface points with features, made by the caller.
     target_cloud : SemanticCloud, optional
+    encoder : str, optional
+        Shown rendered views: ``builtin`` (where nothing of all this is given), a ``.net`` file, a
+        Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or ``package.module:Class``.
     method : str, optional
         ``fused`` (where neither this nor `settings` is given), ``semfm`` (the paper to the letter),
         ``anchored``, ``sinkhorn``, ``nearest``, or ``wks``, which needs no features.
@@ -2658,7 +2707,7 @@ def transfer(source: Union[_MeshLike, PreparedObject], target: Union[_MeshLike, 
     working_vertices : int, optional
         Simplify above this many vertices, 0 keeps them all; 10 000 where none is given.
     cache : cache, optional
-        Where prepared shapes are kept: a folder, or True for the user's own.
+        Where prepared shapes and embeddings are kept: a folder, or True for the user's own.
     progress : progress, optional
 
     Returns
