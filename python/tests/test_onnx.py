@@ -261,4 +261,4 @@ def test_a_missing_runtime_is_named_with_what_to_install(tmp_path, views, capsys
     for model, hint in ((write_encoder(tmp_path), "pip install onnxruntime"), (tmp_path, "pip install torch transformers")):
         assert main([str(views), "-o", str(tmp_path / "e.mcap"), "--model", str(model)]) == 2
         error = capsys.readouterr().err
-        assert f"pip install '{hint}'" in error and error.count("\n") == 1
+        assert hint in error and error.count("\n") == 1

@@ -19,6 +19,7 @@ import numpy as np
 from PIL import Image
 
 from .._files import read_json
+from ..errors import SemfmError
 from .errors import SidecarError, expected
 
 _INSTALL = "needs torch and transformers: pip install torch transformers"
@@ -166,7 +167,10 @@ def present_snapshot(model: str) -> Path:
 
 def _model_type(model: str, folder: Path) -> str:
     path = folder / "config.json"
-    config = read_json(path)
+    try:
+        config = read_json(path)
+    except SemfmError as error:
+        raise SidecarError(str(error)) from error
     if not isinstance(config, dict) or not isinstance(config.get("model_type"), str):
         raise expected(model, "config.json", "a model_type", "none")
     return config["model_type"]

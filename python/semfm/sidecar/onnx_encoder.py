@@ -32,6 +32,7 @@ from PIL import Image
 
 from .._files import read_json
 from .._semfm import read_file
+from ..errors import SemfmError
 from .encoder import Grid
 from .errors import SidecarError, expected
 from .onnx_files import external_files
@@ -63,7 +64,10 @@ class OnnxDescription:
 def read_description(path: str | os.PathLike[str]) -> OnnxDescription:
     """Read and check a ``semfm.encoder/1`` file; the SemfmError names the field at fault."""
     path = os.fspath(path)
-    found = read_json(path)
+    try:
+        found = read_json(path)
+    except SemfmError as error:
+        raise SidecarError(str(error)) from error
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         what = found.get("format") if isinstance(found, dict) else type(found).__name__
         raise expected(path, "format", f"'{FORMAT}'", repr(what))

@@ -91,7 +91,8 @@ impl StagedFolder {
 
     fn put_each(&self, names: &[String], last: &[&str], gone: &[&str]) -> Result<()> {
         fs::create_dir_all(&self.folder).map_err(Error::io(&self.folder))?;
-        let _alone = Alone::in_folder(&self.folder);
+        // A temporary folder is nobody else's, and its lock is held by this process already.
+        let _alone = (!is_stage(&self.folder)).then(|| Alone::in_folder(&self.folder));
         for name in last.iter().chain(gone) {
             let path = self.folder.join(name);
             // Only regular files: what a link points at, or a device, is written into below.
@@ -145,6 +146,11 @@ struct Stage {
 }
 
 static STAGES: LazyLock<Mutex<Vec<Stage>>> = LazyLock::new(Mutex::default);
+
+fn is_stage(folder: &Path) -> bool {
+    let stages = STAGES.lock().unwrap_or_else(PoisonError::into_inner);
+    stages.iter().any(|stage| stage.path == folder)
+}
 
 /// The path that a message names: for a file that is written into the temporary folder of a
 /// [`StagedFolder`], the place that it will have; any other path as it is.
@@ -212,6 +218,16 @@ mod tests {
             assert_eq!(staged.place_of(&staged.path().join("a")), folder.join("a"));
         }
         assert!(listed(parent.path()).is_empty(), "given up");
+        // One inside another, as callers of callers do.
+        let start = std::time::Instant::now();
+        let outer = StagedFolder::new(&folder).unwrap();
+        let inner = StagedFolder::new(outer.path()).unwrap();
+        write_json(inner.path().join("a.json"), &[0]).unwrap();
+        assert_eq!(shown_path(inner.path().join("a.json")), folder.join("a.json"));
+        inner.put(&[], &[]).unwrap();
+        assert_eq!(listed(outer.path()), ["a.json"]);
+        drop(outer);
+        assert!(start.elapsed().as_secs() < 1 && listed(parent.path()).is_empty());
 
         for answer in [1, 2] {
             let staged = StagedFolder::new(&folder).unwrap();
