@@ -715,7 +715,7 @@ class Grasps:
         ----------
         path : path
         format : str, optional
-            ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
+            ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray` and the widths and scores beside it, or Isaac's YAML.
         """
         ...
 
@@ -1443,6 +1443,33 @@ class Region:
         Region
         """
         ...
+    def grown(self, mesh: _MeshLike, *, camera: Optional[Pinhole] = None) -> Region:
+        """The part that the region belongs to, where one camera saw it: the hidden side is added.
+
+        A region that is known all around stays as it is. What was seen keeps its weight, what is added
+        has weight 1.
+
+        Parameters
+        ----------
+        mesh : mesh_like
+            The mesh it belongs to.
+        camera : Pinhole, optional
+            The camera that saw it: what it sees beside the region is outside of the part. Without one,
+            the camera is looked for.
+
+        Returns
+        -------
+        Region
+
+        Examples
+        --------
+        >>> import numpy as np, semfm, semfm.zoo
+        >>> torus = semfm.zoo.torus(40, 20)
+        >>> half = semfm.Region.from_mask(torus.vertices[:, 0] > 0)
+        >>> half.is_one_sided(torus), half.grown(torus) == half
+        (False, True)
+        """
+        ...
     def iou(self, truth: Region, areas: Optional[ArrayLike] = None) -> float:
         """Intersection over union with the true region, in vertices or in areas.
 
@@ -1462,6 +1489,19 @@ class Region:
     @property
     def is_empty(self) -> bool:
         """bool: whether no vertex counts."""
+        ...
+    def is_one_sided(self, mesh: _MeshLike) -> bool:
+        """Whether the region is what one camera sees of a part, which `grown` would complete.
+
+        Parameters
+        ----------
+        mesh : mesh_like
+            The mesh it belongs to.
+
+        Returns
+        -------
+        bool
+        """
         ...
     @property
     def mask(self) -> NDArray[numpy.bool_]:

@@ -158,6 +158,26 @@ fn views_lead_to_a_region_by_a_mask() {
     assert_eq!(answer.code, Some(0), "{answer:?}");
     let n = json(&region)["vertices"].as_array().unwrap().len();
     assert!(n > 50, "half of a picture shows more than {n} vertices");
+    // The side that the camera did not see: with the camera known, and with the region alone.
+    let [whole, again] = ["whole.json", "again.json"].map(|name| folder.path().join(name));
+    let known = run(&[&arguments[..6], &["--grow", "-o", &text(&whole)]].concat());
+    let unknown = run(&[
+        "region",
+        &text(&files[0]),
+        "--region",
+        &text(&region),
+        "--grow",
+        "-o",
+        &text(&again),
+    ]);
+    for (told, path) in [(&known, &whole), (&unknown, &again)] {
+        assert_eq!(told.code, Some(0), "{told:?}");
+        assert!(told.err.contains("--grow added"), "{told:?}");
+        let n_whole = json(path)["vertices"].as_array().unwrap().len();
+        assert!(n_whole * 2 > n * 3, "{n} vertices became {n_whole}");
+    }
+    let alone = run(&["region", &text(&files[0]), "--region", &text(&region), "-o", "no.json"]);
+    assert_eq!(alone.code, Some(2), "{alone:?}");
     let other = run(&[
         "region",
         &text(&files[1]),

@@ -85,6 +85,19 @@ pub fn farthest_points(points: &[DVec3], n: usize) -> Vec<u32> {
     chosen
 }
 
+/// `count` unit vectors spread evenly over the sphere along a golden-angle spiral, from +z down to
+/// −z and never exactly at a pole (offset Fibonacci lattice, González 2010).
+pub fn fibonacci_directions(count: usize) -> impl Iterator<Item = DVec3> {
+    let golden_turn = std::f64::consts::PI * (1.0 + 5f64.sqrt());
+    (0..count).map(move |i| {
+        let i = i as f64 + 0.5;
+        let z = 1.0 - 2.0 * i / count as f64;
+        let (sin, cos) = (golden_turn * i).sin_cos();
+        let ring = (1.0 - z * z).sqrt();
+        DVec3::new(ring * cos, ring * sin, z)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
+use semfm::demonstration::{
+    grow_region, is_one_sided, region_around_contact, region_of_paint, region_under_mask,
+};
 use semfm::files::{RegionFile, read_region, write_region};
 use semfm::fmap::metrics;
 
@@ -174,6 +176,59 @@ impl Region {
     fn read(path: PathBuf, mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
         let shared = from_any(mesh, "mesh")?;
         guarded(mesh.py(), || read_region(&path, &shared))
+    }
+
+    /// The part that the region belongs to, where one camera saw it: the hidden side is added.
+    ///
+    /// A region that is known all around stays as it is. What was seen keeps its weight, what is added
+    /// has weight 1.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : mesh_like
+    ///     The mesh it belongs to.
+    /// camera : Pinhole, optional
+    ///     The camera that saw it: what it sees beside the region is outside of the part. Without one,
+    ///     the camera is looked for.
+    ///
+    /// Returns
+    /// -------
+    /// Region
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, semfm, semfm.zoo
+    /// >>> torus = semfm.zoo.torus(40, 20)
+    /// >>> half = semfm.Region.from_mask(torus.vertices[:, 0] > 0)
+    /// >>> half.is_one_sided(torus), half.grown(torus) == half
+    /// (False, True)
+    #[pyo3(signature = (mesh, *, camera=None))]
+    fn grown(
+        &self,
+        mesh: &Bound<'_, PyAny>,
+        camera: Option<&Bound<'_, Pinhole>>,
+    ) -> PyResult<Self> {
+        let (shared, region) = (from_any(mesh, "mesh")?, self.inner.clone());
+        let camera = camera.map(|camera| camera.get().camera);
+        let grown = run(mesh.py(), None, move |_| {
+            Ok(grow_region(&shared, &region, camera.as_ref())?.region)
+        })?;
+        Ok(Self { inner: Shared::new(grown) })
+    }
+
+    /// Whether the region is what one camera sees of a part, which `grown` would complete.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : mesh_like
+    ///     The mesh it belongs to.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    fn is_one_sided(&self, mesh: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let (shared, region) = (from_any(mesh, "mesh")?, self.inner.clone());
+        run(mesh.py(), None, move |_| is_one_sided(&shared, &region))
     }
 
     /// Writes a region file, whole or not at all.

@@ -24,5 +24,5 @@ pub use gpu::GpuRenderer;
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
 pub use render::{CornerNormals, RenderSettings, SurfaceColor, openness, render, triangle_ids};
 pub use renderer::{Renderer, RendererChoice};
-pub use rig::{CLOSE_UP, RigSettings, camera_towards, fibonacci_directions, rig};
+pub use rig::{CLOSE_UP, RigSettings, camera_towards, rig};
 pub use view::View;

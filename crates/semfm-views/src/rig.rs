@@ -3,6 +3,7 @@
 use std::fmt;
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
+use semfm_geom::sampling::fibonacci_directions;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, principal_axes, surface_vertices};
 
 use crate::render::MAX_IMAGE_SIDE;
@@ -150,19 +151,6 @@ pub fn camera_towards(
 fn unit_vector(what: &str, v: DVec3) -> Result<DVec3> {
     v.try_normalize()
         .ok_or_else(|| Error::invalid(what, "a finite vector of some length", v.to_string()))
-}
-
-/// `count` unit vectors spread evenly over the sphere along a golden-angle spiral, from +z down to
-/// −z and never exactly at a pole (offset Fibonacci lattice, González 2010).
-pub fn fibonacci_directions(count: usize) -> impl Iterator<Item = DVec3> {
-    let golden_turn = std::f64::consts::PI * (1.0 + 5f64.sqrt());
-    (0..count).map(move |i| {
-        let i = i as f64 + 0.5;
-        let z = 1.0 - 2.0 * i / count as f64;
-        let (sin, cos) = (golden_turn * i).sin_cos();
-        let ring = (1.0 - z * z).sqrt();
-        DVec3::new(ring * cos, ring * sin, z)
-    })
 }
 
 /// What a camera must frame: the surface's vertices and their bounding sphere, in a frame whose z

@@ -1,9 +1,11 @@
 //! Where a demonstration touched an object: a region from a contact and a radius, from a mask in a
-//! view, or from the colours of a painted mesh.
+//! view, or from the colours of a painted mesh; and what one camera saw of a part, completed.
 
 use semfm_geom::geodesic::{HeatGeodesics, HeatSettings};
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Pinhole, PixelDepth, SurfaceIndex};
+use semfm_geom::{
+    CameraSearch, Mesh, Pinhole, PixelDepth, SurfaceIndex, Viewpoint, complete_patch,
+};
 
 use crate::{Error, Region, Result};
 
@@ -69,6 +71,85 @@ pub fn region_under_mask(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result
         return Err(Error::invalid("mask", "at least one visible vertex", found));
     }
     Ok(Region::from_mask(&inside))
+}
+
+/// A region that was to be completed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrownRegion {
+    /// The region, completed where one camera saw it, else as it was.
+    pub region: Region,
+    /// Vertices that count now and did not before.
+    pub n_added: usize,
+    /// Share of the given region that one camera can see, where the camera was looked for: below .85 it
+    /// is taken for known all around, and stays as it is.
+    pub visible_share: Option<f64>,
+}
+
+/// Completes what one camera saw of a part to the part that it belongs to: the back of a handle, which no
+/// single mask shows. What was seen keeps its weight, what is added has weight 1.
+///
+/// With the `camera` of the demonstration, everything that it saw and that is not in the region lies
+/// outside of the part. Without one, the camera is looked for; a region that no camera can see for the most
+/// part is known all around already, and stays as it is. How, and what it cannot do:
+/// [`complete_patch`](semfm_geom::complete_patch) and [`CameraSearch`]; what it is worth: `bench/README.md`.
+///
+/// # Errors
+/// [`Error::Invalid`] for a region that is empty or of another mesh, [`semfm_geom::Error::NoArea`].
+pub fn grow_region(mesh: &Mesh, region: &Region, camera: Option<&Pinhole>) -> Result<GrownRegion> {
+    let inside = mask_on(mesh, region)?;
+    let search = CameraSearch::new(mesh)?;
+    let (viewpoint, visible_share) = match camera {
+        Some(camera) => (Some(Viewpoint::Camera(*camera)), None),
+        None => {
+            let likely = search.likely_camera(&inside);
+            let one_sided = likely.filter(|camera| camera.is_one_sided());
+            let viewpoint = one_sided.map(|camera| Viewpoint::Towards(camera.towards_eye));
+            (viewpoint, Some(likely.map_or(0.0, |camera| camera.share)))
+        }
+    };
+    let outside: Vec<bool> = match viewpoint {
+        Some(viewpoint) => {
+            let seen = search.seen(viewpoint);
+            seen.iter().zip(&inside).map(|(&seen, &inside)| seen && !inside).collect()
+        }
+        None => Vec::new(),
+    };
+    // Where nothing was seen outside of the region, nothing tells where its part ends.
+    if !outside.contains(&true) {
+        return Ok(GrownRegion { region: region.clone(), n_added: 0, visible_share });
+    }
+    let part = complete_patch(mesh, &inside, &outside)?;
+    let given = region.weights().iter().zip(&inside).zip(part);
+    let weights = given.map(|((&weight, &inside), part)| match part >= Region::COUNTS {
+        true if !inside => 1.0,
+        _ => weight,
+    });
+    let grown = Region::from_weights(weights.collect())?;
+    let n_added = grown.vertices().len() - region.vertices().len();
+    Ok(GrownRegion { region: grown, n_added, visible_share })
+}
+
+/// Whether a region is what one camera sees of a part, which [`grow_region`] would complete.
+///
+/// # Errors
+/// As [`grow_region`].
+pub fn is_one_sided(mesh: &Mesh, region: &Region) -> Result<bool> {
+    let inside = mask_on(mesh, region)?;
+    let likely = CameraSearch::new(mesh)?.likely_camera(&inside);
+    Ok(likely.is_some_and(|camera| camera.is_one_sided()))
+}
+
+/// Which vertices of a mesh a region holds; at least one.
+fn mask_on(mesh: &Mesh, region: &Region) -> Result<Vec<bool>> {
+    if region.n_vertices() != mesh.n_vertices() {
+        let expected = format!("{} weights, one per vertex of the mesh", mesh.n_vertices());
+        return Err(Error::invalid("region", expected, region.n_vertices().to_string()));
+    }
+    let inside = region.mask();
+    match inside.contains(&true) {
+        true => Ok(inside),
+        false => Err(Error::invalid("region", "at least one vertex that counts", "none")),
+    }
 }
 
 /// How much redder than green and blue a vertex must be to count as painted. The colours that we
@@ -148,6 +229,50 @@ mod tests {
         assert!(seen.len() > sphere.n_vertices() / 4);
         assert!(region_under_mask(&sphere, &camera, &[true; 10]).is_err());
         assert!(region_under_mask(&sphere, &camera, &[false; 64 * 64]).is_err());
+    }
+
+    /// One camera above a torus sees a little less than half of one of its halves.
+    fn half_of_a_torus() -> (semfm_geom::Mesh, Pinhole, Vec<bool>, Region) {
+        let torus = zoo::torus(64, 32);
+        let part: Vec<bool> = torus.vertices().iter().map(|p| p.x > 0.0).collect();
+        let turn = semfm_geom::math::DMat3::from_rotation_x(std::f64::consts::PI);
+        let camera = Pinhole::with_pixel_centres_at_half(
+            Intrinsics { width: 200, height: 200, fx: 250.0, fy: 250.0, cx: 100.0, cy: 100.0 },
+            DAffine3::from_mat3_translation(turn, DVec3::new(0.0, 0.0, 6.0)),
+        )
+        .unwrap();
+        // The camera looks down with x to the right: the right half of its picture.
+        let mask: Vec<bool> = (0..200 * 200).map(|pixel| pixel % 200 >= 100).collect();
+        let seen = region_under_mask(&torus, &camera, &mask).unwrap();
+        (torus, camera, part, seen)
+    }
+
+    #[test]
+    fn what_one_camera_saw_is_completed_and_what_is_whole_stays() {
+        let (torus, camera, part, seen) = half_of_a_torus();
+        let overlap = |region: &Region| {
+            let both = region.mask().iter().zip(&part).filter(|(a, b)| **a && **b).count();
+            let either = region.mask().iter().zip(&part).filter(|(a, b)| **a || **b).count();
+            both as f64 / either as f64
+        };
+        assert!(is_one_sided(&torus, &seen).unwrap() && overlap(&seen) < 0.6);
+        for camera in [Some(&camera), None] {
+            let grown = grow_region(&torus, &seen, camera).unwrap();
+            assert!(overlap(&grown.region) > 0.93, "{camera:?}: {}", overlap(&grown.region));
+            let n_added = grown.region.vertices().len() - seen.vertices().len();
+            assert_eq!(grown.n_added, n_added);
+            assert_eq!(grown.visible_share.is_none(), camera.is_some());
+            // What was seen is still there.
+            assert!(seen.vertices().iter().all(|&v| grown.region.mask()[v as usize]));
+        }
+        let whole = Region::from_mask(&part);
+        assert!(!is_one_sided(&torus, &whole).unwrap());
+        let grown = grow_region(&torus, &whole, None).unwrap();
+        assert_eq!((&grown.region, grown.n_added), (&whole, 0));
+        assert!(grown.visible_share.unwrap() < 0.6);
+        let empty = Region::from_mask(&vec![false; part.len()]);
+        assert!(grow_region(&torus, &empty, None).is_err());
+        assert!(grow_region(&zoo::icosphere(1), &whole, None).is_err());
     }
 
     #[test]

@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
-use semfm::demonstration::{region_around_contact, region_of_paint, region_under_mask};
-use semfm::files::{MaskedPicture, read_mask, write_region};
+use semfm::demonstration::{
+    GrownRegion, grow_region, region_around_contact, region_of_paint, region_under_mask,
+};
+use semfm::files::{MaskedPicture, read_mask, read_region, write_region};
+use semfm::geom::Pinhole;
 use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
 use semfm::views::mcap::{SingleView, read_view};
@@ -17,11 +20,13 @@ use crate::options::{Common, numbers};
 use crate::output::OutputFile;
 
 /// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids
+///
+/// A mask shows one side of a part: --grow adds the side that the camera did not see.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("how").required(true).args(["near", "mask", "ply_color", "vertices"]))]
+#[command(group = ArgGroup::new("how").required(true).args(["near", "mask", "ply_color", "vertices", "region"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli region mug.obj -o grip.json --near 0.05,0,0.04 --radius 0.03\n  \
-    semfm-cli region mug.obj -o grip.json --mask grip.png --view mug.views.mcap#003\n  \
+    semfm-cli region mug.obj -o grip.json --mask grip.png --view mug.views.mcap#003 --grow\n  \
     semfm-cli region painted.ply -o grip.json --ply-color")]
 pub struct RegionCommand {
     /// The mesh
@@ -59,6 +64,13 @@ pub struct RegionCommand {
     /// Vertex ids, 0-based
     #[arg(long, value_name = "ID,ID,…", value_delimiter = ',', help_heading = "How")]
     vertices: Option<Vec<u32>>,
+    /// A region that is there already (JSON), to be completed with --grow
+    #[arg(long, value_name = "FILE", requires = "grow", help_heading = "How")]
+    region: Option<PathBuf>,
+    /// Complete what one camera saw to the part that it belongs to; a region that is known all around
+    /// stays as it is
+    #[arg(long, help_heading = "How")]
+    grow: bool,
 }
 
 impl RegionCommand {
@@ -66,16 +78,21 @@ impl RegionCommand {
         let view =
             self.view.as_deref().map(|view| Path::new(view.rsplit_once('#').map_or(view, |v| v.0)));
         let mut inputs = vec![self.mesh.as_path()];
-        inputs.extend(self.mask.as_deref().into_iter().chain(view));
+        inputs.extend(self.mask.as_deref().into_iter().chain(self.region.as_deref()).chain(view));
         let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         output.check_again()?;
-        let region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
+        let mut camera = None;
+        let mut region = if let (Some(near), Some(radius)) = (&self.near, self.radius) {
             let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
             region_around_contact(&file.mesh, DVec3::new(x, y, z), radius)
                 .with_context(|| self.mesh.display().to_string())?
         } else if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
-            from_mask(&file.mesh, mask, view)?
+            let seen = from_mask(&file.mesh, mask, view)?;
+            camera = Some(seen.camera);
+            seen.region
+        } else if let Some(path) = &self.region {
+            read_region(path, &file.mesh)?
         } else if let Some(paint) = &self.ply_color {
             let paint = match paint.as_str() {
                 "red" => None,
@@ -87,6 +104,9 @@ impl RegionCommand {
             let ids = self.vertices.unwrap_or_default();
             Region::from_vertices(file.mesh.n_vertices(), &ids).context("--vertices")?
         };
+        if self.grow {
+            region = grown(&file.mesh, &region, camera.as_ref(), common)?;
+        }
         write_region(output.path(), &region, &file.mesh)?;
         if !common.quiet {
             let (inside, of) = (region.vertices().len(), region.n_vertices());
@@ -97,7 +117,34 @@ impl RegionCommand {
     }
 }
 
-fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
+/// A region completed to the part that it belongs to, with a line that says what came of it.
+pub fn grown(
+    mesh: &Mesh,
+    region: &Region,
+    camera: Option<&Pinhole>,
+    common: &Common,
+) -> Result<Region> {
+    let GrownRegion { region, n_added, visible_share } =
+        grow_region(mesh, region, camera).context("--grow")?;
+    if !common.quiet {
+        match (n_added, visible_share) {
+            (0, Some(share)) => console::message(format_args!(
+                "--grow added nothing: one camera sees at most {:.0} % of the region",
+                100.0 * share
+            )),
+            _ => console::message(format_args!("--grow added {n_added} vertices")),
+        }
+    }
+    Ok(region)
+}
+
+/// What a camera saw inside a mask.
+struct SeenRegion {
+    region: Region,
+    camera: Pinhole,
+}
+
+fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<SeenRegion> {
     let Some((path, number)) = view.rsplit_once('#') else {
         bail!("--view: expected V.views.mcap#NNN, found `{view}`");
     };
@@ -109,5 +156,7 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<Region> {
     metadata.check_mesh(mesh, path)?;
     let (width, height) = (view.camera.width(), view.camera.height());
     let marked = read_mask(mask, MaskedPicture { width, height, name: "the view" })?;
-    region_under_mask(mesh, &view.camera, &marked).with_context(|| mask.display().to_string())
+    let region = region_under_mask(mesh, &view.camera, &marked)
+        .with_context(|| mask.display().to_string())?;
+    Ok(SeenRegion { region, camera: view.camera })
 }

@@ -20,6 +20,7 @@ use semfm_show::{TRANSFER_FILES, TransferFiles};
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
 use super::grasp::{GraspOptions, gripper_help};
+use super::region::grown;
 use super::size::print_size;
 use super::transfer_output::TransferOutput;
 use crate::console;
@@ -46,6 +47,9 @@ pub struct TransferCommand {
     /// The region on the source (JSON)
     #[arg(long, value_name = "FILE")]
     region: PathBuf,
+    /// First complete the region, where one camera saw it, to the part that it belongs to
+    #[arg(long)]
+    grow: bool,
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
@@ -154,8 +158,11 @@ impl TransferCommand {
         let task = console::progress(common.quiet);
         let settings = self.matching.settings(self.features.features);
         let files = Pair { source: read_mesh(&self.source)?, target: read_mesh(&self.target)? };
-        let region = read_region(&self.region, &files.source.mesh)
+        let mut region = read_region(&self.region, &files.source.mesh)
             .map_err(|error| self.or_region_of_target(error, &files.target.mesh))?;
+        if self.grow {
+            region = grown(&files.source.mesh, &region, None, common)?;
+        }
         let grasps = match &self.gripper {
             Some(gripper) => {
                 let (mesh, seed) = (files.target.mesh.clone(), self.matching.seed);

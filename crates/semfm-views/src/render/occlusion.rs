@@ -7,7 +7,7 @@ use semfm_geom::{Intrinsics, Mesh, Pinhole, PixelDepth, Sphere, surface_sphere};
 
 use super::depth_lookup::inverse_depths;
 use super::triangle::Projection;
-use crate::rig::fibonacci_directions;
+use semfm_geom::sampling::fibonacci_directions;
 
 /// Axes along which a vertex is looked at, from both ends: of each two opposite eyes a convex
 /// object hides the vertex from exactly one.
