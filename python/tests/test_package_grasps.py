@@ -85,11 +85,24 @@ def test_ros_and_yaml_readers_take_the_files(grasps, tmp_path):
     grasps.write(tmp_path / "grasps.mcap", format="ros2")
     with open(tmp_path / "grasps.mcap", "rb") as stream:
         made = reader.make_reader(stream, decoder_factories=[decoder.DecoderFactory()])
-        [(schema, channel, _, message)] = list(made.iter_decoded_messages())
-    assert (schema.name, channel.topic) == ("geometry_msgs/msg/PoseArray", "/grasps/poses")
+        messages = list(made.iter_decoded_messages())
+    told = {channel.topic: (schema.name, message) for schema, channel, _, message in messages}
+    assert len(told) == len(messages) == 4
+    name, message = told["/grasps/poses"]
+    assert name == "geometry_msgs/msg/PoseArray"
     assert message.header.frame_id == "object" and len(message.poses) == len(grasps)
     first = message.poses[0].position
     np.testing.assert_allclose([first.x, first.y, first.z], grasps.object_from_tcp[0, :3, 3])
+    for topic, values in (
+        ("/grasps/widths", grasps.widths),
+        ("/grasps/openings", [grasp.opening for grasp in grasps]),
+        ("/grasps/scores", grasps.scores),
+    ):
+        name, message = told[topic]
+        assert name == "std_msgs/msg/Float64MultiArray"
+        np.testing.assert_array_equal(message.data, values)
+        [dimension] = message.layout.dim
+        assert dimension.size == dimension.stride == len(grasps) and dimension.label
     yaml = pytest.importorskip("yaml")
     grasps.write(tmp_path / "grasps.yaml", format="isaac")
     file = yaml.safe_load((tmp_path / "grasps.yaml").read_text())

@@ -130,7 +130,10 @@ fn other_programs_get_their_own_files() {
     let ros2 = mug.scaled("grasps.mcap", &["--format", "ros2"]);
     assert_eq!(ros2.code, Some(0), "{ros2:?}");
     let report = inspect(&mug.at("grasps.mcap")).unwrap();
-    assert_eq!((report.n_messages, report.channels[0].topic.as_str()), (1, POSES_TOPIC));
+    let topics: Vec<&str> = report.channels.iter().map(|channel| channel.topic.as_str()).collect();
+    let numbers = ["/grasps/widths", "/grasps/openings", "/grasps/scores"];
+    assert_eq!((report.n_messages, topics.len(), topics.contains(&POSES_TOPIC)), (4, 4, true));
+    assert!(numbers.iter().all(|topic| topics.contains(topic)), "{topics:?}");
     let isaac = mug.scaled("grasps.yaml", &["--format", "isaac"]);
     assert_eq!(isaac.code, Some(0), "{isaac:?}");
     let text = std::fs::read_to_string(mug.at("grasps.yaml")).unwrap();

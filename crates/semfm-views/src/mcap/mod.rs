@@ -32,7 +32,7 @@ pub use embeddings_message::PATCH_EMBEDDINGS;
 pub use inspect::{ChannelReport, McapReport, inspect};
 pub use messages::{Colors, find_mesh, read_mesh};
 pub use metadata::{EmbeddingsMetadata, METADATA_NAME, ViewsMetadata};
-pub use pose_array::{POSES_TOPIC, write_pose_array};
+pub use pose_array::{POSES_TOPIC, PoseNumbers, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};
 pub use topics::TF;
 pub use views_file::{SingleView, ViewsFile, read_view, write_views};

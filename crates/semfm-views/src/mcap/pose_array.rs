@@ -1,5 +1,6 @@
 //! Poses for ROS 2: `geometry_msgs/msg/PoseArray` in CDR, as `ros2 bag play` and every ROS viewer
-//! read it.
+//! read it, and beside it one `std_msgs/msg/Float64MultiArray` for each number that belongs to a pose:
+//! messages that every installation has, so that no package need be built to read them.
 //!
 //! CDR (OMG Common Data Representation, XCDR1, little-endian): a header of four bytes, then each
 //! number on a multiple of its own size, counted from behind the header; a string as its length with
@@ -47,9 +48,34 @@ float64 z
 float64 w
 ";
 
-/// Writes one `PoseArray` on [`POSES_TOPIC`], whole or not at all. `poses` are positions in metres
-/// and rotations in the frame `frame_id`; `metadata` goes into the record `semfm`, key `json`, beside
-/// its `format`.
+/// The definition of an array of numbers, in the same form.
+const NUMBERS: &str = "std_msgs/MultiArrayLayout layout
+float64[] data
+================================================================================
+MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+================================================================================
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+";
+
+/// A number for each pose.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseNumbers<'a> {
+    /// Topic of the message.
+    pub topic: &'a str,
+    /// What they are, with their unit: label of the message's only dimension.
+    pub label: &'a str,
+    /// One for each pose, in the same order.
+    pub numbers: &'a [f64],
+}
+
+/// Writes one `PoseArray` on [`POSES_TOPIC`] and an array for each of `numbers`, whole or not at all.
+/// `poses` are positions in metres and rotations in the frame `frame_id`; `metadata` goes into the record
+/// `semfm`, key `json`, beside its `format`.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) where the file cannot be written.
@@ -57,6 +83,7 @@ pub fn write_pose_array(
     path: &Path,
     frame_id: &str,
     poses: &[(DVec3, DQuat)],
+    numbers: &[PoseNumbers<'_>],
     format: &str,
     metadata: &serde_json::Value,
 ) -> Result<()> {
@@ -64,13 +91,18 @@ pub fn write_pose_array(
     write_mcap(path, "ros2", ChunkCompression::Lz4, |file| {
         let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
         file.metadata(METADATA_NAME, BTreeMap::from(entries.map(|(k, v)| (k.to_owned(), v))))?;
-        let schema = Schema {
-            name: "geometry_msgs/msg/PoseArray".to_owned(),
-            encoding: "ros2msg".to_owned(),
-            data: POSE_ARRAY.into(),
-        };
-        file.log_encoded(POSES_TOPIC, &schema, "cdr", &pose_array(frame_id, poses))
+        let schema = schema("geometry_msgs/msg/PoseArray", POSE_ARRAY);
+        file.log_encoded(POSES_TOPIC, &schema, "cdr", &pose_array(frame_id, poses))?;
+        let schema = self::schema("std_msgs/msg/Float64MultiArray", NUMBERS);
+        for PoseNumbers { topic, label, numbers } in numbers {
+            file.log_encoded(topic, &schema, "cdr", &number_array(label, numbers))?;
+        }
+        Ok(())
     })
+}
+
+fn schema(name: &str, definition: &str) -> Schema {
+    Schema { name: name.to_owned(), encoding: "ros2msg".to_owned(), data: definition.into() }
 }
 
 /// The message's bytes, at time 0.
@@ -83,6 +115,19 @@ fn pose_array(frame_id: &str, poses: &[(DVec3, DQuat)]) -> Vec<u8> {
     for (position, rotation) in poses {
         position.to_array().into_iter().chain(rotation.to_array()).for_each(|x| cdr.f64(x));
     }
+    cdr.bytes
+}
+
+/// The message's bytes: one dimension, then the numbers.
+fn number_array(label: &str, numbers: &[f64]) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.length(1);
+    cdr.string(label);
+    cdr.length(numbers.len());
+    cdr.length(numbers.len()); // stride
+    cdr.u32(0); // data_offset
+    cdr.length(numbers.len());
+    numbers.iter().for_each(|&x| cdr.f64(x));
     cdr.bytes
 }
 
@@ -143,13 +188,28 @@ mod tests {
     }
 
     #[test]
+    fn an_array_has_one_dimension_and_its_numbers_behind_it() {
+        let bytes = number_array("w", &[0.5, 0.25]);
+        // Header 4, count of dimensions 4, length 4 + "w\0" 2, padding 2, size, stride, offset, count, 2
+        // numbers on multiples of eight from byte 32 of the body on.
+        assert_eq!(bytes[4..14], [1, 0, 0, 0, 2, 0, 0, 0, b'w', 0]);
+        assert_eq!(bytes[16..32], [2, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0]);
+        let numbers: Vec<f64> = bytes[bytes.len() - 16..]
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
+            .collect();
+        assert_eq!((numbers, (bytes.len() - 4) % 8), (vec![0.5, 0.25], 0));
+    }
+
+    #[test]
     fn our_own_strict_reader_takes_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grasps.mcap");
         let about = serde_json::json!({ "widths": [0.04] });
         let poses = [(DVec3::X, DQuat::from_rotation_z(1.0))];
-        write_pose_array(&path, "camera", &poses, "semfm.grasps/1", &about).unwrap();
+        let widths = PoseNumbers { topic: "/grasps/widths", label: "width (m)", numbers: &[0.04] };
+        write_pose_array(&path, "camera", &poses, &[widths], "semfm.grasps/1", &about).unwrap();
         let report = crate::mcap::inspect(&path).unwrap();
-        assert_eq!(report.n_messages, 1);
+        assert_eq!(report.n_messages, 2);
     }
 }
