@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import threading
@@ -56,6 +59,15 @@ def browse(browser: str, page: Path, *options: str) -> subprocess.CompletedProce
     return subprocess.run(command, capture_output=True, text=True, timeout=180)
 
 
+def with_probe(page: str, added: str) -> str:
+    """The page with HTML at its end, whose one program the page's policy lets run."""
+    (program,) = re.findall("<script>(.*?)</script>", added, re.S)
+    digest = base64.b64encode(hashlib.sha256(program.encode()).digest()).decode()
+    assert page.count("script-src 'sha256-") == 1, "the page has no policy"
+    allowed = page.replace("script-src ", f"script-src 'sha256-{digest}' ")
+    return allowed.replace("</body>", added + "</body>")
+
+
 #: Runs `PROBE`, the body of an async function, and tells what it returns.
 SCRIPT = """<script>
 addEventListener("load", async () => {
@@ -72,7 +84,7 @@ def probe(browser: str, page: Path, body: str, *options: str, seconds: float = 1
     else the console said."""
     probed = page.parent / f"probed-{page.name}"
     script = SCRIPT.replace("PROBE", body)
-    probed.write_text(page.read_text().replace("</body>", script + "</body>"))
+    probed.write_text(with_probe(page.read_text(), script))
     command = command_line(browser, probed, "--remote-debugging-port=0", *options)
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, errors="replace")
     watch = threading.Timer(seconds, process.kill)

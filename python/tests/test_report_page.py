@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from browser import browse, browser, semfm_cli  # noqa: F401
+from browser import browse, browser, semfm_cli, with_probe  # noqa: F401
 
 pytestmark = pytest.mark.full
 
@@ -89,8 +89,7 @@ class Outline(HTMLParser):
 
 def test_the_page_loads_alone_and_can_be_sorted(browser, page, tmp_path):
     probed = tmp_path / "probed.html"
-    text = page.read_text()
-    probed.write_text(text.replace("</body>", PROBE + "</body>"))
+    probed.write_text(with_probe(page.read_text(), PROBE))
     for width in (1280, 390):
         seen = browse(browser, probed, "--dump-dom", f"--window-size={width},900")
         complaints = [line for line in seen.stderr.splitlines() if ":CONSOLE" in line]
@@ -110,6 +109,17 @@ def test_the_page_loads_alone_and_can_be_sorted(browser, page, tmp_path):
         assert [iou for _, iou in gallery["best"]] == ious[::-1]
         assert len(gallery["all"]) == 24 and len(gallery["wks"]) == 12
         assert gallery["none"] == [] and told["count"] == "0 of 24 shown"
+
+
+def test_a_program_that_is_not_the_pages_own_does_not_run(browser, page, tmp_path):
+    spoiled = tmp_path / "spoiled.html"
+    script = "<script>document.title = 'overtaken'</script>"
+    style = '<p id="styled" style="color: rgb(1, 2, 3)">x</p>'
+    spoiled.write_text(page.read_text().replace("</body>", script + style + "</body>"))
+    seen = browse(browser, spoiled, "--dump-dom")
+    assert "overtaken</title>" not in seen.stdout and "<title>" in seen.stdout
+    refusals = [line for line in seen.stderr.splitlines() if "Content Security Policy" in line]
+    assert len(refusals) == 2, seen.stderr
 
 
 def test_a_screenshot_shows_more_than_white(browser, page, tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import browser, probe, semfm_cli  # noqa: F401
+from browser import browse, browser, probe, semfm_cli  # noqa: F401
 
 pytestmark = pytest.mark.full
 
@@ -275,30 +275,102 @@ def test_meshes_with_regions_and_views_files_are_shown(browser, demo):  # noqa: 
     assert told["pictures"] == 4 and told["images"] == [64] * 4 and told["turned"] > 0.01
 
 
-def test_grippers_stand_at_the_object(browser, demo):  # noqa: F811
+def test_the_hidden_counterpart_is_pointed_at(browser, demo):  # noqa: F811
     body = """
-    const [, [alone, few]] = await window.semfmReady;
-    const section = alone.figure.closest("section");
-    const told = { names: [alone.name, few.name], n: [alone.n, few.n], seen: [] };
-    told.legend = section.querySelector(".legend").textContent;
-    section.scrollIntoView(); await frame();
-    for (const panel of [alone, few]) {
-      const { clientWidth: width, clientHeight: height } = panel.canvas, words = new Set();
-      for (let y = 0; y < height; y += 8) for (let x = 0; x < width; x += 8) {
-        const vertex = panel.pick(x, y);
-        if (vertex >= 0) words.add(panel.describe(vertex).replace(/^vertex \\d+(, )?/, ""));
-      }
-      told.seen.push([...words]);
-    }
+    const ring = target.hiddenPlace, told = { before: ring.hidden };
+    const x = edge(source);
+    await point(source, x, 0.5);
+    const seen = [ring.hidden];
+    // Half a turn hides what was seen, or shows what was hidden.
+    target.turn(Math.PI, 0); await frame();
+    told.moved = ring.hidden;
+    await leave(source);
+    await point(source, x, 0.5);
+    seen.push(ring.hidden);
+    told.seen = seen; told.says = ring.textContent;
+    const box = ring.getBoundingClientRect(), stage = target.stage.getBoundingClientRect();
+    told.inside = ring.hidden || (box.left >= stage.left && box.right <= stage.right);
+    await leave(source);
+    told.after = ring.hidden;
     return told;
     """
-    told, console = probe(browser, demo / "page.html", body)
-    assert calm(console) == [] and told["names"] == ["the best grasp", "the best few"]
-    assert 3000 < told["n"][0] < told["n"][1]
-    alone, few = told["seen"]
-    assert sum(word.startswith("grasp") for word in alone) == 1 and "the region" in alone
-    assert sum(word.startswith("grasp") for word in few) > 2
-    assert all(word in told["legend"] for word in few)
+    told, console = probe(browser, demo / "page.html", HELPERS + body)
+    assert calm(console) == []
+    assert told["before"] and told["moved"] and told["after"] and told["inside"]
+    assert told["seen"] == [True, False] and told["says"] == "on the far side"
+
+
+def test_hands_step_through_every_grasp(browser, demo):  # noqa: F811
+    grasps = json.loads((demo / "transfer" / "grasps.json").read_text())["grasps"]
+    body = """
+    const [, [panel]] = await window.semfmReady;
+    const section = panel.figure.closest("section"), aside = section.querySelector(".grasps");
+    section.scrollIntoView(); await frame(); await frame();
+    const checksum = () => pixels(panel).reduce((sum, x, i) => (sum * 31 + x * (i % 7 + 1)) % 1000003, 0);
+    const [previous, next] = aside.querySelectorAll(".steps button");
+    const told = { n: aside.querySelectorAll(".all button").length, titles: [], terms: [], pictures: [], scores: [] };
+    for (let i = 0; i < told.n; i++) {
+      told.titles.push(aside.querySelector("output").textContent);
+      told.terms.push([...aside.querySelectorAll(".terms span")].map(e => e.textContent));
+      told.scores.push(Number(aside.querySelector("dd").textContent));
+      told.pictures.push(checksum());
+      next.click(); await frame();
+    }
+    told.around = aside.querySelector("output").textContent;
+    previous.click(); await frame();
+    told.last = aside.querySelector("output").textContent;
+    const closed = checksum();
+    const [open, together] = aside.querySelectorAll("input");
+    open.click(); await frame();
+    told.opened = checksum() !== closed; open.click();
+    together.click(); await frame();
+    told.together = checksum() !== closed;
+    told.translucent = pixels(panel).some((alpha, i) => i % 4 === 3 && alpha > 100 && alpha < 200);
+    told.gl = panel.painter.gl.getError();
+    return told;
+    """
+    told, console = probe(browser, demo / "page.html", HELPERS + body)
+    assert calm(console) == [] and told["gl"] == 0
+    n = len(grasps)
+    assert told["n"] == n > 2
+    assert told["titles"] == [f"grasp {i + 1} of {n}" for i in range(n)]
+    assert told["around"] == f"grasp 1 of {n}" and told["last"] == f"grasp {n} of {n}"
+    assert told["terms"][0] == sorted(grasps[0]["terms"])
+    np.testing.assert_allclose(told["scores"], [g["score"] for g in grasps], atol=6e-4)
+    assert len(set(told["pictures"])) > 0.8 * n, "steps show the same picture"
+    assert told["opened"] and told["together"] and told["translucent"]
+
+
+def test_the_page_can_be_dark_and_prints_what_was_never_scrolled_to(browser, demo):  # noqa: F811
+    body = """
+    const ground = () => getComputedStyle(document.body).backgroundColor;
+    const told = { system: ground() };
+    document.getElementById("theme").click(); told.chosen = ground();
+    document.getElementById("theme").click(); told.again = ground();
+    const [, [panel]] = groups;
+    told.blank = pixels(panel).every(x => x === 0) || panel.canvas.width === 300;
+    dispatchEvent(new Event("beforeprint"));
+    told.printed = pixels(panel).some(x => x > 0);
+    told.instructions = document.querySelector("details").open;
+    return told;
+    """
+    told, console = probe(browser, demo / "page.html", HELPERS + body, "--window-size=1280,500")
+    assert calm(console) == []
+    assert told["system"] != told["chosen"] and told["again"] == told["system"]
+    assert told["blank"] and told["printed"] and not told["instructions"]
+    dark, _ = probe(
+        browser, demo / "page.html", HELPERS + body, "--blink-settings=preferredColorScheme=0"
+    )
+    assert dark["system"] == told["chosen"]
+
+
+def test_a_program_that_is_not_the_pages_own_does_not_run(browser, demo):  # noqa: F811
+    spoiled = demo / "spoiled.html"
+    script = "<script>document.title = 'overtaken'</script>"
+    spoiled.write_text((demo / "page.html").read_text().replace("</body>", script + "</body>"))
+    seen = browse(browser, spoiled, "--dump-dom")
+    assert "overtaken</title>" not in seen.stdout and "<title>SemFM" in seen.stdout
+    assert "Content Security Policy" in seen.stderr
 
 
 def test_what_cannot_be_shown_is_named_with_what_can(demo):

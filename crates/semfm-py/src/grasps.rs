@@ -207,7 +207,7 @@ impl Grasps {
     /// ----------
     /// path : path
     /// format : str, optional
-    ///     ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray`, or Isaac's YAML.
+    ///     ``"json"``, ``"ros2"`` or ``"isaac"``: `grasps.json`, a ROS 2 MCAP with a `geometry_msgs/msg/PoseArray` and the widths and scores beside it, or Isaac's YAML.
     #[pyo3(signature = (path, *, format="json"))]
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<()> {
         match format {

@@ -6,6 +6,8 @@ use semfm::Verdict;
 use semfm::geom::math::{DVec3, bounds};
 pub use semfm::weight_colors::{MARKED, PLAIN, color_bytes, weight_colors};
 
+use crate::hand::PartKind;
+
 // Okabe and Ito's palette.
 const GREEN: [u8; 3] = [0, 158, 115];
 const VERMILION: [u8; 3] = [213, 94, 0];
@@ -43,9 +45,45 @@ const ANCHORS: [[f32; 3]; 6] = [
 /// Clusters that are no anchors, by turns.
 const OTHER_CLUSTERS: [[f32; 3]; 2] = [[0.82; 3], [0.68; 3]];
 
-/// The worst and the best of the grasps in one picture.
-const WORST_GRASP: [f32; 3] = [0.95, 0.75, 0.30];
-const BEST_GRASP: [f32; 3] = [0.13, 0.42, 0.80];
+/// Grasps of several in one picture, from the best to the last shown: the lightness rises all the way, so
+/// that they stay apart without colour.
+const GRASPS: [[f32; 3]; 4] =
+    [[0.10, 0.16, 0.42], [0.13, 0.44, 0.60], [0.36, 0.70, 0.58], [0.95, 0.84, 0.35]];
+/// The object's two contacts with the pads.
+pub(crate) const CONTACT: [f32; 3] = [0.98, 0.80, 0.10];
+/// The arrow along which a hand comes.
+pub(crate) const APPROACH: [f32; 3] = [0.12, 0.14, 0.18];
+/// The table below an object.
+pub(crate) const TABLE: [f32; 3] = [0.90, 0.87, 0.81];
+
+/// The colours of a hand's parts: the nearer to the object the darker.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HandColors {
+    pub palm: [f32; 3],
+    pub finger: [f32; 3],
+    pub pad: [f32; 3],
+}
+
+impl HandColors {
+    /// A hand that is shown alone.
+    pub(crate) fn of_one() -> Self {
+        Self { palm: [0.52, 0.64, 0.82], finger: [0.24, 0.42, 0.68], pad: [0.05, 0.12, 0.28] }
+    }
+
+    /// A hand by the rank of its grasp, where `n_shown` are drawn in one picture.
+    pub(crate) fn of_rank(rank: usize, n_shown: usize) -> Self {
+        let palm = grasp_color(rank, n_shown);
+        Self { palm, finger: palm.map(|c| 0.8 * c), pad: palm.map(|c| 0.5 * c) }
+    }
+
+    pub(crate) fn of(self, kind: PartKind) -> [f32; 3] {
+        match kind {
+            PartKind::Palm => self.palm,
+            PartKind::Finger => self.finger,
+            PartKind::Pad => self.pad,
+        }
+    }
+}
 
 /// The colour of an anchor by its rank from 0, grey for none (negative).
 pub(crate) fn anchor_color(rank: i64) -> [f32; 3] {
@@ -60,10 +98,13 @@ pub(crate) fn cluster_color(cluster: u32, anchor_rank: i64) -> [f32; 3] {
     }
 }
 
-/// The colour of the grasp of this rank where `n_shown` are drawn in one picture: the better the bluer.
+/// The colour of the grasp of this rank where `n_shown` are drawn in one picture: the better the darker.
 pub(crate) fn grasp_color(rank: usize, n_shown: usize) -> [f32; 3] {
-    let share = rank as f32 / (n_shown - 1) as f32;
-    std::array::from_fn(|c| BEST_GRASP[c] + share * (WORST_GRASP[c] - BEST_GRASP[c]))
+    let pieces = GRASPS.len() - 1;
+    let along = rank as f32 / n_shown.saturating_sub(1).max(1) as f32 * pieces as f32;
+    let piece = (along as usize).min(pieces - 1);
+    let (from, to) = (GRASPS[piece], GRASPS[piece + 1]);
+    std::array::from_fn(|c| from[c] + (along - piece as f32) * (to[c] - from[c]))
 }
 
 /// Positions as colours: x, y, z over the bounding box.

@@ -13,14 +13,17 @@ pub mod colors;
 mod error;
 #[cfg(feature = "mcap")]
 pub mod foxglove;
+mod hand;
 pub mod html;
 mod page;
 mod pictures;
+mod surface;
 mod transfer_files;
 
 pub use error::{Error, Result};
 pub use page::{
-    Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors, groups_of_paths, write_page,
+    Fact, Group, Hands, Layer, LegendEntry, Panel, Picture, VertexColors, groups_of_paths,
+    write_page,
 };
 pub use pictures::{TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_sheet};
 pub use transfer_files::{TRANSFER_FILES, TransferFiles, write_transfer};

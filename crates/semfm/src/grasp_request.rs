@@ -157,13 +157,24 @@ impl GraspProblem {
         }
     }
 
-    /// The object in metres, for pictures.
+    /// The object in metres.
     ///
     /// # Errors
     /// [`semfm_geom::Error::NotFinite`] where a coordinate leaves the range of numbers.
     pub fn mesh_in_metres(&self) -> Result<Mesh> {
         let vertices = self.mesh.vertices().iter().map(|&p| p * self.object_scale).collect();
         Ok(Mesh::new(vertices, self.mesh.faces().to_vec())?)
+    }
+
+    /// The table in the frame of the object in metres, its normal of length 1; none where there is none.
+    pub fn table(&self) -> Option<Table> {
+        let table = self.scene.table()?;
+        Some(Table { point: table.point, normal: table.normal })
+    }
+
+    /// The object's mesh as read, in its own units.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
     }
 
     /// How large the object is.

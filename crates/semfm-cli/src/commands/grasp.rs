@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use semfm::demonstration::is_one_sided;
 use semfm::files::{
-    GraspSettingsRecord, GraspsFile, read_aligned, read_obstacle, read_region, write_isaac_grasps,
-    write_ros2_grasps,
+    GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle, read_region,
+    write_isaac_grasps, write_ros2_grasps,
 };
 use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
@@ -61,7 +62,7 @@ pub struct GraspCommand {
 enum Format {
     /// grasps.json (docs/formats.md)
     Json,
-    /// ROS 2 MCAP: geometry_msgs/msg/PoseArray
+    /// ROS 2 MCAP: geometry_msgs/msg/PoseArray, widths and scores beside it
     Ros2,
     /// Isaac's grasp YAML
     Isaac,
@@ -159,7 +160,7 @@ impl GraspCommand {
         }
         let path = output.path();
         match self.format {
-            Format::Json => write_grasps(path, &problem, &found)?,
+            Format::Json => grasps_file(&problem, &found).write(path)?,
             Format::Ros2 => write_ros2_grasps(path, &result)?,
             Format::Isaac => write_isaac_grasps(path, &result)?,
         }
@@ -171,6 +172,14 @@ impl GraspCommand {
         if found.grasps.is_empty() && !common.quiet {
             let reason = small_region(&problem, region.weights())?;
             reason.iter().for_each(console::message);
+            if is_one_sided(problem.mesh(), &region)? {
+                console::message(format_args!(
+                    "the region is what one camera sees of its part; the pads need both sides: \
+                     semfm-cli region {} --region {} --grow -o whole.json",
+                    self.mesh.display(),
+                    self.region.display()
+                ));
+            }
         }
         output.finish(common)?;
         if !common.json {
@@ -275,8 +284,8 @@ fn small_region(problem: &GraspProblem, weights: &[f64]) -> Result<Option<String
     }))
 }
 
-/// Writes `grasps.json` with the settings of the search.
-pub fn write_grasps(path: &Path, problem: &GraspProblem, found: &Grasps) -> Result<()> {
+/// The content of `grasps.json`, with the table and the settings of the search.
+pub fn grasps_file(problem: &GraspProblem, found: &Grasps) -> GraspsFile {
     let settings = problem.settings();
     let settings = GraspSettingsRecord {
         seed: settings.seed,
@@ -284,8 +293,11 @@ pub fn write_grasps(path: &Path, problem: &GraspProblem, found: &Grasps) -> Resu
         n_samples: settings.n_samples,
         version: env!("CARGO_PKG_VERSION").into(),
     };
-    let file = GraspsFile { settings: Some(settings), ..GraspsFile::new(&problem.result(found)) };
-    Ok(file.write(path)?)
+    let table = problem.table().map(|Table { point, normal }| TableRecord {
+        point: point.to_array(),
+        normal: normal.to_array(),
+    });
+    GraspsFile { settings: Some(settings), table, ..GraspsFile::new(&problem.result(found)) }
 }
 
 /// Draws the best grasps in a region, one weight per vertex.
@@ -296,8 +308,8 @@ pub fn draw_grasps(
     found: &Grasps,
     task: &Task,
 ) -> Result<()> {
-    let (mesh, gripper) = (problem.mesh_in_metres()?, problem.gripper());
-    Ok(write_grasp_picture(path, &mesh, weights, gripper, &found.grasps, task)?)
+    let file = grasps_file(problem, found);
+    Ok(write_grasp_picture(path, problem.mesh(), weights, &file, task)?)
 }
 
 /// The grasps in short, for `--json`.

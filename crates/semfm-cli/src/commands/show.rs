@@ -15,12 +15,14 @@ use crate::output::OutputFile;
 /// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
 ///
 /// The page needs no network. Pointing at the source lights the matched place of the target, and the
-/// other way round.
+/// other way round. A region after a transfer's folder is the true one, which the answer is held against.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  semfm-cli show semfm-demo/transfer -o demo.html\n  \
-    semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html")]
+    semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html\n  \
+    semfm-cli show out true-grip.json -o judged.html")]
 pub struct ShowCommand {
-    /// Folders that `transfer -o` wrote, meshes, regions and grasps (after their mesh), views files
+    /// Folders that `transfer -o` wrote (the true region on the target may follow), meshes, regions and
+    /// grasps (after their mesh), views files
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Where to write the page; `-` is stdout

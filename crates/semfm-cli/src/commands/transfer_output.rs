@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
+use semfm::demonstration::is_one_sided;
 use semfm::files::{Provenance, TransferResult, put_transfer, stages_ms};
 use semfm::fmap::Stages;
 use semfm::geom::io::StagedFolder;
@@ -13,7 +14,7 @@ use semfm_show::{TransferFiles, write_transfer};
 use serde_json::{Value, json};
 
 use super::Outcome;
-use super::grasp::{draw_grasps, print_grasps, summary as grasps_summary, write_grasps};
+use super::grasp::{draw_grasps, grasps_file, print_grasps, summary as grasps_summary};
 use crate::console;
 use crate::options::Common;
 
@@ -45,7 +46,7 @@ impl TransferOutput<'_> {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
             let [file, picture] = GRASPS.map(|name| staged.path().join(name));
-            write_grasps(&file, problem, &found)?;
+            grasps_file(problem, &found).write(&file)?;
             if self.files == TransferFiles::All {
                 draw_grasps(&picture, problem, weights, &found, task)?;
             }
@@ -58,7 +59,16 @@ impl TransferOutput<'_> {
             console::data(self.summary(&stages, &files, grasps.as_ref()));
         } else {
             self.print(&stages, common);
-            grasps.iter().for_each(|found| print_grasps(found, common));
+            if let Some(found) = &grasps {
+                print_grasps(found, common);
+                let mesh = self.source.object.shape().original();
+                if found.grasps.is_empty() && is_one_sided(mesh, self.region)? {
+                    console::message(
+                        "the region is what one camera sees of its part; the pads need both sides: \
+                         transfer --grow completes it first",
+                    );
+                }
+            }
             console::data("wrote");
             files.iter().for_each(|file| console::data(format_args!("  {}", file.display())));
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use semfm::geom::io::{StagedFolder, printable, write_atomically};
-use semfm_show::colors::SERIES;
+use semfm_show::colors::{SERIES, hex};
 
 use super::html::{Cell, Table, escape, plot};
 use super::plots::{DrawError, error_curves};
@@ -70,7 +70,13 @@ fn page(results: &MapResults) -> std::result::Result<String, DrawError> {
         title: "All pairs".into(),
         body: pairs + &failures(results),
     });
-    Ok(shell("Maps against true correspondences", &head, "", &sections))
+    Ok(shell("Maps against true correspondences", &head, &series_style(), &sections))
+}
+
+/// The colour of each series for the style sheet: the page's policy lets no element bring its own.
+fn series_style() -> String {
+    let rules = SERIES.iter().enumerate();
+    rules.map(|(i, &color)| format!(".series{i} {{ --c: {}; }}\n", hex(color))).collect()
 }
 
 fn about(method: &str) -> &str {
@@ -122,9 +128,9 @@ fn figure(results: &MapResults, set: &str) -> std::result::Result<String, DrawEr
         return Ok(String::new());
     }
     let mut legend = String::new();
-    for (s, [r, g, b]) in summaries.iter().zip(SERIES.iter().cycle()) {
+    for (s, series) in summaries.iter().zip((0..SERIES.len()).cycle()) {
         let words = escape(about(&s.method));
-        legend += &format!("<li class=\"solid\" style=\"--c:rgb({r} {g} {b})\">{words}</li>");
+        legend += &format!("<li class=\"solid series{series}\">{words}</li>");
     }
     let plot = plot(
         &error_curves::draw(&errors, (high * 1.02).ceil())?,

@@ -24,6 +24,7 @@ use semfm::geom::io::write_atomically;
 use semfm_show::colors::{
     EXTRA, MISSED, NamedColor, QUOTED, QUOTED_VLM, RIGHT, SECOND, css_properties,
 };
+use semfm_show::html::policy;
 
 use crate::dataset::Dataset;
 use crate::results::Results;
@@ -166,22 +167,20 @@ fn shell(title: &str, head: &str, style: &str, sections: &[Section]) -> String {
         links += &format!("<li><a href=\"#{id}\">{}</a></li>", escape(title));
         bodies += &section(id, title, body);
     }
+    let style = format!(":root {{ {} }}\n{}{style}", style_colors(), include_str!("style.css"));
+    let script = include_str!("page.js");
     // The policy makes sure of it: whatever is not in this page is not loaded.
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
-         img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n{}\n\
          <link rel=\"icon\" href=\"data:,\">\n\
-         <title>{title}</title>\n<style>\n:root {{ {} }}\n{}{style}</style>\n</head>\n<body>\n\
+         <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n\
          <header>\n<h1>{title}</h1>\n{head}<nav aria-label=\"Contents\"><ul>{links}</ul></nav>\n\
          </header>\n<main>\n{bodies}</main>\n\
          <footer>Written by semfm {} from <code>results.json</code>; <code>table.md</code> holds the \
-         same numbers as text.</footer>\n<script>\n{}</script>\n</body>\n</html>\n",
-        style_colors(),
-        include_str!("style.css"),
+         same numbers as text.</footer>\n<script>{script}</script>\n</body>\n</html>\n",
+        policy(&style, script),
         env!("CARGO_PKG_VERSION"),
-        include_str!("page.js"),
     )
 }
 

@@ -4,6 +4,7 @@ use semfm::geom::math::{DMat3, DVec3};
 use serde::Serialize;
 
 use super::encoding::{EncodedMesh, encode_bytes, encode_numbers};
+use super::grasps::{Hands, HandsData};
 use super::group::{Group, Layer, Panel, Picture, VertexColors};
 use crate::colors::{MARKED, PLAIN, color_bytes, hex};
 use crate::html::base64;
@@ -26,6 +27,7 @@ struct GroupData<'a> {
     panels: Vec<PanelData<'a>>,
     source_of: Option<String>,
     pictures: Vec<PictureData<'a>>,
+    hands: Option<&'a HandsData>,
 }
 
 #[derive(Serialize)]
@@ -96,6 +98,7 @@ impl<'a> GroupData<'a> {
             panels: panels.map(|(k, panel)| PanelData::new(panel, k, &group.layers)).collect(),
             source_of: group.source_of.as_ref().map(|ids| encode_numbers(ids.iter().copied())),
             pictures: pictures.map(|picture| PictureData::new(picture, upright)).collect(),
+            hands: group.hands.as_ref().map(Hands::data),
         }
     }
 }

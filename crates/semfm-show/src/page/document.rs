@@ -9,12 +9,14 @@ use super::data::PageData;
 use super::group::Group;
 use crate::Result;
 use crate::colors::{MARKED, NamedColor, PLAIN, color_bytes, css_properties, verdict_color};
-use crate::html::{Field, escape, fill};
+use crate::html::{Field, escape, fill, policy};
 
 /// The viewer, in the order in which its files build on each other.
-const VIEWER: [&str; 4] = [
+const VIEWER: [&str; 6] = [
     include_str!("viewer/painter.js"),
     include_str!("viewer/panel.js"),
+    include_str!("viewer/hands.js"),
+    include_str!("viewer/theme.js"),
     include_str!("viewer/decode.js"),
     include_str!("viewer/viewer.js"),
 ];
@@ -28,12 +30,14 @@ pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
     groups.iter().try_for_each(Group::check)?;
     refuse_input(path)?;
     let script = format!("\"use strict\";\n{}", VIEWER.concat());
+    let style = format!(":root {{ {} }}\n{}", style_colors(), include_str!("viewer/style.css"));
     let page = fill(
         include_str!("viewer/page.html"),
         &[
+            Field { name: "policy", html: &policy(&style, &script) },
             Field { name: "title", html: &escape(title) },
             Field { name: "version", html: env!("CARGO_PKG_VERSION") },
-            Field { name: "colors", html: &style_colors() },
+            Field { name: "style", html: &style },
             Field { name: "script", html: &script },
             Field { name: "data", html: &script_json(&PageData::new(groups)) },
         ],
@@ -88,6 +92,7 @@ mod tests {
             ],
             source_of,
             pictures: Vec::new(),
+            hands: None,
         }
     }
 
@@ -98,6 +103,12 @@ mod tests {
         write_page(&path, "a < b {{data}}", &[group(Some(vec![0, 1, 2]))]).unwrap();
         let page = std::fs::read_to_string(&path).unwrap();
         assert!(!page.contains("http://") && !page.contains("https://"));
+        let inside = |open: &str, close: &str| {
+            let start = page.rfind(open).unwrap() + open.len();
+            &page[start..start + page[start..].find(close).unwrap()]
+        };
+        let policy = policy(inside("<style>", "</style>"), inside("<script>", "</script>"));
+        assert!(page.contains(&policy), "the policy does not let the page's own program run");
         assert_eq!(page.matches("</script>").count(), 2);
         assert!(page.contains("a &lt; b {{data}}") && page.contains("--refuse: #b3261e;"));
         assert_eq!(page.matches("{{").count(), 2, "a field of the template is not filled");

@@ -3,6 +3,7 @@
 use semfm::geom::math::DVec3;
 use semfm::{Mesh, Task};
 
+use super::grasps::Hands;
 use crate::pictures::{Viewpoints, viewpoints};
 use crate::{Error, Result};
 
@@ -92,6 +93,8 @@ pub struct Group {
     pub source_of: Option<Vec<u32>>,
     /// Pictures of the first panel's mesh.
     pub pictures: Vec<Picture>,
+    /// Hands at the first panel's mesh.
+    pub hands: Option<Hands>,
 }
 
 impl VertexColors {

@@ -36,6 +36,7 @@ pub(super) fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
         layers,
         source_of: None,
         pictures: Vec::new(),
+        hands: None,
     })
 }
 

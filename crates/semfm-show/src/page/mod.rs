@@ -16,5 +16,6 @@ mod transfer_folder;
 mod views;
 
 pub use document::write_page;
+pub use grasps::Hands;
 pub use group::{Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors};
 pub use paths::groups_of_paths;

@@ -10,45 +10,56 @@ use serde_json::Value;
 use super::grasps::grasps_group;
 use super::group::Group;
 use super::mesh::{add_region, mesh_group};
-use super::transfer_folder::transfer_groups;
+use super::transfer_folder::{add_truth, transfer_groups};
 use crate::{Error, Result};
 
 /// What `show` takes, for its messages.
 fn expected() -> String {
     format!(
-        "the folder that `transfer -o` wrote, a mesh ({}), a region or grasps (JSON) after their \
-         mesh, or a views file (MCAP)",
+        "the folder that `transfer -o` wrote, with the true region (JSON) after it where that is known, \
+         a mesh ({}), a region or grasps (JSON) after their mesh, or a views file (MCAP)",
         MeshFormat::readable_names()
     )
 }
 
 /// The groups of all paths: one for each folder of a transfer (and one for its grasps), mesh and views
-/// file; a region file is shown on the mesh before it, a file of grasps beside it.
+/// file; a region file is shown on the mesh before it, a file of grasps beside it. A region file after a
+/// transfer's folder is the true region on its target.
 ///
 /// # Errors
 /// [`Error::Format`] for a path that cannot be shown, with what it is and what would be taken, and for
 /// files of a folder that do not fit each other; [`Error::Semfm`] where a file cannot be read or drawn.
 pub fn groups_of_paths(paths: &[PathBuf], task: &Task) -> Result<Vec<Group>> {
     let mut groups: Vec<Group> = Vec::new();
-    // The mesh that regions and grasps belong to.
-    let mut before: Option<MeshBefore> = None;
+    // What regions and grasps belong to.
+    let mut before: Option<Before> = None;
     for path in paths {
         if !path.is_dir() && extension(path) == "json" {
-            let Some(mesh) = &mut before else { return Err(json_alone(path)) };
-            mesh.add_json(path, &mut groups, task)?;
+            match &mut before {
+                None => return Err(json_alone(path)),
+                Some(Before::Mesh(mesh)) => mesh.add_json(path, &mut groups, task)?,
+                Some(Before::Transfer(group)) => add_truth(&mut groups[*group], path)?,
+            }
             continue;
         }
         before = None;
         if path.is_dir() {
+            before = Some(Before::Transfer(groups.len()));
             groups.extend(groups_of_folder(path, task)?);
         } else if extension(path) == "mcap" {
             groups.push(group_of_mcap(path, task)?);
         } else {
-            before = Some(MeshBefore { group: groups.len(), region: None });
+            before = Some(Before::Mesh(MeshBefore { group: groups.len(), region: None }));
             groups.push(group_of_mesh(path, task)?);
         }
     }
     Ok(groups)
+}
+
+/// What the files after it belong to: a mesh, or a transfer by the number of its group.
+enum Before {
+    Mesh(MeshBefore),
+    Transfer(usize),
 }
 
 /// A mesh that files after it belong to: the number of its group, and the last region on it.
@@ -168,6 +179,29 @@ mod tests {
             groups.iter().map(|group| group.layers.iter().map(|l| &*l.name).collect()).collect();
         assert_eq!(names, [vec!["grip.json", "colours"], vec!["colours"]]);
         write_page(&at("page.html"), "t", &groups).unwrap();
+    }
+
+    #[cfg(feature = "mcap")]
+    #[test]
+    fn a_views_file_of_a_mesh_with_the_zero_below_zero_is_shown() {
+        use semfm::geom::math::DVec3;
+        use semfm::rendered_views::{ViewSettings, write_rendered_views};
+        use semfm::views::{Renderer, RigSettings};
+
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let turned = zoo::icosphere(1).vertices().iter().map(|&p| -p).collect::<Vec<DVec3>>();
+        assert!(turned.iter().any(|p| p.x == 0.0 && p.x.is_sign_negative()));
+        let mesh = semfm::Mesh::new(turned, zoo::icosphere(1).faces().to_vec()).unwrap();
+        write_mesh(at("ball.ply"), &mesh).unwrap();
+        let file = semfm::geom::io::read_mesh(at("ball.ply")).unwrap();
+        let rig = RigSettings { count: 2, size: 32, ..Default::default() };
+        let settings = ViewSettings { rig, ..Default::default() };
+        let (views, task) = (at("ball.views.mcap"), Task::default());
+        write_rendered_views(&views, &file, &settings, &Renderer::cpu(), &task).unwrap();
+        std::fs::write(at("grip.json"), json!({ "vertices": [0] }).to_string()).unwrap();
+        let paths = [at("ball.ply"), at("grip.json"), views];
+        assert_eq!(groups_of_paths(&paths, &task).unwrap().len(), 2);
     }
 
     #[test]

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use semfm::files::{HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile};
+use semfm::files::{
+    HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile, read_region,
+};
+use semfm::fmap::metrics::iou;
 use semfm::geom::MeshHash;
 use semfm::geom::io::{FormatError, read_mesh};
 use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
@@ -12,8 +15,9 @@ use super::grasps::grasps_group;
 use super::group::{
     Fact, Group, Layer, LegendEntry, Panel, VIEWPOINT_SIDE, VertexColors, mesh_note,
 };
+use super::mesh::file_name;
 use crate::Result;
-use crate::colors::anchor_color;
+use crate::colors::{EXTRA, MISSED, RIGHT, anchor_color, outcome_colors};
 use crate::pictures::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
 
 /// Classes of a layer have numbers below 256; so many anchors or places get one of their own.
@@ -41,6 +45,35 @@ pub(super) fn transfer_groups(folder: &Path, task: &Task) -> Result<Vec<Group>> 
     };
     let layers = files.layers(folder)?;
     Ok(std::iter::once(files.into_group(folder, layers, viewpoints)).chain(grasps).collect())
+}
+
+/// Holds the transferred region against the true one on the target: a layer that tells what is right, too
+/// much and missed, and their IoU.
+///
+/// # Errors
+/// [`Error::Semfm`](crate::Error::Semfm) for a file that is no region of the target.
+pub(super) fn add_truth(group: &mut Group, path: &Path) -> Result<()> {
+    let [_, target] = &group.panels[..] else { return Ok(()) };
+    let truth = read_region(path, &target.mesh)?;
+    let [VertexColors::Weights(given), VertexColors::Weights(found)] = &group.layers[0].colors[..]
+    else {
+        return Ok(());
+    };
+    let found = Region::from_weights(found.clone())?;
+    let inside: Vec<bool> = given.iter().map(|&w| w >= Region::COUNTS).collect();
+    let outcomes = [outcome_colors(&inside, &inside), outcome_colors(&found.mask(), &truth.mask())];
+    let colors =
+        outcomes.map(|colors| VertexColors::Colors(colors.into_iter().map(color_bytes).collect()));
+    let legend = vec![
+        LegendEntry::swatch(RIGHT, "right"),
+        LegendEntry::swatch(EXTRA, "found, and not in the true region"),
+        LegendEntry::swatch(MISSED, "in the true region, and not found"),
+    ];
+    let name = file_name(path);
+    group.facts.push(Fact::new(format!("IoU with {name}"), format!("{:.2}", iou(&found, &truth)?)));
+    let layer = Layer { name: format!("against {name}"), legend, colors: colors.into() };
+    group.layers.insert(1, layer);
+    Ok(())
 }
 
 /// The files of a transfer that the page shows.
@@ -127,7 +160,9 @@ impl TransferFolder {
             Fact::new("confidence", format!("{confidence:.2}")),
             Fact::new("method", transfer.settings.method),
         ];
-        facts.extend(provenance.iou.map(|iou| Fact::new("IoU", format!("{iou:.2}"))));
+        facts.extend(
+            provenance.iou.map(|iou| Fact::new("IoU with the true grip", format!("{iou:.2}"))),
+        );
         facts
     }
 
@@ -142,6 +177,7 @@ impl TransferFolder {
             layers,
             source_of: Some(self.map.source_of),
             pictures: Vec::new(),
+            hands: None,
         }
     }
 }

@@ -32,6 +32,7 @@ pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
         layers: vec![Layer::own_colors(colors)],
         source_of: None,
         pictures,
+        hands: None,
     })
 }
 

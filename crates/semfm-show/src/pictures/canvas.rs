@@ -31,6 +31,16 @@ impl Canvas {
         Self { width, height, rgb: color.repeat(width * height) }
     }
 
+    /// A picture of this width to be drawn on.
+    pub(super) fn of_picture(rgb: Vec<u8>, width: usize) -> Self {
+        Self { width, height: rgb.len() / (3 * width), rgb }
+    }
+
+    /// The picture as it is now.
+    pub(super) fn into_picture(self) -> Vec<u8> {
+        self.rgb
+    }
+
     fn offset(&self, x: usize, y: usize) -> usize {
         3 * (y * self.width + x)
     }

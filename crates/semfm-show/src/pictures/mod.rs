@@ -5,6 +5,7 @@ mod feature_colors;
 mod features_picture;
 mod grasp_picture;
 mod pair_rotation;
+mod scale_bar;
 mod sheet;
 mod stroke_font;
 mod transfer_figure;
@@ -17,7 +18,10 @@ pub use sheet::write_sheet;
 pub use transfer_figure::TransferFigure;
 pub use viewpoints::{Viewpoints, viewpoints};
 
-pub(crate) use grasp_picture::{N_SHOWN, viewpoints_with_grippers};
+pub(crate) use grasp_picture::{
+    ARROW, ARROW_GAP, ARROW_RADIUS, N_SHOWN, OPACITY, TABLE_REACH, ball_radius,
+};
 pub(crate) use pair_rotation::WeightedMesh;
 pub(crate) use transfer_figure::ObjectFigure;
-pub(crate) use viewpoints::{PairedViewpoints, paired_viewpoints};
+pub(crate) use upright::upright;
+pub(crate) use viewpoints::{PairedViewpoints, paired_viewpoints, viewpoints_around};

@@ -1,8 +1,8 @@
 //! Which way is up: pictures of an object lying on its side are hard to read.
 
 use semfm::geom::math::{DVec3, bounds};
+use semfm::geom::sampling::fibonacci_directions;
 use semfm::geom::{Mesh, principal_axes};
-use semfm::views::fibonacci_directions;
 
 use crate::Result;
 
@@ -25,7 +25,7 @@ const N_FLAT_SIDES: usize = 16;
 
 /// Which way is up.
 #[derive(Clone, Copy)]
-pub(super) struct Upright {
+pub(crate) struct Upright {
     pub up: DVec3,
     /// Whether the object has a foot to stand on, so that `up` is more than a guess.
     pub is_sure: bool,
@@ -37,7 +37,7 @@ pub(super) struct Upright {
 /// # Errors
 /// [`Error::Invalid`](crate::Error::Invalid) for a mesh without vertices,
 /// [`Error::Semfm`](crate::Error::Semfm) for one without principal axes.
-pub(super) fn upright(mesh: &Mesh) -> Result<Upright> {
+pub(crate) fn upright(mesh: &Mesh) -> Result<Upright> {
     let Some((low, high)) = bounds(mesh.vertices()) else {
         return Err(crate::Error::invalid("mesh to be shown", "vertices", "none"));
     };

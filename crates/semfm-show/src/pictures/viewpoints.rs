@@ -3,8 +3,9 @@
 
 use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
+use semfm::geom::sampling::fibonacci_directions;
 use semfm::geom::{Mesh, Pinhole, Task};
-use semfm::views::{RigSettings, camera_towards, fibonacci_directions, triangle_ids};
+use semfm::views::{RigSettings, camera_towards, triangle_ids};
 
 use super::pair_rotation::{Standing, WeightedMesh, pair_rotation};
 use super::upright::upright;
@@ -40,7 +41,7 @@ pub fn viewpoints(mesh: &Mesh, weights: &[f64], side: u32, task: &Task) -> Resul
 }
 
 /// The same with a given way up.
-pub(super) fn viewpoints_around(
+pub(crate) fn viewpoints_around(
     up: DVec3,
     object: WeightedMesh<'_>,
     side: u32,

@@ -44,6 +44,9 @@ pub struct GraspsFile {
     pub n_candidates: usize,
     /// Gripper poses that passed every check.
     pub n_survivors: usize,
+    /// The table that the object stands on, where the program that wrote the file gave it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<TableRecord>,
     /// The settings of the search, where the program that wrote the file gave them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub settings: Option<GraspSettingsRecord>,
@@ -133,6 +136,15 @@ pub struct MissRecord {
     pub object_from_tcp: MatrixRows,
 }
 
+/// A table of a [`GraspsFile`], in the frame of the object in metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TableRecord {
+    /// A point of its top.
+    pub point: [f64; 3],
+    /// Unit normal, away from the table.
+    pub normal: [f64; 3],
+}
+
 /// The settings of a search as `grasps.json` has them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspSettingsRecord {
@@ -147,7 +159,7 @@ pub struct GraspSettingsRecord {
 }
 
 impl GraspsFile {
-    /// The file of a result, without settings.
+    /// The file of a result, without table and settings.
     pub fn new(result: &GraspResult<'_>) -> Self {
         let found = result.found;
         let rejected =
@@ -169,6 +181,7 @@ impl GraspsFile {
             }),
             n_candidates: found.n_candidates,
             n_survivors: found.n_survivors,
+            table: None,
             settings: None,
         }
     }

@@ -48,7 +48,7 @@ pub use depth_image::read_depth_image;
 pub use embeddings::read_embeddings;
 pub use grasps::{
     FORMAT as GRASPS_FORMAT, GraspRecord, GraspSettingsRecord, GraspsFile, GripperRecord,
-    HandRecord, MissRecord, PartRecord,
+    HandRecord, MissRecord, PartRecord, TableRecord,
 };
 pub use intrinsics::read_intrinsics;
 pub use isaac_grasps::write_isaac_grasps;

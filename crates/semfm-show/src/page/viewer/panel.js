@@ -4,6 +4,8 @@
 const REACH = 9, SLIP = 7;
 // Shape of the canvas, and the share of it that an object fills at the start.
 const ASPECT = 4 / 3, FILL = 0.82;
+// A surface that is this much nearer to the eye, as a share of the object's radius, hides a vertex.
+const BEHIND = 0.06;
 // Steps of the keys: radians, pixels and a factor. Radians of a dragged pixel.
 const KEY_TURN = 0.1, KEY_MOVE = 30, KEY_ZOOM = 1.15, DRAG_TURN = 0.008;
 const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -17,6 +19,8 @@ class Panel {
     this.positions = data.positions;
     this.faces = data.faces;
     this.layers = data.layers;
+    // Hands that stand at the object, if there are any.
+    this.hands = data.hands;
     // The place on the first object that each vertex is matched to: its own, until panels are linked.
     this.matched = data.positions;
     this.n = this.positions.length / 3;
@@ -43,7 +47,9 @@ class Panel {
       this.canvas.tabIndex = 0;
       this.canvas.setAttribute("role", "application");
       this.canvas.setAttribute("aria-label", `${name}, ${note}, to be turned with the arrow keys`);
-      this.stage.append(this.canvas);
+      this.hiddenPlace = element("div", element("span"), "hidden-place");
+      this.hiddenPlace.hidden = true;
+      this.stage.append(this.canvas, this.hiddenPlace);
     } else {
       this.stage.className = "fault";
       this.stage.textContent = NO_WEBGL;
@@ -68,6 +74,10 @@ class Panel {
   // it may touch the edge.
   fit() {
     const [low, high] = boundsOf(this.positions, this.faces);
+    this.beside = this.hands ? this.hands.reach() : [];
+    for (const p of this.beside) for (let k = 0; k < 3; k++) {
+      low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]);
+    }
     this.centre = low.map((x, k) => (x + high[k]) / 2);
     this.radius = Math.hypot(...low.map((x, k) => (high[k] - x) / 2)) || 1;
     Object.assign(this, this.home);
@@ -79,17 +89,17 @@ class Panel {
     this.centre = this.centre.map((x, k) => x + du * right[k] + dv * up[k]);
   }
 
-  // Least and largest coordinates of the surface along two axes.
+  // Least and largest coordinates along two axes, of the surface and of what stands beside it.
   boxAlong(right, up) {
     const p = this.positions;
     let left = Infinity, bottom = Infinity, rightmost = -Infinity, top = -Infinity;
-    for (const vertex of this.faces) {
-      const i = 3 * vertex;
-      const u = right[0] * p[i] + right[1] * p[i + 1] + right[2] * p[i + 2];
-      const v = up[0] * p[i] + up[1] * p[i + 1] + up[2] * p[i + 2];
+    const add = (x, y, z) => {
+      const u = right[0] * x + right[1] * y + right[2] * z, v = up[0] * x + up[1] * y + up[2] * z;
       left = Math.min(left, u); rightmost = Math.max(rightmost, u);
       bottom = Math.min(bottom, v); top = Math.max(top, v);
-    }
+    };
+    for (const vertex of this.faces) add(p[3 * vertex], p[3 * vertex + 1], p[3 * vertex + 2]);
+    for (const point of this.beside) add(...point);
     return [left, bottom, rightmost, top];
   }
 
@@ -100,6 +110,7 @@ class Panel {
 
   moved() {
     this.ids = null;
+    this.pointAt(-1);
     this.draw();
   }
 
@@ -115,6 +126,48 @@ class Panel {
   highlight(centre, radius) {
     this.spot = centre ? [...centre, radius] : [0, 0, 0, 0];
     this.draw();
+  }
+
+  // Shows where a vertex lies that the object hides, or the edge of the picture does; −1: nowhere.
+  pointAt(vertex) {
+    if (!this.hiddenPlace) return;
+    const why = vertex < 0 ? "" : this.whyUnseen(vertex);
+    this.hiddenPlace.hidden = !why;
+    if (!why) return;
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const [x, y] = this.placeOf(vertex), inside = (at, size) => Math.max(20, Math.min(size - 20, at));
+    this.hiddenPlace.style.left = `${inside(x, width)}px`;
+    this.hiddenPlace.style.top = `${inside(y, height)}px`;
+    this.hiddenPlace.classList.toggle("low", y > height - 60);
+    this.hiddenPlace.firstChild.textContent = why;
+  }
+
+  // Where a vertex is on the canvas, in CSS pixels.
+  placeOf(vertex) {
+    const m = this.view().clip, [a, b, c] = this.position(vertex);
+    const x = m[0] * a + m[4] * b + m[8] * c + m[12], y = m[1] * a + m[5] * b + m[9] * c + m[13];
+    return [(1 + x) / 2 * this.canvas.clientWidth, (1 - y) / 2 * this.canvas.clientHeight];
+  }
+
+  // Why a vertex cannot be seen; nothing where it can.
+  whyUnseen(vertex) {
+    const [x, y] = this.placeOf(vertex), [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (x < 0 || y < 0 || x > width || y > height) return "outside the picture";
+    const before = this.pick(x, y), [, , back] = this.axes();
+    if (before < 0) return "";
+    const nearer = dot(back, this.position(before)) - dot(back, this.position(vertex));
+    return nearer > BEHIND * this.radius ? "on the far side" : "";
+  }
+
+  // The vertex that is matched nearest to the highlighted place.
+  nearestHighlighted() {
+    const [x, y, z] = this.spot;
+    let nearest = -1, least = Infinity;
+    for (let v = 0; v < this.n; v++) {
+      const squared = this.squaredDistance(v, x, y, z);
+      if (squared < least) { least = squared; nearest = v; }
+    }
+    return nearest;
   }
 
   // How many vertices that are.
@@ -175,7 +228,13 @@ class Panel {
       [this.canvas.width, this.canvas.height] = [width, height];
       this.ids = null;
     }
-    this.painter.draw(this.loaded, this.view(), this.canvas, width, height);
+    this.painter.draw(this.loaded, this.view(), this.canvas, width, height, this.hands ? this.itemsBeside() : []);
+  }
+
+  // What stands beside the object. Seen from below, a table is all but clear.
+  itemsBeside() {
+    const [, , back] = this.axes(), normal = this.hands.data.tableNormal;
+    return this.hands.items().map(item => item.isTable && dot(back, normal) < 0 ? { ...item, alpha: 0.25 } : item);
   }
 
   // The vertex at a place of the canvas in CSS pixels, or the nearest within reach, or −1. The picture
@@ -255,7 +314,9 @@ class Panel {
   listenToSize() {
     const look = seen => { this.visible = seen.some(entry => entry.isIntersecting); this.draw(); };
     new IntersectionObserver(look, { rootMargin: "200px" }).observe(this.figure);
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    new ResizeObserver(() => { this.pointAt(-1); this.draw(); }).observe(this.canvas);
+    // Paper shows panels that were never scrolled to.
+    addEventListener("beforeprint", () => { this.visible = true; this.paint(); });
   }
 
   listenToPointer() {

@@ -1,7 +1,7 @@
 // The page: groups of panels side by side, in one of several layers of colour. Data: {plain, marked,
 // groups: [{title, facts: [{name, value}], layers: [{name, kind, legend: [{color, text}]}], panels: [{name,
 // note, n, step, positions, faces, upright, yaw, pitch, colors}], sourceOf, pictures: [{name, png, yaw,
-// pitch}]}]}. Arrays are read by `decode.js`.
+// pitch}], hands}]}. Arrays are read by `decode.js`, hands by `hands.js`.
 
 const VERDICTS = ["accept", "check", "refuse"];
 const TOO_OLD = "This browser is too old for this page: it cannot decompress the meshes (DecompressionStream). Open it in one from 2023 or newer.";
@@ -22,7 +22,7 @@ async function decodeLayer(layer, encoded, n, matchColors, { plain, marked }) {
 }
 
 // The panels of a group. With a point map, the second takes the position colours of the first.
-async function decodePanels(painter, group, sourceOf, weightColors) {
+async function decodePanels(painter, group, sourceOf, hands, weightColors) {
   const panels = [];
   let firstColors = null;
   for (const data of group.panels) {
@@ -34,7 +34,7 @@ async function decodePanels(painter, group, sourceOf, weightColors) {
     firstColors ||= matchColors;
     const layers = await Promise.all(group.layers.map((layer, i) =>
       decodeLayer(layer, data.colors[i], data.n, matchColors, weightColors)));
-    panels.push(new Panel(painter, { ...data, positions, faces, layers }));
+    panels.push(new Panel(painter, { ...data, positions, faces, layers, hands }));
   }
   return panels;
 }
@@ -58,7 +58,7 @@ function link([source, target], sourceOf) {
     target.highlight(source.position(sourceVertex), targetRadius);
   };
   const clear = () => {
-    for (const panel of [source, target]) { panel.highlight(null); panel.write(""); }
+    for (const panel of [source, target]) { panel.highlight(null); panel.write(""); panel.pointAt(-1); }
   };
   [source.leave, target.leave] = [clear, clear];
   source.hover = vertex => {
@@ -66,10 +66,14 @@ function link([source, target], sourceOf) {
     // A map need not reach every place of the source.
     const off = target.distanceToMatched(source.position(vertex));
     highlight(vertex, Math.max(radius, 1.4 * off));
+    source.pointAt(-1);
+    target.pointAt(target.nearestHighlighted());
     target.write(counterpartText(off < radius, target.nHighlighted()));
   };
   target.hover = vertex => {
     highlight(sourceOf[vertex], radius);
+    target.pointAt(-1);
+    source.pointAt(sourceOf[vertex]);
     target.write(`${target.describe(vertex)}, matched to source vertex ${sourceOf[vertex]}`);
     source.write(source.describe(sourceOf[vertex]));
   };
@@ -105,13 +109,16 @@ function factsList(facts) {
   return element("ul", facts.map(fact => element("li", [`${fact.name} `, element("b", fact.value, verdictClass(fact))])), "facts");
 }
 
+// A colour, three numbers from 0 to 1, and what it stands for.
+function swatch(color, text) {
+  const made = element("i");
+  made.style.background = `rgb(${color.map(c => Math.round(255 * c)).join(" ")})`;
+  return element("span", [made, text]);
+}
+
 function legendItems(layer) {
-  const items = layer.legend.filter(({ text }) => text).map(({ color, text }) => {
-    if (!color) return element("span", text);
-    const swatch = element("i");
-    swatch.style.background = color;
-    return element("span", [swatch, text]);
-  });
+  const items = layer.legend.filter(({ text }) => text)
+    .map(({ color, text }) => color ? swatch(rgb(color).map(c => c / 255), text) : element("span", text));
   const bar = () => element("span", ["weight 0", element("i", null, "bar"), "1, counts from the mark on"]);
   return layer.kind === "weights" ? [bar(), ...items] : items;
 }
@@ -150,7 +157,8 @@ function pictureButton({ name, png, yaw, pitch }, panel) {
 
 async function addGroup(painter, group, weightColors) {
   const sourceOf = group.sourceOf && await decodeNumbers(group.sourceOf);
-  const panels = await decodePanels(painter, group, sourceOf, weightColors);
+  const hands = group.hands && new Hands(group.hands);
+  const panels = await decodePanels(painter, group, sourceOf, hands, weightColors);
   panels.forEach(answerPointer);
   if (sourceOf) link(panels, sourceOf);
   const { buttons, legend, show } = layerControls(group.layers, panels);
@@ -159,7 +167,9 @@ async function addGroup(painter, group, weightColors) {
     factsList(group.facts),
     element("div", [...buttons, cameraControls(panels)], "controls"),
     legend,
-    element("div", panels.map(panel => panel.figure), "panels"),
+    hands
+      ? element("div", [panels[0].figure, new HandControls(panels[0], hands).element], "panels beside")
+      : element("div", panels.map(panel => panel.figure), "panels"),
     element("div", group.pictures.map(picture => pictureButton(picture, panels[0])), "pictures"),
   ]));
   show(0);
@@ -175,5 +185,6 @@ async function start() {
   return all;
 }
 
+startTheme(document.getElementById("theme"));
 // The panels of each group, once all is shown.
 window.semfmReady = start().catch(error => { addFault("This page is damaged: " + error.message); throw error; });

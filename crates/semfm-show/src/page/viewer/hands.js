@@ -1,0 +1,153 @@
+// Hands at the object: one grasp after the other, with the terms of its score, or the best few together.
+// Matrices are 3 × 4, rows one after the other. Data of a group: {parts: [{carrier, kind, positions,
+// faces}], grasps: [{place, closed, open, width, opening, score, terms, contacts}], arrow, ball, table,
+// colors, ranks, opacity}: see `hands.rs`.
+
+// What 1 means for each term of a score.
+const TERMS = {
+  approach: "the hand comes as it was demonstrated",
+  bite: "the pads are filled along their length",
+  clearance: "the open hand keeps 1 cm from everything",
+  contact: "each pad touches with 60 % of its face or more",
+  epsilon: "the grip resists pushes and twists as well as two full pads",
+  friction: "the contacts oppose each other exactly",
+  gravity: "the weight does not turn the object between the pads",
+  lever: "the grip is around the centre of mass",
+  region: "all contact lies in the region",
+};
+
+// a · b for motions of 3 × 4.
+function chain(a, b) {
+  const out = [];
+  for (let i = 0; i < 3; i++) for (let k = 0; k < 4; k++) {
+    const r = 4 * i;
+    out.push(a[r] * b[k] + a[r + 1] * b[4 + k] + a[r + 2] * b[8 + k] + (k === 3 ? a[r + 3] : 0));
+  }
+  return out;
+}
+
+function moved(m, [x, y, z]) {
+  return [0, 4, 8].map(r => m[r] * x + m[r + 1] * y + m[r + 2] * z + m[r + 3]);
+}
+
+const AT_REST = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+
+class Hands {
+  constructor(data) {
+    this.data = data;
+    for (const shape of [...data.parts, data.arrow, data.ball, data.table]) if (shape) {
+      shape.positions = new Float32Array(shape.positions);
+      shape.faces = new Uint32Array(shape.faces);
+    }
+    this.at = 0;
+    this.isOpen = false;
+    this.isTogether = false;
+  }
+
+  // How many are drawn together: each has a colour of its own.
+  get nTogether() { return Math.min(this.data.ranks.length, this.data.grasps.length); }
+
+  // Corners of the boxes of all hands, for the choice of scale.
+  reach() {
+    const points = [];
+    for (const grasp of this.data.grasps) for (const part of this.data.parts) {
+      const box = boundsOf(part.positions, part.faces);
+      const place = chain(grasp.place, grasp.closed[part.carrier]);
+      for (let c = 0; c < 8; c++) points.push(moved(place, [0, 1, 2].map(k => box[c >> k & 1][k])));
+    }
+    return points;
+  }
+
+  // What is drawn beside the object: solid things, then translucent ones.
+  items() {
+    const { colors, grasps, table } = this.data, items = [];
+    if (table) items.push({ shape: table, place: AT_REST, color: colors.table, alpha: 1, isTable: true });
+    if (this.isTogether) {
+      for (let rank = this.nTogether - 1; rank >= 0; rank--) this.addHand(items, grasps[rank], this.data.ranks[rank]);
+      return items;
+    }
+    const grasp = grasps[this.at];
+    items.push({ shape: this.data.arrow, place: grasp.place, color: colors.approach, alpha: 1 });
+    for (const [x, y, z] of grasp.contacts) {
+      items.push({ shape: this.data.ball, place: [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z], color: colors.contact, alpha: 1 });
+    }
+    this.addHand(items, grasp, colors);
+    return items;
+  }
+
+  addHand(items, grasp, colors) {
+    const poses = this.isOpen ? grasp.open : grasp.closed;
+    for (const part of this.data.parts) {
+      items.push({ shape: part, place: chain(grasp.place, poses[part.carrier]), color: colors[part.kind], alpha: this.data.opacity });
+    }
+  }
+}
+
+// The controls beside a panel that shows hands, and what is known of the grasp that is shown.
+class HandControls {
+  constructor(panel, hands) {
+    this.panel = panel;
+    this.hands = hands;
+    const { grasps } = hands.data;
+    this.title = element("output");
+    this.numbers = element("dl");
+    this.terms = element("div", null, "terms");
+    this.bars = grasps.map((grasp, i) => this.scoreBar(grasp, i));
+    const steps = [button("‹ previous", () => this.step(-1)), this.title, button("next ›", () => this.step(1))];
+    const few = `the best ${hands.nTogether} together, the better the darker`;
+    this.element = element("aside", [
+      element("h3", "Grasps, best first"),
+      element("div", grasps.length > 1 ? steps : [this.title], "steps"),
+      element("div", grasps.length > 1 ? this.bars : [], "all"),
+      this.checkbox("hand open, as it comes", on => { hands.isOpen = on; }),
+      ...(hands.nTogether > 1 ? [this.checkbox(few, on => { hands.isTogether = on; })] : []),
+      this.numbers, this.terms, this.legend(),
+    ], "grasps");
+    this.show(0);
+  }
+
+  scoreBar({ score }, i) {
+    const bar = element("i"), made = button(bar, () => this.show(i));
+    bar.style.height = `${Math.max(4, 100 * score)}%`;
+    made.setAttribute("aria-label", `grasp ${i + 1}, score ${score.toFixed(2)}`);
+    made.title = `grasp ${i + 1}, score ${score.toFixed(2)}`;
+    return made;
+  }
+
+  checkbox(text, answer) {
+    const box = element("input");
+    box.type = "checkbox";
+    box.addEventListener("change", () => { answer(box.checked); this.panel.draw(); });
+    return element("label", [box, ` ${text}`]);
+  }
+
+  legend() {
+    const { colors, table } = this.hands.data;
+    const names = { palm: "hand", finger: "finger", pad: "pad", contact: "contact", approach: "approach", table: "table" };
+    const items = Object.entries(names).filter(([kind]) => kind !== "table" || table);
+    return element("div", items.map(([kind, name]) => swatch(colors[kind], name)), "legend");
+  }
+
+  step(by) {
+    const n = this.bars.length;
+    this.show((this.hands.at + by + n) % n);
+  }
+
+  show(i) {
+    const grasp = this.hands.data.grasps[i], millimetres = x => `${(1e3 * x).toFixed(1)} mm`;
+    this.hands.at = i;
+    this.title.textContent = `grasp ${i + 1} of ${this.bars.length}`;
+    this.bars.forEach((bar, k) => bar.setAttribute("aria-pressed", String(k === i)));
+    const numbers = [["score", grasp.score.toFixed(3)], ["between the pads", millimetres(grasp.width)], ["on the way in", millimetres(grasp.opening)]];
+    this.numbers.replaceChildren(...numbers.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
+    this.terms.replaceChildren(...grasp.terms.flatMap(([name, value]) => this.term(name, value)));
+    this.panel.draw();
+  }
+
+  term(name, value) {
+    const bar = element("i"), label = element("span", name);
+    bar.style.width = `${100 * value}%`;
+    label.title = TERMS[name] ? `1: ${TERMS[name]}` : "";
+    return [label, element("div", bar), element("b", value.toFixed(2))];
+  }
+}
