@@ -51,8 +51,8 @@ const GRASPS: [[f32; 3]; 4] =
     [[0.10, 0.16, 0.42], [0.13, 0.44, 0.60], [0.36, 0.70, 0.58], [0.95, 0.84, 0.35]];
 /// The object's two contacts with the pads.
 pub(crate) const CONTACT: [f32; 3] = [0.98, 0.80, 0.10];
-/// The arrow along which a hand comes.
-pub(crate) const APPROACH: [f32; 3] = [0.12, 0.14, 0.18];
+/// The arrow along which a hand comes: seen on white and on a dark page.
+pub(crate) const APPROACH: [f32; 3] = [0.72, 0.33, 0.58];
 /// The table below an object.
 pub(crate) const TABLE: [f32; 3] = [0.90, 0.87, 0.81];
 

@@ -47,15 +47,14 @@ class Hands {
   // How many are drawn together: each has a colour of its own.
   get nTogether() { return Math.min(this.data.ranks.length, this.data.grasps.length); }
 
-  // Corners of the boxes of all hands, for the choice of scale.
+  // For each grasp, the corners of the boxes around the hand's parts: for the choice of scale.
   reach() {
-    const points = [];
-    for (const grasp of this.data.grasps) for (const part of this.data.parts) {
-      const box = boundsOf(part.positions, part.faces);
+    const boxes = this.data.parts.map(part => boundsOf(part.positions, part.faces));
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7];
+    return this.data.grasps.map(grasp => this.data.parts.flatMap((part, i) => {
       const place = chain(grasp.place, grasp.closed[part.carrier]);
-      for (let c = 0; c < 8; c++) points.push(moved(place, [0, 1, 2].map(k => box[c >> k & 1][k])));
-    }
-    return points;
+      return corners.map(c => moved(place, [0, 1, 2].map(k => boxes[i][c >> k & 1][k])));
+    }));
   }
 
   // What is drawn beside the object: solid things, then translucent ones.

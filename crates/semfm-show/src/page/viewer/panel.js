@@ -74,8 +74,10 @@ class Panel {
   // it may touch the edge.
   fit() {
     const [low, high] = boundsOf(this.positions, this.faces);
-    this.beside = this.hands ? this.hands.reach() : [];
-    for (const p of this.beside) for (let k = 0; k < 3; k++) {
+    const hands = this.hands ? this.hands.reach() : [];
+    // The first hand is seen in full at the start; depth is for all of them.
+    this.beside = hands[0] || [];
+    for (const p of hands.flat()) for (let k = 0; k < 3; k++) {
       low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]);
     }
     this.centre = low.map((x, k) => (x + high[k]) / 2);

@@ -7,18 +7,22 @@ function keptTheme() {
   try { return localStorage.getItem(THEME_KEY); } catch { return null; }
 }
 
+// Keeps a choice, or none.
 function keepTheme(theme) {
-  try { localStorage.setItem(THEME_KEY, theme); } catch { /* a page from a file may keep nothing */ }
+  try {
+    if (theme) localStorage.setItem(THEME_KEY, theme); else localStorage.removeItem(THEME_KEY);
+  } catch { /* a page from a file may keep nothing */ }
 }
 
 function startTheme(switchButton) {
   const system = matchMedia("(prefers-color-scheme: dark)"), root = document.documentElement;
-  const shown = () => root.dataset.theme || (system.matches ? "dark" : "light");
+  const ofSystem = () => system.matches ? "dark" : "light", shown = () => root.dataset.theme || ofSystem();
   const label = () => { switchButton.textContent = shown() === "dark" ? "light page" : "dark page"; };
   const kept = keptTheme();
   if (kept === "dark" || kept === "light") root.dataset.theme = kept;
   switchButton.addEventListener("click", () => {
-    root.dataset.theme = shown() === "dark" ? "light" : "dark";
+    const wanted = shown() === "dark" ? "light" : "dark";
+    if (wanted === ofSystem()) delete root.dataset.theme; else root.dataset.theme = wanted;
     keepTheme(root.dataset.theme);
     label();
   });
