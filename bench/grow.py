@@ -63,7 +63,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows, whole = defaultdict(list), defaultdict(list)
     for category, mesh, truth in labelled(arguments.objects):
-        areas = mesh.vertex_areas
+        areas = mesh.vertex_areas()
         for camera, seen in seen_by(mesh, truth, arguments.views):
             regions = (seen, seen.grown(mesh, camera=camera), seen.grown(mesh))
             rows[category].append([region.iou(truth, areas) for region in regions])

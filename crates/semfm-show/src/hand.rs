@@ -16,6 +16,10 @@ const EDGE_SHARE: f64 = 0.28;
 const LARGEST_EDGE: f64 = 0.008;
 /// Steps of a quarter circle of a round edge.
 const EDGE_STEPS: usize = 3;
+/// A palm this much wider than it is deep and high is drawn with a wrist of this share of its width: makers
+/// give the outer measures, and a hand that is drawn as a brick is not told from a box.
+const WIDE: f64 = 1.5;
+const WRIST: f64 = 0.55;
 /// Points nearer than this to a box's side lie on it, metres.
 const ON_SIDE: f64 = 1e-9;
 /// Thickness of a plate that stands for a pad, metres: thin beside any finger.
@@ -63,7 +67,9 @@ impl DrawnHand {
                     _ => PartKind::Finger,
                 };
                 let mut surface = Surface::default();
-                part.hulls.iter().for_each(|hull| surface.add(&drawn_piece(hull)));
+                for hull in &part.hulls {
+                    surface.add(&drawn_piece(hull, kind));
+                }
                 DrawnPart { carrier, kind, surface }
             })
             .collect();
@@ -91,13 +97,14 @@ pub(crate) fn affine(rows: &MatrixRows) -> DAffine3 {
     DAffine3::from_mat3_translation(rotation, translation)
 }
 
-/// A convex piece by its corners; nothing where they have no hull (all in one plane).
-fn drawn_piece(corners: &[[f64; 3]]) -> Surface {
+/// A convex piece by its corners; nothing where they have no hull (all in one plane). A palm that is wide
+/// along its own y is drawn narrower at the wrist.
+fn drawn_piece(corners: &[[f64; 3]], kind: PartKind) -> Surface {
     let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
-    match box_of(&corners) {
-        Some((low, high)) => rounded_box(low, high),
-        None => hull(&corners),
-    }
+    let Some((low, high)) = box_of(&corners) else { return hull(&corners) };
+    let size = high - low;
+    let is_wide = kind == PartKind::Palm && size.y > WIDE * size.x.max(size.z);
+    rounded_box(low, high, if is_wide { WRIST } else { 1.0 })
 }
 
 /// The convex hull, every triangle with corners of its own, so that edges stay sharp.
@@ -130,14 +137,19 @@ fn box_of(corners: &[DVec3]) -> Option<(DVec3, DVec3)> {
     (corners.len() == 8 && seen == [true; 8]).then_some((low, high))
 }
 
-/// A box with round edges: the hull of an eighth of a ball in each corner.
-fn rounded_box(low: DVec3, high: DVec3) -> Surface {
+/// A box with round edges: the hull of an eighth of a ball in each corner. At its lowest z it is so much
+/// narrower along y.
+fn rounded_box(low: DVec3, high: DVec3, narrower: f64) -> Surface {
     let radius = ((high - low).min_element() * EDGE_SHARE).min(LARGEST_EDGE);
     let mut points = Vec::new();
     for corner in 0..8 {
         let side =
             DVec3::from_array([0, 1, 2].map(|k| if corner >> k & 1 == 1 { 1.0 } else { -1.0 }));
-        let middle = DVec3::select(side.cmpgt(DVec3::ZERO), high, low) - side * radius;
+        let mut middle = DVec3::select(side.cmpgt(DVec3::ZERO), high, low) - side * radius;
+        if side.z < 0.0 {
+            let axis = f64::midpoint(low.y, high.y);
+            middle.y = axis + narrower * (middle.y - axis);
+        }
         for i in 0..=EDGE_STEPS {
             for j in 0..=EDGE_STEPS - i {
                 let direction = DVec3::new(i as f64, j as f64, (EDGE_STEPS - i - j) as f64);
@@ -204,7 +216,7 @@ mod tests {
     #[test]
     fn a_box_gets_round_edges_inside_itself() {
         let (low, high) = (DVec3::new(-0.01, 0.0, 0.02), DVec3::new(0.03, 0.02, 0.05));
-        let drawn = drawn_piece(&corners(low, high));
+        let drawn = drawn_piece(&corners(low, high), PartKind::Finger);
         let (inner_low, inner_high) = bounds(&drawn.vertices).unwrap();
         assert!((inner_low - low).length() < 1e-12 && (inner_high - high).length() < 1e-12);
         let reach = drawn.vertices.iter().map(|&p| p.distance(high)).fold(1.0, f64::min);
@@ -214,13 +226,26 @@ mod tests {
     }
 
     #[test]
+    fn a_wide_palm_is_narrow_at_the_wrist_and_stays_inside_its_box() {
+        let (low, high) = (DVec3::new(-0.03, -0.1, -0.13), DVec3::new(0.03, 0.1, -0.04));
+        let palm = drawn_piece(&corners(low, high), PartKind::Palm);
+        let width_at = |z: f64| {
+            let near = palm.vertices.iter().filter(|p| (p.z - z).abs() < 0.01);
+            near.map(|p| p.y.abs()).fold(0.0, f64::max)
+        };
+        assert!((width_at(high.z) - 0.1).abs() < 1e-9 && width_at(low.z) < 0.07);
+        let (least, most) = bounds(&palm.vertices).unwrap();
+        assert!((low - least).max_element() < 1e-12 && (most - high).max_element() < 1e-12);
+    }
+
+    #[test]
     fn what_is_no_box_is_drawn_as_it_is() {
         let mut points = corners(DVec3::ZERO, DVec3::ONE);
         points[7] = [2.0, 2.0, 2.0];
-        let drawn = drawn_piece(&points);
+        let drawn = drawn_piece(&points, PartKind::Palm);
         assert!(
             drawn.vertices.contains(&DVec3::splat(2.0)) || drawn.vertices.contains(&DVec3::ONE)
         );
-        assert!(drawn_piece(&points[..2]).faces.is_empty());
+        assert!(drawn_piece(&points[..2], PartKind::Palm).faces.is_empty());
     }
 }

@@ -154,11 +154,18 @@ impl<'a> GraspScene<'a> {
                 solid.add(&disc, TABLE);
             }
         }
-        let (under, over) = (solid.rendered(camera, task)?, with_hands.rendered(camera, task)?);
-        let rgb = under.rgb.iter().zip(&over.rgb).map(|(&under, &over)| {
-            (f32::from(under) + OPACITY * (f32::from(over) - f32::from(under))).round() as u8
-        });
-        let mut view = View { rgb: rgb.collect(), ..over };
+        let under = solid.rendered(camera, 0.0, task)?;
+        let over = with_hands.rendered(camera, EDGES, task)?;
+        let n_solid = self.object.mesh.n_faces() as i32;
+        let mut rgb = under.rgb;
+        let pixels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(over.rgb.as_chunks::<3>().0);
+        for ((under, over), triangle) in pixels.zip(&over.triangles) {
+            // The object itself has no outlines.
+            if !(0..n_solid).contains(triangle) {
+                *under = tinted(*under, *over);
+            }
+        }
+        let mut view = View { rgb, ..over };
         let middle =
             bounds(self.object.mesh.vertices()).map_or(DVec3::ZERO, |(a, b)| (a + b) / 2.0);
         draw_scale_bar(&mut view, camera.project(middle).z);
@@ -197,6 +204,14 @@ impl<'a> GraspScene<'a> {
     }
 }
 
+/// A pixel seen through another.
+fn tinted(under: [u8; 3], over: [u8; 3]) -> [u8; 3] {
+    std::array::from_fn(|c| {
+        let (under, over) = (f32::from(under[c]), f32::from(over[c]));
+        (under + OPACITY * (over - under)).round() as u8
+    })
+}
+
 /// A surface with a colour per vertex.
 #[derive(Clone)]
 struct Painted {
@@ -220,8 +235,8 @@ impl Painted {
         Ok(Mesh::new(self.surface.vertices.clone(), self.surface.faces.clone())?)
     }
 
-    fn rendered(&self, camera: Pinhole, task: &Task) -> Result<View> {
-        let settings = RenderSettings { supersampling: 3, edges: EDGES, ..Default::default() };
+    fn rendered(&self, camera: Pinhole, edges: f64, task: &Task) -> Result<View> {
+        let settings = RenderSettings { supersampling: 3, edges, ..Default::default() };
         let colors = SurfaceColor::Vertices(&self.colors);
         let mut views = render(&self.mesh()?, &colors, &[camera], &settings, task)?;
         Ok(views.remove(0))
