@@ -48,12 +48,22 @@ pub fn write_transfer(
     let figure = TransferFigure::new(result, task)?;
     let [transfer, features] =
         ["transfer.png", "features.png"].map(|name| staged.path().join(name));
-    figure.write_transfer_picture(&transfer, task)?;
-    figure.write_features_picture(&features, task)?;
+    let pictures = || {
+        let (transfer, features) = rayon::join(
+            || figure.write_transfer_picture(&transfer, task),
+            || figure.write_features_picture(&features, task),
+        );
+        transfer.and(features)
+    };
     #[cfg(feature = "mcap")]
     {
         let scene = staged.path().join("transfer.mcap");
-        crate::foxglove::write_transfer_scene(&scene, &figure, &result.report().to_json(), task)?;
+        let report = result.report().to_json();
+        let write_scene = || crate::foxglove::write_transfer_scene(&scene, &figure, &report, task);
+        let (pictures, scene) = rayon::join(pictures, write_scene);
+        pictures.and(scene)?;
     }
+    #[cfg(not(feature = "mcap"))]
+    pictures()?;
     Ok(files::put_transfer(staged)?)
 }

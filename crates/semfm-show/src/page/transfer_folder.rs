@@ -76,6 +76,11 @@ pub(super) fn add_truth(group: &mut Group, path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The first letters of a version: hashes are long.
+fn short(version: &str) -> String {
+    version.chars().take(24).collect()
+}
+
 /// The files of a transfer that the page shows.
 struct TransferFolder {
     source: Mesh,
@@ -160,6 +165,10 @@ impl TransferFolder {
             Fact::new("confidence", format!("{confidence:.2}")),
             Fact::new("method", transfer.settings.method),
         ];
+        let encoder = self.report.target.encoder.as_ref();
+        facts.extend(encoder.map(|encoder| {
+            Fact::new("features", format!("{} {}", encoder.name, short(&encoder.version)))
+        }));
         facts.extend(
             provenance.iou.map(|iou| Fact::new("IoU with the true grip", format!("{iou:.2}"))),
         );
