@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use semfm::geom::Mesh;
 use semfm::geom::io::{read_mesh, write_json, write_mesh};
 use semfm::geom::math::DVec3;
-use semfm::views::{RenderSettings, RigSettings, SurfaceColor, render, rig};
+use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, render, rig};
+use semfm::{Mesh, Task};
 use semfm_tests::shell::{answer, json, run, semfm_cli};
 use serde_json::json;
 
@@ -39,19 +39,39 @@ fn words(command: &str) -> Option<Vec<&str>> {
     Some(arguments.split_whitespace().collect())
 }
 
+/// One of the views of a rig.
+fn shot(mesh: &Mesh, settings: &RigSettings, number: usize) -> View {
+    let cameras = rig(mesh, settings).unwrap();
+    let (light, task) = (RenderSettings::default(), Task::default());
+    let views = render(mesh, &SurfaceColor::GREY, &cameras[number..=number], &light, &task);
+    views.unwrap().remove(0)
+}
+
+/// White where the view shows such a triangle.
+fn mask(view: &View, is_inside: impl Fn(usize) -> bool) -> image::GrayImage {
+    let side = view.camera.width();
+    image::GrayImage::from_fn(side, side, |x, y| {
+        let triangle = view.triangles[(y * side + x) as usize];
+        let inside = usize::try_from(triangle).is_ok_and(&is_inside);
+        image::Luma([if inside { 255 } else { 0 }])
+    })
+}
+
 /// What the README supposes the reader to have: a mask of the handle in a view, what a depth camera
 /// sees of the kettle, a gripper, a table, labelled objects.
 fn own_files(folder: &Path) {
-    let mask =
-        image::GrayImage::from_fn(224, 224, |x, _| image::Luma([if x < 80 { 255 } else { 0 }]));
-    mask.save(folder.join("grip.png")).unwrap();
+    let mug = read_mesh(folder.join("containers_0_s0.obj")).unwrap().mesh;
+    let truth = json(&folder.join("containers_0_s0.json"));
+    let handle: Vec<u32> = serde_json::from_value(truth["region"]["vertices"].clone()).unwrap();
+    let view = shot(&mug, &RigSettings::default(), 3);
+    mask(&view, |face| mug.faces()[face].iter().all(|v| handle.contains(v)))
+        .save(folder.join("grip.png"))
+        .unwrap();
 
     let kettle = read_mesh(folder.join("containers_1_s0.obj")).unwrap().mesh;
     let settings = RigSettings { size: 320, ..RigSettings::default() };
-    let camera = rig(&kettle, &settings).unwrap()[5];
-    let light = RenderSettings::default();
-    let views = render(&kettle, &SurfaceColor::GREY, &[camera], &light, &Default::default());
-    let view = views.unwrap().remove(0);
+    let view = shot(&kettle, &settings, 5);
+    let camera = view.camera;
     let side = camera.width();
     let metres_per_unit = 0.24;
     let depth = image::ImageBuffer::from_fn(side, side, |x, y| {
@@ -60,10 +80,7 @@ fn own_files(folder: &Path) {
         image::Luma([millimetres.round() as u16])
     });
     depth.save(folder.join("depth.png")).unwrap();
-    let seen = image::GrayImage::from_fn(side, side, |x, y| {
-        image::Luma([if view.triangles[(y * side + x) as usize] >= 0 { 255 } else { 0 }])
-    });
-    seen.save(folder.join("kettle.png")).unwrap();
+    mask(&view, |_| true).save(folder.join("kettle.png")).unwrap();
     let (cx, cy) = (camera.cx() - 0.5, camera.cy() - 0.5); // in K.json the first pixel's centre is 0
     let intrinsics = json!({ "fx": camera.fx(), "fy": camera.fy(), "cx": cx, "cy": cy });
     write_json(folder.join("K.json"), &intrinsics).unwrap();
