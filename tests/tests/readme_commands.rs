@@ -26,7 +26,9 @@ fn commands() -> Vec<String> {
     for block in text.split("```sh\n").skip(1) {
         let block = block.split("```").next().unwrap().replace("\\\n", " ");
         let lines = block.lines().map(|line| line.split(" # ").next().unwrap_or_default().trim());
-        commands.extend(lines.filter(|line| !line.is_empty()).map(str::to_owned));
+        commands.extend(
+            lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned),
+        );
     }
     commands
 }
