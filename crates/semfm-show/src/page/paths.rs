@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn a_views_file_of_a_mesh_with_the_zero_below_zero_is_shown() {
         use semfm::geom::math::DVec3;
-        use semfm::rendered_views::{ViewSettings, write_rendered_views};
+        use semfm::encoder::rendered_views::{RenderedObject, ViewSettings};
         use semfm::views::{Renderer, RigSettings};
 
         let folder = tempfile::tempdir().unwrap();
@@ -198,7 +198,8 @@ mod tests {
         let rig = RigSettings { count: 2, size: 32, ..Default::default() };
         let settings = ViewSettings { rig, ..Default::default() };
         let (views, task) = (at("ball.views.mcap"), Task::default());
-        write_rendered_views(&views, &file, &settings, &Renderer::cpu(), &task).unwrap();
+        let drawn = RenderedObject::new(&file, &settings, &Renderer::cpu(), &task).unwrap();
+        drawn.write(&views).unwrap();
         std::fs::write(at("grip.json"), json!({ "vertices": [0] }).to_string()).unwrap();
         let paths = [at("ball.ply"), at("grip.json"), views];
         assert_eq!(groups_of_paths(&paths, &task).unwrap().len(), 2);
