@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from typing import Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._semfm import Region
+from ._semfm import Mesh, Region
 from .errors import InvalidInput
 
 Colors = NDArray[np.float64]
+PathLike = Union[str, "os.PathLike[str]"]
 
 # Colour without and with full weight, as sRGB in 0..1: those of `transfer.png`.
 PLAIN = np.array([0.78, 0.78, 0.78])
@@ -31,10 +33,13 @@ def position_colors(points: ArrayLike) -> Colors:
     return (points - low) / extent * 0.8 + 0.15
 
 
-def weights_of(region: Union[Region, ArrayLike], n_vertices: int) -> Colors:
-    """The (n,) weights of a region or of an array; `InvalidInput` where their number is another."""
+def weights_of(region: Union[Region, PathLike, ArrayLike], mesh: Mesh) -> Colors:
+    """The (n,) weights of a region, of a region file or of an array; `InvalidInput` where their number
+    is not that of the mesh's vertices."""
+    if isinstance(region, (str, os.PathLike)):
+        region = Region.read(region, mesh)
     weights = region.weights if isinstance(region, Region) else np.asarray(region)
-    return per_vertex(weights, n_vertices, "region", columns=None).astype(np.float64)
+    return per_vertex(weights, mesh.n_vertices, "region", columns=None).astype(np.float64)
 
 
 def colors_of(colors: ArrayLike, n_vertices: int) -> Colors:

@@ -290,7 +290,7 @@ def test_npz_files_give_maps_and_bases_back(result, tmp_path):
     fitted = semfm.FunctionalMap.fit(basis, target, semfm.wks(basis), semfm.wks(target), k=20)
     fitted.to_npz(tmp_path / "fitted.npz")
     assert semfm.FunctionalMap.from_npz(tmp_path / "fitted.npz") == fitted
-    with pytest.raises(semfm.InvalidInput, match="matrix"):
+    with pytest.raises(semfm.FormatError, match="matrix"):
         semfm.FunctionalMap.from_npz(tmp_path / "basis.npz")
 
 

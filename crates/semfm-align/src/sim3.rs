@@ -50,7 +50,8 @@ impl Sim3 {
         let linear = DMat3::from_cols(x, y, z).transpose();
         let volume = linear.determinant();
         if volume <= 0.0 {
-            let found = format!("determinant {volume}");
+            let linear = rows[..3].iter().map(|[a, b, c, _]| [a, b, c]).collect::<Vec<_>>();
+            let found = format!("determinant {volume} of the rows {linear:?}");
             return Err(not_a_similarity("a rotation times a positive scale", found));
         }
         let scale = volume.cbrt();
@@ -58,7 +59,8 @@ impl Sim3 {
         let defect = (turn * turn.transpose() - DMat3::IDENTITY).to_cols_array();
         let worst = defect.iter().fold(0.0f64, |worst, x| worst.max(x.abs()));
         if worst > SIMILARITY_TOLERANCE {
-            let found = format!("a matrix {worst:.1e} away from one");
+            let linear = rows[..3].iter().map(|[a, b, c, _]| [a, b, c]).collect::<Vec<_>>();
+            let found = format!("the rows {linear:?}, {worst:.1e} away from one");
             return Err(not_a_similarity("a rotation times one scale", found));
         }
         let rotation = DQuat::from_mat3(&turn).normalize();

@@ -154,6 +154,12 @@ impl Pinhole {
         PixelDepth { u: fx * p.x / p.z + cx, v: fy * p.y / p.z + cy, z: p.z }
     }
 
+    /// The point of the world that the camera sees at a pixel position and depth: undoes
+    /// [`project`](Self::project).
+    pub fn unproject(&self, PixelDepth { u, v, z }: PixelDepth) -> DVec3 {
+        self.camera_from_world.inverse().transform_point3(z * self.ray_in_camera(u, v))
+    }
+
     /// Where the camera stands, in the world's frame.
     pub fn eye(&self) -> DVec3 {
         self.camera_from_world.inverse().translation
@@ -202,7 +208,8 @@ fn check_pose(camera_from_world: &DAffine3) -> Result<()> {
     let orthonormal = defect.iter().all(|x| x.abs() <= ROTATION_TOLERANCE);
     if !(orthonormal && turn.determinant() > 0.0) {
         let expected = "a rotation (orthonormal, determinant 1)";
-        return Err(out_of_range("camera: pose", expected, turn.to_string()));
+        let rows = [0, 1, 2].map(|i| turn.row(i).to_array());
+        return Err(out_of_range("camera: pose", expected, format!("the rows {rows:?}")));
     }
     Ok(())
 }
@@ -225,6 +232,8 @@ mod tests {
         let camera = Pinhole::with_pixel_centres_at_half(INTRINSICS, pose).unwrap();
         let PixelDepth { u, v, z } = camera.project(camera.eye() + 2.5 * camera.ray(10.5, 40.25));
         assert!((u - 10.5).abs() < 1e-9 && (v - 40.25).abs() < 1e-9 && (z - 2.5).abs() < 1e-9);
+        let point = DVec3::new(0.3, -0.4, 0.2);
+        assert!(camera.unproject(camera.project(point)).distance(point) < 1e-12);
     }
 
     #[test]
@@ -255,5 +264,10 @@ mod tests {
             let error = Pinhole::with_pixel_centres_at_half(intrinsics, pose).unwrap_err();
             assert!(error.to_string().starts_with(name), "{error}");
         }
+        let mut turned = DAffine3::IDENTITY;
+        turned.matrix3 = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(7.0, 0.0, 1.0));
+        let error = Pinhole::with_pixel_centres_at_half(INTRINSICS, turned).unwrap_err();
+        let rows = "[[1.0, 0.0, 7.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]";
+        assert!(error.to_string().contains(rows), "{error}");
     }
 }

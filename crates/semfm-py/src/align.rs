@@ -1,21 +1,64 @@
 //! `align`: the pose and scale of an object in what a camera sees.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use semfm::align::Alignment as Found;
 use semfm::align::{self, AlignSettings, Observation, Sim3};
+use semfm::files::AlignedFile;
+use semfm::geom::math::DVec3;
 
 use crate::arrays_in::{self, Axis};
 use crate::interruptible::run;
-use crate::mesh::from_any;
-use crate::{arrays_out, errors};
+use crate::mesh::{Mesh, from_any};
+use crate::shared::Shared;
+use crate::{arrays_out, errors, json};
 
 /// Pose and scale of an object before a camera, and how far to trust them: see `align`.
 #[pyclass(frozen, module = "semfm")]
 pub struct Alignment {
     found: Arc<Found>,
+    file: Arc<AlignedFile>,
+    question: Arc<Question>,
 }
+
+/// What was asked, so that a pickle can ask it again.
+struct Question {
+    mesh: Shared<semfm::Mesh>,
+    points: Vec<DVec3>,
+    viewpoint: Option<(f64, f64, f64)>,
+    settings: AlignSettings,
+}
+
+impl Question {
+    fn answer(self, py: Python<'_>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<Alignment> {
+        let question = Arc::new(self);
+        let asked = question.clone();
+        let (found, file) = run(py, progress, move |task| {
+            let Question { mesh, points, viewpoint, settings } = &*asked;
+            let observed = match *viewpoint {
+                Some((x, y, z)) => Observation::from_view(points, [x, y, z].into())?,
+                None => Observation::from_many_views(points)?,
+            };
+            let found = align::align(mesh, &observed, settings, task)?;
+            let file = AlignedFile::new(&found, mesh, settings);
+            Ok((found, file))
+        })?;
+        Ok(Alignment { found: Arc::new(found), file: Arc::new(file), question })
+    }
+}
+
+/// What a pickle holds: mesh, points, viewpoint, init by rows, scale range, starts, seed.
+type Pickled<'py> = (
+    Mesh,
+    Bound<'py, PyAny>,
+    Option<(f64, f64, f64)>,
+    Option<[[f64; 4]; 4]>,
+    Option<[f64; 2]>,
+    usize,
+    u64,
+);
 
 #[pymethods]
 impl Alignment {
@@ -87,6 +130,37 @@ impl Alignment {
         self.found.reasons.clone()
     }
 
+    /// The content of `aligned.json`.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json::to_python(py, &self.file.to_json())
+    }
+
+    /// Writes `aligned.json`, whole or not at all: what `semfm-cli align` writes and
+    /// ``semfm-cli grasp --aligned`` reads.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let file = self.file.clone();
+        run(py, None, move |_| file.write(&path))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_alignment")?;
+        let Question { mesh, points, viewpoint, settings } = &*self.question;
+        let AlignSettings { init, scale_range, n_starts, seed } = *settings;
+        let numbers = points.iter().flat_map(|p| p.to_array()).collect();
+        let points = arrays_out::owned_rows(py, numbers, 3)?;
+        let init = init.map(|init| init.to_rows());
+        let mesh = Mesh { inner: mesh.clone() };
+        Ok((restore, (mesh, points, *viewpoint, init, scale_range, n_starts, seed)))
+    }
+
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
     }
@@ -155,12 +229,25 @@ pub fn align_(
     };
     let scale_range = scale_range.map(|(low, high)| [low, high]);
     let settings = AlignSettings { init, scale_range, n_starts, seed };
-    let found = run(py, progress, move |task| {
-        let observed = match viewpoint {
-            Some((x, y, z)) => Observation::from_view(&points, [x, y, z].into())?,
-            None => Observation::from_many_views(&points)?,
-        };
-        Ok(align::align(&mesh, &observed, &settings, task)?)
-    })?;
-    Ok(Alignment { found: Arc::new(found) })
+    Question { mesh, points, viewpoint, settings }.answer(py, progress)
+}
+
+/// An alignment out of a pickle: asked again, which gives the same.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "what a pickle holds")]
+pub fn _restore_alignment(
+    py: Python<'_>,
+    mesh: &Bound<'_, Mesh>,
+    points: &Bound<'_, PyAny>,
+    viewpoint: Option<(f64, f64, f64)>,
+    init: Option<[[f64; 4]; 4]>,
+    scale_range: Option<[f64; 2]>,
+    n_starts: usize,
+    seed: u64,
+) -> PyResult<Alignment> {
+    let points = arrays_in::points(points, "points")?;
+    let init = init.map(Sim3::from_rows).transpose();
+    let init = init.map_err(|error| errors::raise(py, &error.into()))?;
+    let settings = AlignSettings { init, scale_range, n_starts, seed };
+    Question { mesh: mesh.get().inner.clone(), points, viewpoint, settings }.answer(py, None)
 }

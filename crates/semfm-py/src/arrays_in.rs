@@ -17,6 +17,43 @@ pub enum Axis {
     Any(&'static str),
     /// This length.
     Is(usize),
+    /// One per working vertex of a shape, whose mesh as given has another number of them.
+    Working { n: usize, n_original: usize },
+    /// One per vertex of a shape's mesh as given.
+    Original { n: usize, n_working: usize },
+}
+
+impl Axis {
+    fn length(self) -> Option<usize> {
+        match self {
+            Self::Any(_) => None,
+            Self::Is(n) | Self::Working { n, .. } | Self::Original { n, .. } => Some(n),
+        }
+    }
+
+    /// What the axis counts, where that may be mistaken.
+    fn space(self) -> Option<&'static str> {
+        match self {
+            Self::Any(_) | Self::Is(_) => None,
+            Self::Working { .. } => Some("one per working vertex of the shape"),
+            Self::Original { .. } => Some("one per vertex of the mesh as given"),
+        }
+    }
+
+    /// What to do with an axis of length `found` that counts the vertices of the other mesh.
+    fn advice(self, found: usize) -> Option<&'static str> {
+        match self {
+            Self::Working { n, n_original } if found == n_original && found != n => Some(
+                ", one per vertex of the mesh as given: `Shape.onto_working(values)` reads them off \
+                 at the working vertices",
+            ),
+            Self::Original { n, n_working } if found == n_working && found != n => Some(
+                ", one per working vertex: `Shape.onto_original(values)` extends them to the mesh as \
+                 given",
+            ),
+            _ => None,
+        }
+    }
 }
 
 use Axis::{Any, Is};
@@ -154,6 +191,12 @@ pub fn ids(
     }
 }
 
+/// A count in an array without axes, as .npz files have them.
+pub fn count(value: &Bound<'_, PyAny>, name: &str) -> PyResult<usize> {
+    let number = value.call_method0("item").and_then(|number| number.extract());
+    number.map_err(|_| errors::wrong_type(name, "a whole number of at least 0", value))
+}
+
 /// Truth values, row-major, and the shape.
 pub fn mask(
     value: &Bound<'_, PyAny>,
@@ -213,12 +256,10 @@ fn checked<'py>(
     }
     let shape = untyped.shape();
     let fits = shape.len() == axes.len()
-        && shape.iter().zip(axes).all(|(&n, axis)| match axis {
-            Any(_) => true,
-            Is(wanted) => n == *wanted,
-        });
+        && shape.iter().zip(axes).all(|(&n, axis)| axis.length().is_none_or(|wanted| n == wanted));
     if !fits {
-        let found = format!("shape {}", tuple(shape));
+        let advice = shape.iter().zip(axes).find_map(|(&n, axis)| axis.advice(n));
+        let found = format!("shape {}{}", tuple(shape), advice.unwrap_or_default());
         return Err(errors::invalid(py, name, &wanted_array(kind, axes), &found));
     }
     Ok(array)
@@ -256,7 +297,9 @@ fn finite<T: Copy + std::fmt::Display>(
 }
 
 fn wanted_array(kind: Kind, axes: &[Axis]) -> String {
-    format!("an array of {}, shape {}", kind.name, wanted_shape(axes))
+    let space = axes.iter().find_map(|axis| axis.space());
+    let space = space.map(|space| format!(" ({space})")).unwrap_or_default();
+    format!("an array of {}, shape {}{space}", kind.name, wanted_shape(axes))
 }
 
 fn wanted_shape(axes: &[Axis]) -> String {
@@ -264,7 +307,7 @@ fn wanted_shape(axes: &[Axis]) -> String {
         .iter()
         .map(|axis| match axis {
             Any(letter) => (*letter).to_owned(),
-            Is(n) => n.to_string(),
+            Is(n) | Axis::Working { n, .. } | Axis::Original { n, .. } => n.to_string(),
         })
         .collect();
     brackets(&words)

@@ -95,8 +95,9 @@ pub fn diffused_indicators<'py>(
     norm: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = basis.py();
+    let rows = basis.get().rows();
     let basis = basis.get().inner.clone();
-    let labels = arrays_in::ids(labels, "labels", &[Axis::Is(basis.n_vertices())])?.0;
+    let labels = arrays_in::ids(labels, "labels", &[rows])?.0;
     let chosen = arrays_in::ids(chosen, "chosen", &[Axis::Any("c")])?.0;
     let norm = match norm {
         "surface" => DescriptorNorm::Surface,

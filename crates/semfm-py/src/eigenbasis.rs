@@ -34,6 +34,20 @@ use crate::{arrays_out, errors, json};
 #[pyclass(frozen, module = "semfm")]
 pub struct Eigenbasis {
     pub inner: Shared<geom::Eigenbasis>,
+    /// Vertices of the mesh as given, where it is the basis of a shape.
+    pub n_original: Option<usize>,
+}
+
+impl Eigenbasis {
+    pub fn new_of(basis: geom::Eigenbasis) -> Self {
+        Self { inner: Shared::new(basis), n_original: None }
+    }
+
+    /// One entry per vertex of the basis.
+    pub fn rows(&self) -> Axis {
+        let n = self.inner.n_vertices();
+        self.n_original.map_or(Axis::Is(n), |n_original| Axis::Working { n, n_original })
+    }
 }
 
 /// How far a basis that is given may be from orthonormal: what f32 files lose.
@@ -81,7 +95,7 @@ impl Eigenbasis {
             let found = format!("|ΦᵀMΦ − I| up to {error:.1e}");
             return Err(errors::invalid(py, "functions", expected, &found));
         }
-        Ok(Self { inner: Shared::new(basis) })
+        Ok(Self::new_of(basis))
     }
 
     /// int: number of eigenpairs k.
@@ -135,14 +149,15 @@ impl Eigenbasis {
     /// Parameters
     /// ----------
     /// functions : (n,) or (n, p) array_like
+    ///     On the working vertices, for the basis of a `Shape`: `Shape.onto_working` makes them of
+    ///     functions on the mesh as given.
     ///
     /// Returns
     /// -------
     /// (k,) or (k, p) float64 array
     fn project<'py>(&self, functions: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.inner.n_vertices();
         let basis = self.inner.clone();
-        columns(functions, "functions", Axis::Is(n), move |f| basis.project_all(f))
+        columns(functions, "functions", self.rows(), move |f| basis.project_all(f))
     }
 
     /// The functions ΦA with the coefficients A, of which there may be fewer than k.
@@ -182,9 +197,8 @@ impl Eigenbasis {
             let py = functions.py();
             return Err(errors::invalid(py, "t", "a time of at least 0", &t.to_string()));
         }
-        let n = self.inner.n_vertices();
         let basis = self.inner.clone();
-        columns(functions, "functions", Axis::Is(n), move |f| basis.diffuse_all(f, t))
+        columns(functions, "functions", self.rows(), move |f| basis.diffuse_all(f, t))
     }
 
     /// The first pairs only.
@@ -208,7 +222,7 @@ impl Eigenbasis {
             mass: basis.mass.clone(),
             residuals: basis.residuals[..k].to_vec(),
         });
-        Ok(Self { inner: shared })
+        Ok(Self { inner: shared, n_original: self.n_original })
     }
 
     /// Writes `values`, `functions`, `mass` and `residuals` to an .npz file.
@@ -326,7 +340,7 @@ pub fn eigenbasis(
     check_size(py, k, laplacian.n_vertices())?;
     let settings = EigenSettings { tolerance, seed };
     let basis = run(py, progress, move |task| Ok(solve(&laplacian, k, &settings, task)?))?;
-    Ok(Eigenbasis { inner: Shared::new(basis) })
+    Ok(Eigenbasis::new_of(basis))
 }
 
 /// Refuses a k whose basis, or whose dense solution, no machine would hold.

@@ -36,6 +36,12 @@ pub fn invalid(py: Python<'_>, argument: &str, expected: &str, found: &str) -> P
     exception(py, "InvalidInput", &message, "invalid", Some(argument))
 }
 
+/// A file that is not what it must be: `semfm.FormatError`, a ValueError.
+pub fn format(py: Python<'_>, path: &str, expected: &str, found: &str) -> PyErr {
+    let message = format!("{path}: expected {expected}, found {found}");
+    exception(py, "FormatError", &message, "format", Some(path))
+}
+
 /// An argument of the wrong type: `semfm.InvalidType`, a TypeError.
 pub fn wrong_type(argument: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
     let name = found.get_type().name().map_or_else(|_| "something else".into(), |n| n.to_string());

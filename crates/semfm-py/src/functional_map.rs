@@ -114,6 +114,7 @@ impl FunctionalMap {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = source.py();
+        let (source_rows, target_rows) = (source.get().rows(), target.get().rows());
         let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
         let k = k.unwrap_or(source.k().min(target.k()));
         if k == 0 {
@@ -122,10 +123,9 @@ impl FunctionalMap {
         for basis in [&source, &target] {
             check_size(py, "k", k, basis)?;
         }
-        let rows = |basis: &geom::Eigenbasis| if coefficients { k } else { basis.n_vertices() };
-        let axes = [Axis::Is(rows(&source)), Axis::Any("p")];
+        let axes = [if coefficients { Axis::Is(k) } else { source_rows }, Axis::Any("p")];
         let a = arrays_in::laid(source_descriptors, "source_descriptors", axes)?;
-        let axes = [Axis::Is(rows(&target)), Axis::Is(a.ncols())];
+        let axes = [if coefficients { Axis::Is(k) } else { target_rows }, Axis::Is(a.ncols())];
         let b = arrays_in::laid(target_descriptors, "target_descriptors", axes)?;
         let source_mesh = source_mesh.map(|mesh| from_any(mesh, "source_mesh")).transpose()?;
         let target_mesh = target_mesh.map(|mesh| from_any(mesh, "target_mesh")).transpose()?;

@@ -9,7 +9,8 @@ use crate::arrays_in::{self, Axis, within_memory};
 use crate::arrays_out;
 use crate::interruptible::run;
 use crate::laplacian::kind_of;
-use crate::mesh::from_any;
+use crate::mesh::{Mesh, from_any};
+use crate::shared::Shared;
 
 /// Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
 /// once, then every question costs two triangular solves.
@@ -32,6 +33,9 @@ use crate::mesh::from_any;
 #[pyclass(frozen, module = "semfm")]
 pub struct HeatGeodesics {
     inner: Arc<geodesic::HeatGeodesics>,
+    mesh: Shared<semfm::Mesh>,
+    kind: String,
+    time: f64,
 }
 
 #[pymethods]
@@ -42,8 +46,9 @@ impl HeatGeodesics {
         let py = mesh.py();
         let settings = HeatSettings { kind: kind_of(py, kind)?, time };
         let mesh = from_any(mesh, "mesh")?;
-        let shared = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&mesh, &settings)?))?;
-        Ok(Self { inner: Arc::new(shared) })
+        let of = mesh.clone();
+        let shared = run(py, None, move |_| Ok(geodesic::HeatGeodesics::new(&of, &settings)?))?;
+        Ok(Self { inner: Arc::new(shared), mesh, kind: kind.to_owned(), time })
     }
 
     /// Distance of every vertex from the nearest source.
@@ -107,6 +112,14 @@ impl HeatGeodesics {
     fn n_vertices(&self) -> usize {
         self.inner.n_vertices()
     }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Mesh, String, f64))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_heat")?;
+        Ok((restore, (Mesh { inner: self.mesh.clone() }, self.kind.clone(), self.time)))
+    }
 }
 
 fn ids(sources: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
@@ -140,4 +153,10 @@ pub fn geodesic_distances<'py>(
     time: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     HeatGeodesics::new(mesh, kind, time)?.distances(sources)
+}
+
+/// Geodesics out of a pickle: factorised again.
+#[pyfunction]
+pub fn _restore_heat(mesh: &Bound<'_, PyAny>, kind: &str, time: f64) -> PyResult<HeatGeodesics> {
+    HeatGeodesics::new(mesh, kind, time)
 }

@@ -15,7 +15,7 @@ pub struct PickledGrasps {
 }
 
 #[derive(Serialize, Deserialize)]
-struct PickledGrasp {
+pub struct PickledGrasp {
     position: [f64; 3],
     rotation: [f64; 4],
     width: f64,
@@ -64,7 +64,7 @@ impl PickledGrasps {
 }
 
 impl PickledGrasp {
-    fn of(grasp: &Grasp) -> Self {
+    pub fn of(grasp: &Grasp) -> Self {
         Self {
             position: grasp.object_from_tcp.translation.to_array(),
             rotation: grasp.object_from_tcp.rotation.to_array(),
@@ -78,7 +78,7 @@ impl PickledGrasp {
         }
     }
 
-    fn restore(self) -> Grasp {
+    pub fn restore(self) -> Grasp {
         let rotation = DQuat::from_array(self.rotation);
         Grasp {
             object_from_tcp: Pose::from_parts(DVec3::from_array(self.position), rotation),

@@ -12,11 +12,11 @@ use semfm::grasp::{self, ApproachCone, GraspSettings, Pose};
 use semfm::{GraspRequest, GraspResult, Obstacle, Table};
 
 use crate::arrays_in::{self, Axis};
-use crate::grasp_pickle::PickledGrasps;
+use crate::grasp_pickle::{PickledGrasp, PickledGrasps};
 use crate::gripper::{Gripper, matrix};
 use crate::interruptible::run;
 use crate::mesh::from_any;
-use crate::region::Region;
+use crate::region::{Region, region_of};
 use crate::shared::Shared;
 use crate::{arrays_out, errors, json};
 
@@ -25,6 +25,7 @@ use crate::{arrays_out, errors, json};
 #[derive(Clone)]
 pub struct Grasp {
     pub grasp: grasp::Grasp,
+    camera_from_object: Option<Pose>,
 }
 
 #[pymethods]
@@ -33,6 +34,28 @@ impl Grasp {
     #[getter]
     fn object_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         matrix(py, self.grasp.object_from_tcp)
+    }
+
+    /// (4, 4) float64 array, optional: the same in the camera's frame; None where `find_grasps` was told
+    /// no `camera_from_object`.
+    #[getter]
+    fn camera_from_tcp<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let pose = self.camera_from_object.map(|camera| camera * self.grasp.object_from_tcp);
+        pose.map(|pose| matrix(py, pose)).transpose()
+    }
+
+    /// (3,) float64 array: the TCP, between the pads, in the object's frame, metres.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        arrays_out::owned(py, self.grasp.object_from_tcp.translation.to_array().to_vec())
+    }
+
+    /// (3,) float64 array: the unit direction in which the hand comes (+z of the TCP), in the object's
+    /// frame.
+    #[getter]
+    fn approach<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let approach = self.grasp.object_from_tcp.rotation * DVec3::Z;
+        arrays_out::owned(py, approach.to_array().to_vec())
     }
 
     /// float: distance between the closed pads, metres.
@@ -81,6 +104,24 @@ impl Grasp {
         Ok(terms)
     }
 
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Option<[f64; 16]>))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_grasp")?;
+        let plain = serde_json::to_string(&PickledGrasp::of(&self.grasp))
+            .map_err(|error| errors::internal(py, &error.to_string()))?;
+        Ok((restore, (plain, self.camera_from_object.map(columns))))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
     fn __repr__(&self) -> String {
         format!("Grasp(score {:.2}, width {:.4} m)", self.grasp.score, self.grasp.width)
     }
@@ -97,6 +138,7 @@ fn rows(py: Python<'_>, points: [DVec3; 2]) -> PyResult<Bound<'_, PyAny>> {
 pub struct Grasps {
     found: Arc<grasp::Grasps>,
     mesh: Shared<semfm::Mesh>,
+    region: Shared<semfm::Region>,
     gripper: Py<Gripper>,
     scale: f64,
     camera_from_object: Option<Pose>,
@@ -130,7 +172,10 @@ impl Grasps {
         let at = if index < 0 { index + n as isize } else { index };
         let grasp = usize::try_from(at).ok().and_then(|at| self.found.grasps.get(at));
         grasp
-            .map(|grasp| Grasp { grasp: grasp.clone() })
+            .map(|grasp| Grasp {
+                grasp: grasp.clone(),
+                camera_from_object: self.camera_from_object,
+            })
             .ok_or_else(|| errors::index_out_of_range(py, &format!("grasp {index} of {n}")))
     }
 
@@ -159,6 +204,24 @@ impl Grasps {
     #[getter]
     fn widths<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         arrays_out::owned(py, self.found.grasps.iter().map(|grasp| grasp.width).collect())
+    }
+
+    /// Mesh: the object, in its own units.
+    #[getter]
+    fn mesh(&self) -> crate::mesh::Mesh {
+        crate::mesh::Mesh { inner: self.mesh.clone() }
+    }
+
+    /// Region: where the pads close.
+    #[getter]
+    fn region(&self) -> Region {
+        Region { inner: self.region.clone() }
+    }
+
+    /// float: metres per unit of the mesh.
+    #[getter]
+    fn scale(&self) -> f64 {
+        self.scale
     }
 
     /// Gripper: the gripper.
@@ -223,14 +286,14 @@ impl Grasps {
         py: Python<'py>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (String, crate::mesh::Mesh, Py<Gripper>, f64, Option<[f64; 16]>),
+        (String, crate::mesh::Mesh, Region, Py<Gripper>, f64, Option<[f64; 16]>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_grasps")?;
         let plain = serde_json::to_string(&PickledGrasps::of(&self.found))
             .map_err(|error| errors::internal(py, &error.to_string()))?;
-        let camera = self.camera_from_object.map(|pose| pose.to_mat4().to_cols_array());
-        let mesh = crate::mesh::Mesh { inner: self.mesh.clone() };
-        Ok((restore, (plain, mesh, self.gripper.clone_ref(py), self.scale, camera)))
+        let camera = self.camera_from_object.map(columns);
+        let gripper = self.gripper.clone_ref(py);
+        Ok((restore, (plain, self.mesh(), self.region(), gripper, self.scale, camera)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -257,6 +320,7 @@ pub fn _restore_grasps(
     py: Python<'_>,
     plain: &str,
     mesh: &Bound<'_, crate::mesh::Mesh>,
+    region: &Bound<'_, Region>,
     gripper: Py<Gripper>,
     scale: f64,
     camera_from_object: Option<[f64; 16]>,
@@ -266,11 +330,32 @@ pub fn _restore_grasps(
     Ok(Grasps {
         found: Arc::new(plain.restore()),
         mesh: mesh.get().inner.clone(),
+        region: region.get().inner.clone(),
         gripper,
         scale,
-        camera_from_object: camera_from_object
-            .map(|columns| Pose::from_mat4(DMat4::from_cols_array(&columns))),
+        camera_from_object: camera_from_object.map(of_columns),
     })
+}
+
+/// A grasp out of a pickle.
+#[pyfunction]
+pub fn _restore_grasp(
+    py: Python<'_>,
+    plain: &str,
+    camera_from_object: Option<[f64; 16]>,
+) -> PyResult<Grasp> {
+    let plain: PickledGrasp = serde_json::from_str(plain)
+        .map_err(|error| errors::invalid(py, "pickle", "a grasp", &error.to_string()))?;
+    let camera_from_object = camera_from_object.map(of_columns);
+    Ok(Grasp { grasp: plain.restore(), camera_from_object })
+}
+
+fn columns(pose: Pose) -> [f64; 16] {
+    pose.to_mat4().to_cols_array()
+}
+
+fn of_columns(columns: [f64; 16]) -> Pose {
+    Pose::from_mat4(DMat4::from_cols_array(&columns))
 }
 
 /// Parallel-jaw grasps whose pads close inside a region.
@@ -283,7 +368,7 @@ pub fn _restore_grasps(
 /// ----------
 /// mesh : mesh_like
 ///     The object.
-/// region : Region
+/// region : Region or path
 ///     Where the pads shall close; of the mesh.
 /// gripper : Gripper or path
 ///     A gripper, or what `Gripper` takes.
@@ -342,7 +427,7 @@ pub fn _restore_grasps(
 pub fn find_grasps(
     py: Python<'_>,
     mesh: &Bound<'_, PyAny>,
-    region: &Bound<'_, Region>,
+    region: &Bound<'_, PyAny>,
     gripper: &Bound<'_, PyAny>,
     scale: f64,
     camera_from_object: Option<&Bound<'_, PyAny>>,
@@ -391,13 +476,14 @@ pub fn find_grasps(
         scene_points.map(|points| arrays_in::points(points, "scene_points")).transpose()?;
     request.obstacles.push(Obstacle::Points(points.unwrap_or_default()));
     let camera_from_object = request.camera_from_object;
-    let (weights, object) = (region.get().inner.clone(), mesh.clone());
+    let region = region_of(region, &mesh)?;
+    let (weights, object) = (region.clone(), mesh.clone());
     let fingers = gripper.get().inner.clone();
     let found = run(py, progress, move |task| {
         let problem = request.prepare(Arc::new((*object).clone()), (*fingers).clone())?;
         problem.find(weights.weights(), task)
     })?;
-    Ok(Grasps { found: Arc::new(found), mesh, gripper, scale, camera_from_object })
+    Ok(Grasps { found: Arc::new(found), mesh, region, gripper, scale, camera_from_object })
 }
 
 /// A vector (3), where there is one.

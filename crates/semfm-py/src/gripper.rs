@@ -9,6 +9,8 @@ use semfm::robot::{self, GripperSettings, JointPosition, Pose};
 
 use crate::arrays_out;
 use crate::interruptible::run;
+use crate::mesh::Mesh;
+use crate::shared::Shared;
 
 /// A parallel-jaw gripper: +z along the approach, y along the closing direction, origin between the
 /// finger pads (TCP), metres.
@@ -105,6 +107,23 @@ impl Gripper {
     /// (4, 4) float64 array
     fn flange_from_tcp<'py>(&self, py: Python<'py>, width: f64) -> PyResult<Bound<'py, PyAny>> {
         matrix(py, self.inner.flange_from_tcp_at(width))
+    }
+
+    /// The gripper's collision shapes as a mesh, for pictures and viewers.
+    ///
+    /// Parameters
+    /// ----------
+    /// width : float
+    ///     Distance between the pads, metres; outside of the opening, the nearest inside.
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    ///     In the TCP frame, metres.
+    fn mesh_at(&self, py: Python<'_>, width: f64) -> PyResult<Mesh> {
+        let gripper = self.inner.clone();
+        let mesh = run(py, None, move |_| Ok(gripper.mesh_at(width)?))?;
+        Ok(Mesh { inner: Shared::new(mesh) })
     }
 
     /// Positions of the joints that open and close the gripper.

@@ -7,6 +7,7 @@
 
 use std::any::Any;
 use std::cell::Cell;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, Once, PoisonError};
@@ -36,6 +37,7 @@ pub fn run<T: Send + 'static>(
     work: impl FnOnce(&Task) -> semfm::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     let listener = Listener::new(py, progress)?;
+    let mut furthest = Furthest::default();
     let (tell, mut news) = channel();
     let task = match &listener {
         Listener::Silent => Task::default(),
@@ -59,7 +61,10 @@ pub fn run<T: Send + 'static>(
         let stop = match event {
             Ok(News::End(Ok(result))) => break result.map_err(|error| errors::raise(py, &error)),
             Ok(News::End(Err(panic))) => break Err(errors::internal(py, &message_of(&*panic))),
-            Ok(News::Progress(stage, done, total)) => listener.tell(&stage, done, total),
+            Ok(News::Progress(stage, done, total)) if furthest.is_passed(&stage, done, total) => {
+                listener.tell(&stage, done, total)
+            }
+            Ok(News::Progress(..)) => Ok(()),
             Err(RecvTimeoutError::Timeout) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => {
                 break Err(errors::internal(py, "a worker thread vanished"));
@@ -72,6 +77,23 @@ pub fn run<T: Send + 'static>(
     };
     listener.close();
     result
+}
+
+/// How far each stage has come. Two objects are prepared side by side and tell of the same stages: what
+/// is behind the one that is further is not told, so that nobody sees a count go back.
+#[derive(Default)]
+struct Furthest(HashMap<String, f64>);
+
+impl Furthest {
+    fn is_passed(&mut self, stage: &str, done: usize, total: usize) -> bool {
+        let share = if total == 0 { done as f64 } else { done as f64 / total as f64 };
+        match self.0.get_mut(stage) {
+            Some(furthest) if share > *furthest => *furthest = share,
+            Some(_) => return false,
+            None => drop(self.0.insert(stage.to_owned(), share)),
+        }
+        true
+    }
 }
 
 type Event<T> = Result<News<T>, RecvTimeoutError>;

@@ -63,21 +63,22 @@ pub fn read_npz<'py, const N: usize>(
 ) -> PyResult<[Bound<'py, PyAny>; N]> {
     let path_of = path.to_owned();
     let bytes = run(py, None, move |_| Ok(io::read_file(&path_of)?))?;
+    let place = path.display().to_string();
+    let not_ours = |expected: &str, found: &str| errors::format(py, &place, expected, found);
     let foreign = io::foreign_kind(&bytes).filter(|kind| !kind.contains("ZIP"));
     if let Some(kind) = foreign {
-        let place = path.display().to_string();
-        return Err(errors::invalid(py, &place, "an .npz file", kind));
+        return Err(not_ours("an .npz file", kind));
     }
-    let buffer = py.import("io")?.getattr("BytesIO")?.call1((PyBytes::new(py, &bytes),))?;
-    let file = py.import("numpy")?.call_method1("load", (buffer,))?; // without pickles
-    let found = names.map(|name| file.get_item(name));
-    file.call_method0("close")?;
+    let content = py.import("io")?.getattr("BytesIO")?.call1((PyBytes::new(py, &bytes),))?;
+    let file = py.import("numpy")?.call_method1("load", (content,)); // without pickles
+    let file = file.map_err(|error| not_ours("an .npz file", &error.value(py).to_string()))?;
+    if !file.hasattr("files")? {
+        return Err(not_ours("an .npz file", "a single array"));
+    }
     let mut arrays = Vec::with_capacity(N);
-    for (name, array) in names.iter().zip(found) {
-        let place = path.display().to_string();
-        let missing =
-            |_| errors::invalid(py, &place, &format!("an .npz file with `{name}`"), "none");
-        arrays.push(array.map_err(missing)?);
+    for name in names {
+        let missing = |_| not_ours(&format!("an .npz file with `{name}`"), "none");
+        arrays.push(file.get_item(name).map_err(missing)?);
     }
     arrays.try_into().map_err(|_| errors::internal(py, "arrays of an .npz file"))
 }

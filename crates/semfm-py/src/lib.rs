@@ -30,6 +30,7 @@ mod json;
 mod laplacian;
 mod matching;
 mod mesh;
+mod pictures;
 mod pinhole;
 mod point_map;
 mod prepared;
@@ -40,6 +41,7 @@ mod shared;
 mod surface;
 mod synth;
 mod transfer;
+mod stored_transfer;
 mod transfer_function;
 mod view;
 mod views_file;
@@ -50,7 +52,7 @@ mod _semfm {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::align::{Alignment, align_};
+    use crate::align::{_restore_alignment, Alignment, align_};
     #[pymodule_export]
     use crate::anchors::{_restore_anchors, Anchors, Clusters, spectral_clusters};
     #[pymodule_export]
@@ -66,9 +68,9 @@ mod _semfm {
     #[pymodule_export]
     use crate::functional_map::FunctionalMap;
     #[pymodule_export]
-    use crate::geodesic::{HeatGeodesics, geodesic_distances};
+    use crate::geodesic::{_restore_heat, HeatGeodesics, geodesic_distances};
     #[pymodule_export]
-    use crate::grasps::{_restore_grasps, Grasp, Grasps, find_grasps};
+    use crate::grasps::{_restore_grasp, _restore_grasps, Grasp, Grasps, find_grasps};
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]
@@ -80,7 +82,7 @@ mod _semfm {
         Laplacian, cotan_laplacian_, laplacian, point_cloud_laplacian_, tufted_laplacian_,
     };
     #[pymodule_export]
-    use crate::matching::Matching;
+    use crate::matching::{_restore_matching, Matching};
     #[pymodule_export]
     use crate::mesh::{Mesh, MeshFile, mesh_formats, read_mesh};
     #[pymodule_export]
@@ -100,9 +102,11 @@ mod _semfm {
         SurfaceIndex, farthest_points, icosphere, sample_even, sample_uniform, torus,
     };
     #[pymodule_export]
-    use crate::synth::{DemoObject, demo_object};
+    use crate::synth::{_restore_demo_object, DemoObject, demo_object};
     #[pymodule_export]
-    use crate::transfer::{_restore_transfer, Hypothesis, Transfer};
+    use crate::transfer::{_restore_hypothesis, _restore_transfer, Hypothesis, Transfer};
+    #[pymodule_export]
+    use crate::stored_transfer::{StoredTransfer, read_transfer};
     #[pymodule_export]
     use crate::transfer_function::transfer;
     #[pymodule_export]

@@ -53,6 +53,7 @@ pub struct Matching {
     pair: Arc<Matched>,
     source: PreparedObject,
     target: PreparedObject,
+    settings: fmap::TransferSettings,
 }
 
 #[pymethods]
@@ -141,6 +142,23 @@ impl Matching {
         self.target.clone()
     }
 
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (PreparedObject, PreparedObject, TransferSettings))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_matching")?;
+        let settings = TransferSettings { settings: self.settings.clone() };
+        Ok((restore, (self.source(), self.target(), settings)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
     fn __repr__(&self) -> &'static str {
         "Matching(PreparedObject, PreparedObject)"
     }
@@ -158,7 +176,7 @@ impl Matching {
         if pair.source().has_features() {
             pair.anchors(task)?; // its reports list them, as those of the short call
         }
-        Ok(Self { pair: Arc::new(pair), source, target })
+        Ok(Self { pair: Arc::new(pair), source, target, settings: settings.clone() })
     }
 
     /// Transfers one region, which must be of the source's mesh.
@@ -167,4 +185,16 @@ impl Matching {
         let (source, target) = (self.source.clone(), self.target.clone());
         Ok(Transfer { inner: transfer, source, target, region })
     }
+}
+
+/// A matching out of a pickle: matched again, which gives the same.
+#[pyfunction]
+pub fn _restore_matching(
+    source: &Bound<'_, PreparedObject>,
+    target: &Bound<'_, PreparedObject>,
+    settings: &Bound<'_, TransferSettings>,
+) -> PyResult<Matching> {
+    let (py, settings) = (source.py(), settings.get().settings.clone());
+    let (source, target) = (source.get().clone(), target.get().clone());
+    run(py, None, move |task| Matching::of(source, target, &settings, task))
 }

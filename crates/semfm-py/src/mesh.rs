@@ -4,15 +4,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::{PyBytes, PyDict, PyType};
 use semfm::encoder::rendered_views::Drawable;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io;
 
 use crate::arrays_in::{self, Axis};
 use crate::interruptible::{guard, run};
+use crate::region::region_of;
 use crate::shared::Shared;
-use crate::{arrays_out, errors, json};
+use crate::{arrays_out, errors, json, pictures};
 
 /// A triangle mesh in its own frame and units.
 ///
@@ -77,20 +78,27 @@ impl Mesh {
         Ok(Self { inner: Shared::new(mesh) })
     }
 
-    /// The mesh of a `trimesh.Trimesh`, vertex by vertex (load it with ``process=False``, or trimesh
-    /// will have merged vertices).
+    /// The mesh of a `trimesh.Trimesh` or `trimesh.Scene` (what ``trimesh.load`` returns for GLB), vertex
+    /// by vertex: load it with ``process=False``, or trimesh will have merged vertices.
     ///
     /// Parameters
     /// ----------
     /// mesh : object
-    ///     Anything with `vertices` (n, 3) and `faces` (m, 3).
+    ///     Anything with `vertices` (n, 3) and `faces` (m, 3); or a scene, whose meshes are put behind each
+    ///     other in the order of its graph, each where its node stands. Points and lines are left out.
     ///
     /// Returns
     /// -------
     /// Mesh
     #[staticmethod]
     fn from_trimesh(mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::new(&mesh.getattr("vertices")?, &mesh.getattr("faces")?)
+        if is_scene(mesh)? {
+            let arrays = mesh.py().import("semfm.adapters.trimesh")?.getattr("scene_arrays")?;
+            let (vertices, faces): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                arrays.call1((mesh,))?.extract()?;
+            return Self::new(&vertices, &faces);
+        }
+        Self::of_arrays(mesh, "faces", "a trimesh.Trimesh, or an object with vertices and faces")
     }
 
     /// The mesh of an `open3d.geometry.TriangleMesh`.
@@ -105,7 +113,8 @@ impl Mesh {
     /// Mesh
     #[staticmethod]
     fn from_open3d(mesh: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::new(&mesh.getattr("vertices")?, &mesh.getattr("triangles")?)
+        let wanted = "an open3d.geometry.TriangleMesh, or an object with vertices and triangles";
+        Self::of_arrays(mesh, "triangles", wanted)
     }
 
     /// Writes a mesh file, whole or not at all, in a format that ``mesh_formats()`` says is written.
@@ -222,6 +231,42 @@ impl Mesh {
         json::to_python(py, &report)
     }
 
+    /// A picture from two sides, which notebooks show by themselves.
+    ///
+    /// Parameters
+    /// ----------
+    /// region : Region or path, optional
+    ///     Painted grey to red by weight; the sides are those from which it is seen best.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    ///     PNG.
+    #[pyo3(signature = (*, region=None))]
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        region: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let mesh = self.inner.clone();
+        let n = mesh.n_vertices();
+        let weights = match region {
+            Some(region) => region_of(region, &mesh)?.weights().to_vec(),
+            None => vec![0.0; n],
+        };
+        if weights.len() != n {
+            let expected = format!("a region of the mesh's {n} vertices");
+            return Err(errors::invalid(py, "region", &expected, &weights.len().to_string()));
+        }
+        pictures::png(py, move |path, task| {
+            pictures::write_mesh_picture(path, &mesh, &weights, task)
+        })
+    }
+
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyBytes>> {
+        pictures::shown(self.picture(py, None))
+    }
+
     fn __repr__(&self) -> String {
         format!("Mesh({} vertices, {} triangles)", self.inner.n_vertices(), self.inner.n_faces())
     }
@@ -249,6 +294,21 @@ impl Mesh {
     }
 }
 
+impl Mesh {
+    /// The mesh of an object with `vertices` and triangles under the name `faces`.
+    fn of_arrays(mesh: &Bound<'_, PyAny>, faces: &str, wanted: &str) -> PyResult<Self> {
+        if !mesh.hasattr("vertices")? || !mesh.hasattr(faces)? {
+            return Err(errors::wrong_type("mesh", wanted, mesh));
+        }
+        Self::new(&mesh.getattr("vertices")?, &mesh.getattr(faces)?)
+    }
+}
+
+/// Whether it is a scene of trimesh: geometries by name, and a graph that says where they stand.
+fn is_scene(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(!value.hasattr("vertices")? && value.hasattr("geometry")? && value.hasattr("graph")?)
+}
+
 /// What `__reduce__` answers: the class and its arguments.
 pub type Reduced<'py> = (Bound<'py, PyType>, Bound<'py, PyAny>);
 
@@ -260,6 +320,9 @@ pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Shared<semfm::
     if let Ok(path) = value.extract::<PathBuf>() {
         return Ok(Mesh::read(value.py(), path)?.inner);
     }
+    if is_scene(value)? {
+        return Ok(Mesh::from_trimesh(value)?.inner);
+    }
     if value.hasattr("vertices")? {
         if value.hasattr("faces")? {
             return Ok(Mesh::from_trimesh(value)?.inner);
@@ -267,6 +330,9 @@ pub fn from_any(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Shared<semfm::
         if value.hasattr("triangles")? {
             return Ok(Mesh::from_open3d(value)?.inner);
         }
+    }
+    if let Ok(file) = value.cast::<MeshFile>() {
+        return Ok(file.get().mesh().inner);
     }
     let wanted = "a Mesh, a path, or an object with vertices and faces (or triangles)";
     Err(errors::wrong_type(name, wanted, value))

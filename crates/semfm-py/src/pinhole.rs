@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use semfm::align::DepthImage;
 use semfm::geom::math::{DAffine3, DMat3, DVec3};
 use semfm::geom::{self, Intrinsics, PixelDepth};
 use semfm::views::{self, RigSettings};
@@ -52,27 +53,30 @@ impl Pinhole {
     ///     Principal point, x, in pixels.
     /// cy : float
     ///     Principal point, y, in pixels.
-    /// camera_from_world : (4, 4) array_like
-    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+    /// camera_from_world : (4, 4) array_like, optional
+    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+    ///     the camera's own frame is the world.
     ///
     /// Returns
     /// -------
     /// Pinhole
     #[staticmethod]
+    #[pyo3(signature = (width, height, fx, fy, cx, cy, camera_from_world=None))]
+    #[expect(clippy::too_many_arguments, reason = "a camera's numbers")]
     fn with_pixel_centres_at_half(
+        py: Python<'_>,
         width: u32,
         height: u32,
         fx: f64,
         fy: f64,
         cx: f64,
         cy: f64,
-        camera_from_world: &Bound<'_, PyAny>,
+        camera_from_world: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
-        let pose = rigid_matrix(camera_from_world, "camera_from_world")?;
-        let camera = guard(camera_from_world.py(), || {
-            Ok(geom::Pinhole::with_pixel_centres_at_half(intrinsics, pose)?)
-        })?;
+        let pose = pose_of(camera_from_world)?;
+        let camera =
+            guard(py, || Ok(geom::Pinhole::with_pixel_centres_at_half(intrinsics, pose)?))?;
         Ok(Self { camera })
     }
 
@@ -93,28 +97,76 @@ impl Pinhole {
     ///     Principal point, x, in pixels.
     /// cy : float
     ///     Principal point, y, in pixels.
-    /// camera_from_world : (4, 4) array_like
-    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+    /// camera_from_world : (4, 4) array_like, optional
+    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+    ///     the camera's own frame is the world.
     ///
     /// Returns
     /// -------
     /// Pinhole
     #[staticmethod]
+    #[pyo3(signature = (width, height, fx, fy, cx, cy, camera_from_world=None))]
+    #[expect(clippy::too_many_arguments, reason = "a camera's numbers")]
     fn with_pixel_centres_at_integers(
+        py: Python<'_>,
         width: u32,
         height: u32,
         fx: f64,
         fy: f64,
         cx: f64,
         cy: f64,
-        camera_from_world: &Bound<'_, PyAny>,
+        camera_from_world: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
-        let pose = rigid_matrix(camera_from_world, "camera_from_world")?;
-        let camera = guard(camera_from_world.py(), || {
-            Ok(geom::Pinhole::with_pixel_centres_at_integers(intrinsics, pose)?)
-        })?;
+        let pose = pose_of(camera_from_world)?;
+        let camera =
+            guard(py, || Ok(geom::Pinhole::with_pixel_centres_at_integers(intrinsics, pose)?))?;
         Ok(Self { camera })
+    }
+
+    /// A camera from a calibration's matrix ``[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]``, counted as by
+    /// `with_pixel_centres_at_integers`.
+    ///
+    /// Parameters
+    /// ----------
+    /// matrix : (3, 3) array_like
+    ///     K of OpenCV, ROS `CameraInfo` and most calibration tools, in pixels.
+    /// width : int
+    ///     Pixels.
+    /// height : int
+    ///     Pixels.
+    /// camera_from_world : (4, 4) array_like, optional
+    ///     Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+    ///     the camera's own frame is the world.
+    ///
+    /// Returns
+    /// -------
+    /// Pinhole
+    ///
+    /// Examples
+    /// --------
+    /// >>> import semfm
+    /// >>> camera = semfm.Pinhole.from_matrix([[70, 0, 31.5], [0, 70, 23.5], [0, 0, 1]], 64, 48)
+    /// >>> camera.cx, camera.cy
+    /// (32.0, 24.0)
+    #[staticmethod]
+    #[pyo3(signature = (matrix, width, height, *, camera_from_world=None))]
+    fn from_matrix(
+        matrix: &Bound<'_, PyAny>,
+        width: u32,
+        height: u32,
+        camera_from_world: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let py = matrix.py();
+        let (k, _) = arrays_in::floats(matrix, "matrix", &[Axis::Is(3), Axis::Is(3)])?;
+        if [k[1], k[3], k[6], k[7], k[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
+            let rows: Vec<&[f64]> = k.chunks(3).collect();
+            let expected = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] (no skew)";
+            let found = format!("the rows {rows:?}");
+            return Err(crate::errors::invalid(py, "matrix", expected, &found));
+        }
+        let (fx, fy, cx, cy) = (k[0], k[4], k[2], k[5]);
+        Self::with_pixel_centres_at_integers(py, width, height, fx, fy, cx, cy, camera_from_world)
     }
 
     /// int: pixels.
@@ -190,6 +242,99 @@ impl Pinhole {
             [u, v, z]
         });
         arrays_out::owned_rows(points.py(), projected.collect(), 3)
+    }
+
+    /// Directions of the lines of sight through pixel positions. They start at `eye`.
+    ///
+    /// Parameters
+    /// ----------
+    /// pixels : (n, 2) array_like
+    ///     u to the right and v down, in pixels; the centre of pixel (0, 0) is at (½, ½).
+    ///
+    /// Returns
+    /// -------
+    /// (n, 3) float64 array
+    ///     In the world's frame, scaled so that the depth is 1: the point at depth z is
+    ///     ``eye + z * ray``.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import semfm
+    /// >>> camera = semfm.Pinhole.with_pixel_centres_at_half(64, 48, 70, 70, 32, 24)
+    /// >>> camera.rays([[32, 24], [67, 24]]).tolist()
+    /// [[0.0, 0.0, 1.0], [0.5, 0.0, 1.0]]
+    fn rays<'py>(&self, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (uv, _) = arrays_in::floats(pixels, "pixels", &[Axis::Any("n"), Axis::Is(2)])?;
+        let rays = uv.chunks_exact(2).flat_map(|uv| self.camera.ray(uv[0], uv[1]).to_array());
+        arrays_out::owned_rows(pixels.py(), rays.collect(), 3)
+    }
+
+    /// The points that the camera sees at pixel positions and depths: undoes `project`.
+    ///
+    /// Parameters
+    /// ----------
+    /// pixels : (n, 3) array_like
+    ///     u, v, and depth z along the camera's axis, as `project` gives them.
+    ///
+    /// Returns
+    /// -------
+    /// (n, 3) float64 array
+    ///     In the world's frame.
+    fn unproject<'py>(&self, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (rows, _) = arrays_in::floats(pixels, "pixels", &[Axis::Any("n"), Axis::Is(3)])?;
+        let points = rows
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .flat_map(|&[u, v, z]| self.camera.unproject(PixelDepth { u, v, z }).to_array());
+        arrays_out::owned_rows(pixels.py(), points.collect(), 3)
+    }
+
+    /// The points of a depth image, for `align` and for scenes of `find_grasps`.
+    ///
+    /// Parameters
+    /// ----------
+    /// depth : (height, width) array_like
+    ///     Depth along the camera's axis, in metres for `align`. What is 0, negative or not finite is no
+    ///     point.
+    /// mask : (height, width) array_like, optional
+    ///     Of dtype bool: only the pixels where it is true.
+    ///
+    /// Returns
+    /// -------
+    /// (n, 3) float64 array
+    ///     In the world's frame, row by row of the image.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> import semfm
+    /// >>> camera = semfm.Pinhole.from_matrix([[50, 0, 1], [0, 50, 1], [0, 0, 1]], 3, 3)
+    /// >>> depth = np.zeros((3, 3))
+    /// >>> depth[1, 1] = 0.5
+    /// >>> camera.cloud(depth).tolist()
+    /// [[0.0, 0.0, 0.5]]
+    #[pyo3(signature = (depth, *, mask=None))]
+    fn cloud<'py>(
+        &self,
+        depth: &Bound<'py, PyAny>,
+        mask: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = depth.py();
+        let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
+        let axes = [Axis::Is(height), Axis::Is(width)];
+        let (depth, _) = arrays_in::any32(depth, "depth", &axes)?;
+        let mask = mask.map(|mask| arrays_in::mask(mask, "mask", &axes)).transpose()?;
+        let camera = self.camera;
+        let points = run(py, None, move |_| {
+            let image = DepthImage::new(width, height, depth)?;
+            let mask = mask.as_ref().map(|(mask, _)| mask.as_slice());
+            let world_from_camera = camera.camera_from_world().inverse();
+            let seen = image.points(&camera, mask)?.object.into_iter();
+            Ok(seen.map(|p| world_from_camera.transform_point3(p)).collect::<Vec<_>>())
+        })?;
+        let numbers = points.iter().flat_map(|p| p.to_array()).collect();
+        arrays_out::owned_rows(py, numbers, 3)
     }
 
     fn __repr__(&self) -> String {
@@ -326,12 +471,18 @@ pub fn rows_and_columns<'py>(
     PyTuple::new(py, shape)
 }
 
+/// The pose of a camera; the camera's own frame is the world where none is given.
+fn pose_of(camera_from_world: Option<&Bound<'_, PyAny>>) -> PyResult<DAffine3> {
+    let pose = camera_from_world.map(|pose| rigid_matrix(pose, "camera_from_world"));
+    Ok(pose.transpose()?.unwrap_or(DAffine3::IDENTITY))
+}
+
 /// A rigid motion given as a homogeneous matrix (4 × 4).
 fn rigid_matrix(value: &Bound<'_, PyAny>, name: &str) -> PyResult<DAffine3> {
     let (m, _) = arrays_in::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {
         let found = format!("{:?}", &m[12..]);
-        return Err(crate::errors::invalid(value.py(), name, "the last row 0, 0, 0, 1", &found));
+        return Err(crate::errors::invalid(value.py(), name, "the last row [0, 0, 0, 1]", &found));
     }
     let rows = [0, 4, 8].map(|at| DVec3::new(m[at], m[at + 1], m[at + 2]));
     let rotation = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();

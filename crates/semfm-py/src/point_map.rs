@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use semfm::files::PointMapFile;
 use semfm::fmap;
 
 use crate::arrays_in::{self, Axis};
-use crate::interruptible::guard;
+use crate::interruptible::{guard, run};
 use crate::mesh::Reduced;
 use crate::shared::Shared;
 use crate::{arrays_out, errors, json};
@@ -33,6 +34,15 @@ use crate::{arrays_out, errors, json};
 pub struct PointMap {
     pub inner: Shared<fmap::PointMap>,
     pub n_source: usize,
+}
+
+impl PointMap {
+    /// The map of a file.
+    pub fn of_file(py: Python<'_>, file: &PointMapFile) -> PyResult<Self> {
+        let n_source = file.source_weight.len();
+        let map = guard(py, || Ok(fmap::PointMap::new(file.source_of.clone(), n_source)?))?;
+        Ok(Self { inner: Shared::new(map), n_source })
+    }
 }
 
 #[pymethods]
@@ -111,7 +121,26 @@ impl PointMap {
     #[staticmethod]
     fn from_npz(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let [source_of, n_source] = json::read_npz(py, &path, ["source_of", "n_source"])?;
-        Self::new(&source_of, n_source.call_method0("item")?.extract()?)
+        Self::new(&source_of, arrays_in::count(&n_source, "n_source")?)
+    }
+
+    /// Reads the `point_map.json` of a transfer's folder.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path
+    ///
+    /// Returns
+    /// -------
+    /// PointMap
+    ///
+    /// See Also
+    /// --------
+    /// read_transfer : the whole folder.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let file = run(py, None, move |_| PointMapFile::read(&path))?;
+        Self::of_file(py, &file)
     }
 
     fn __len__(&self) -> usize {

@@ -323,6 +323,18 @@ impl Region {
         format!("Region({inside} of {n} vertices)")
     }
 
+    /// What a notebook shows: a region alone has no surface to be drawn on.
+    fn _repr_html_(&self) -> String {
+        let (inside, n) = (self.inner.vertices().len(), self.inner.n_vertices());
+        let share = 100.0 * inside as f64 / n.max(1) as f64;
+        format!(
+            "<div><b>Region</b>: {inside} of {n} vertices ({share:.1} %)\
+             <div style='width:16em;height:.5em;background:#c7c7c7'>\
+             <div style='width:{share:.2}%;height:100%;background:#db2929'></div></div>\
+             <small><code>mesh.picture(region=…)</code> draws it on its mesh</small></div>"
+        )
+    }
+
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| *other.get().inner == *self.inner)
     }

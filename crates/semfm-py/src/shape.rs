@@ -128,7 +128,9 @@ impl Shape {
     /// Eigenbasis: that of the working mesh at area 1 (n_working × k).
     #[getter]
     fn basis(&self) -> Eigenbasis {
-        Eigenbasis { inner: Shared::part_of(&self.inner, geom::Shape::basis) }
+        let n_original = self.inner.original().n_vertices();
+        let n_original = Some(n_original).filter(|&n| n != self.inner.mesh().n_vertices());
+        Eigenbasis { inner: Shared::part_of(&self.inner, geom::Shape::basis), n_original }
     }
 
     /// float: √area of the working mesh, the length that becomes 1.
@@ -155,7 +157,7 @@ impl Shape {
     ///     Exact where a vertex was kept, linear on the nearest working triangle elsewhere.
     fn onto_original<'py>(&self, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = values.py();
-        let n = Axis::Is(self.inner.mesh().n_vertices());
+        let n = self.working_rows();
         let values = arrays_in::floats(values, "values", &[n])?.0;
         Ok(arrays_out::owned(py, guard(py, || Ok(self.inner.onto_original(&values)))?))
     }
@@ -171,7 +173,8 @@ impl Shape {
     /// (n_working,) float64 array
     fn onto_working<'py>(&self, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let py = values.py();
-        let n = Axis::Is(self.inner.original().n_vertices());
+        let (n, n_working) = (self.inner.original().n_vertices(), self.inner.mesh().n_vertices());
+        let n = Axis::Original { n, n_working };
         let values = arrays_in::floats(values, "values", &[n])?.0;
         Ok(arrays_out::owned(py, guard(py, || Ok(self.inner.onto_working(&values)))?))
     }
@@ -189,7 +192,7 @@ impl Shape {
     /// (n_working,) float64 array
     fn smooth<'py>(&self, function: &Bound<'py, PyAny>, t: f64) -> PyResult<Bound<'py, PyAny>> {
         let py = function.py();
-        let n = Axis::Is(self.inner.mesh().n_vertices());
+        let n = self.working_rows();
         let function = arrays_in::floats(function, "function", &[n])?.0;
         let shape = self.inner.clone();
         let smoothed = run(py, None, move |_| Ok(shape.smooth(&function, t)?))?;
@@ -217,6 +220,14 @@ impl Shape {
 
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
+    }
+}
+
+impl Shape {
+    /// One entry per working vertex.
+    fn working_rows(&self) -> Axis {
+        let (n, n_original) = (self.inner.mesh().n_vertices(), self.inner.original().n_vertices());
+        Axis::Working { n, n_original }
     }
 }
 

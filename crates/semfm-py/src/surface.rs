@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyTuple, PyType};
 use semfm::geom::math::DVec3;
 use semfm::geom::sampling::{self, SurfaceSample};
 use semfm_geom::zoo;
@@ -124,6 +124,10 @@ impl SurfaceIndex {
     #[getter]
     fn mesh(&self) -> Mesh {
         Mesh { inner: self.mesh.clone() }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Mesh,)) {
+        (slf.get_type(), (slf.get().mesh(),))
     }
 }
 

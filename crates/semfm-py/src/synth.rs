@@ -24,7 +24,11 @@ use crate::{arrays_out, errors};
 #[pyclass(frozen, module = "semfm")]
 pub struct DemoObject {
     inner: Arc<SynthObject>,
+    request: Request,
 }
+
+/// What `demo_object` was asked for: category, seed, instance, n_vertices, holes, floaters.
+type Request = (String, u64, usize, usize, usize, usize);
 
 /// All names of parts, in one order for all objects.
 const PARTS: [&str; 21] = [
@@ -68,6 +72,11 @@ impl DemoObject {
     #[getter]
     fn name(&self) -> String {
         self.inner.name()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Request)> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_demo_object")?;
+        Ok((restore, self.request.clone()))
     }
 
     /// The parts as one-hot features, one column per part of this object.
@@ -249,7 +258,22 @@ pub fn demo_object(
     let settings = ObjectSettings { n_vertices, holes, floaters, seed };
     let object =
         run(py, None, move |_| make_object(category, instance, &settings).map_err(raised))?;
-    Ok(DemoObject { inner: Arc::new(object) })
+    let request = (category.to_string(), seed, instance, n_vertices, holes, floaters);
+    Ok(DemoObject { inner: Arc::new(object), request })
+}
+
+/// A demo object out of a pickle: made again, which gives the same.
+#[pyfunction]
+pub fn _restore_demo_object(
+    py: Python<'_>,
+    category: &str,
+    seed: u64,
+    instance: usize,
+    n_vertices: usize,
+    holes: usize,
+    floaters: usize,
+) -> PyResult<DemoObject> {
+    demo_object(py, category, seed, instance, n_vertices, holes, floaters)
 }
 
 fn raised(error: semfm_synth::Error) -> semfm::Error {

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use semfm::files::{Provenance, TransferResult};
 use semfm::fmap;
-use semfm_show::{TransferFiles, write_transfer};
+use semfm_show::{TransferFiles, TransferFigure, write_transfer};
 use serde_json::{Value, json};
 
 use crate::interruptible::run;
@@ -16,7 +16,7 @@ use crate::prepared::PreparedObject;
 use crate::region::Region;
 use crate::settings::TransferSettings;
 use crate::shared::Shared;
-use crate::{arrays_out, errors, json as dicts};
+use crate::{arrays_out, errors, json as dicts, pictures};
 
 /// A transferred region and everything known about it.
 ///
@@ -149,6 +149,28 @@ impl Transfer {
         Ok(files.iter().map(|file| file.display().to_string()).collect())
     }
 
+    /// A picture of both objects with the region, which notebooks show by themselves: `transfer.png` of
+    /// `write`.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    ///     PNG.
+    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let (shared, region) = (self.inner.clone(), self.region.clone());
+        let (source, target) = (self.source.inner.clone(), self.target.inner.clone());
+        pictures::png(py, move |path, task| {
+            let (source, target, transfer) = (&*source, &*target, &*shared);
+            let (region, provenance) = (&*region, &Provenance::default());
+            let result = TransferResult { source, target, region, transfer, provenance };
+            Ok(TransferFigure::new(&result, task)?.write_transfer_picture(path, task)?)
+        })
+    }
+
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyBytes>> {
+        pictures::shown(self.picture(py))
+    }
+
     fn __repr__(&self) -> String {
         let (n, of) = (self.inner.region.vertices().len(), self.inner.region.n_vertices());
         let (verdict, confidence) = (self.verdict(), self.inner.confidence);
@@ -225,6 +247,10 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    pub fn new(region: semfm::Region, probability: f64) -> Self {
+        Self { region: Shared::new(region), probability }
+    }
+
     fn of(hypothesis: &fmap::Hypothesis) -> Self {
         let fmap::Hypothesis { region, probability, .. } = hypothesis;
         Self { region: Shared::new(region.clone()), probability: *probability }
@@ -245,8 +271,27 @@ impl Hypothesis {
         self.probability
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Region, f64))> {
+        let restore = py.import("semfm._semfm")?.getattr("_restore_hypothesis")?;
+        Ok((restore, (self.region(), self.probability)))
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
     fn __repr__(&self) -> String {
         let n = self.region.vertices().len();
         format!("Hypothesis({n} vertices, probability {:.2})", self.probability)
     }
+}
+
+/// A hypothesis out of a pickle.
+#[pyfunction]
+pub fn _restore_hypothesis(region: &Bound<'_, Region>, probability: f64) -> Hypothesis {
+    Hypothesis { region: region.get().inner.clone(), probability }
 }

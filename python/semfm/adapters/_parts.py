@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 import importlib
+import os
 from dataclasses import dataclass, field
 from typing import Any, Optional, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._paint import colors_of, position_colors, weight_colors, weights_of
-from .._semfm import Mesh, MeshFile, PreparedObject, Region, SemanticCloud, Shape, Transfer
+from .._paint import PathLike, colors_of, position_colors, weight_colors, weights_of
+from .._semfm import (
+    Grasps,
+    Mesh,
+    MeshFile,
+    PreparedObject,
+    Region,
+    SemanticCloud,
+    Shape,
+    Transfer,
+    StoredTransfer,
+)
 from ..errors import InvalidInput, InvalidType, MissingPackage
 
 Floats = NDArray[np.float64]
+
+# Grippers that are shown: more hide each other and the object.
+MOST_GRIPPERS = 6
+# The colour of a gripper, sRGB.
+GRIPPER = np.array([0.24, 0.45, 0.70])
 
 # The gap between the two objects of a pair, as a share of the larger one's width.
 GAP = 0.25
@@ -38,19 +54,19 @@ class Part:
 
 def parts_of(
     thing: Any,
-    region: Optional[Union[Region, ArrayLike]] = None,
+    region: Optional[Union[Region, PathLike, ArrayLike]] = None,
     colors: Optional[ArrayLike] = None,
 ) -> list[Part]:
-    """The parts of an object: one, or source and target of a `Transfer`."""
+    """The parts of an object: one; source and target of a transfer; object and grippers of grasps."""
     if region is not None and colors is not None:
         raise InvalidInput("region and colors: expected one of them, found both", place="region")
-    if isinstance(thing, Transfer):
+    if isinstance(thing, (Transfer, StoredTransfer, Grasps)):
         if region is not None or colors is not None:
+            kind = type(thing).__name__
             raise InvalidInput(
-                "region and colors: expected none with a Transfer, which has its own",
-                place="region",
+                f"region and colors: expected none with {kind}, which has its own", place="region"
             )
-        return sides(thing)
+        return with_grippers(thing) if isinstance(thing, Grasps) else sides(thing)
     if isinstance(thing, SemanticCloud):
         if region is not None:
             raise InvalidInput("region: expected none with a SemanticCloud", place="region")
@@ -61,13 +77,13 @@ def parts_of(
 
 
 def surface(
-    thing: Any, region: Optional[Union[Region, ArrayLike]], colors: Optional[ArrayLike]
+    thing: Any, region: Optional[Union[Region, PathLike, ArrayLike]], colors: Optional[ArrayLike]
 ) -> Part:
     """One mesh with its region or colours."""
     mesh = mesh_of(thing)
     part = Part("mesh", mesh.vertices, mesh.faces)
     if region is not None:
-        part.scalars["region"] = weights_of(region, mesh.n_vertices)
+        part.scalars["region"] = weights_of(region, mesh)
         part.colors = weight_colors(part.scalars["region"])
     elif colors is not None:
         part.colors = colors_of(colors, mesh.n_vertices)
@@ -84,17 +100,35 @@ def mesh_of(thing: Any) -> Mesh:
         return thing.mesh
     if isinstance(thing, Shape):
         return thing.original
+    if isinstance(thing, (str, os.PathLike)):
+        return Mesh.read(thing)
     raise InvalidType(
-        "expected a Mesh, MeshFile, Shape, PreparedObject, SemanticCloud or Transfer, "
-        f"found {type(thing).__name__}",
+        "expected a Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, "
+        f"StoredTransfer or Grasps, found {type(thing).__name__}",
         "type",
     )
 
 
-def sides(transfer: Transfer) -> list[Part]:
+def with_grippers(grasps: Grasps) -> list[Part]:
+    """The object in metres with its region, and the best grippers where they close, best first."""
+    part = surface(grasps.mesh, grasps.region, None)
+    part.name, part.vertices = "object", part.vertices * grasps.scale
+    parts = [part]
+    for rank in range(min(len(grasps), MOST_GRIPPERS)):
+        grasp = grasps[rank]
+        hand = grasps.gripper.mesh_at(grasp.width)
+        pose = grasp.object_from_tcp
+        vertices = hand.vertices @ pose[:3, :3].T + pose[:3, 3]
+        share = 1.0 - 0.5 * rank / MOST_GRIPPERS
+        colors = np.tile(GRIPPER * share + (1.0 - share), (len(vertices), 1))
+        parts.append(Part(f"grasp {rank}", vertices, hand.faces, colors))
+    return parts
+
+
+def sides(transfer: Union[Transfer, StoredTransfer]) -> list[Part]:
     """Source and target with region and matched places, the target beside the source along x."""
     source = surface(transfer.source, transfer.source_region, None)
-    target = surface(transfer.target, transfer.weights, None)
+    target = surface(transfer.target, transfer.region, None)
     source.name, target.name = "source", "target"
     places = position_colors(source.vertices)
     source.layers["places"], target.layers["places"] = places, transfer.point_map.pull_back(places)

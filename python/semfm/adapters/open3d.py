@@ -7,6 +7,7 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._paint import PathLike
 from .._semfm import Region
 from ._parts import Part, library, parts_of
 
@@ -14,15 +15,15 @@ from ._parts import Part, library, parts_of
 def to_open3d(
     thing: Any,
     *,
-    region: Optional[Union[Region, ArrayLike]] = None,
+    region: Optional[Union[Region, PathLike, ArrayLike]] = None,
     colors: Optional[ArrayLike] = None,
 ) -> Any:
     """An `open3d.geometry.TriangleMesh` or `PointCloud`; of a transfer, a tuple of two meshes.
 
     Parameters
     ----------
-    thing : Mesh, MeshFile, Shape, PreparedObject, SemanticCloud or Transfer
-    region : Region or (n,) array_like, optional
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or Grasps
+    region : Region, path or (n,) array_like, optional
         Painted grey to red by weight.
     colors : (n, 3) or (n, 4) array_like, optional
         sRGB of each vertex: uint8, or fractions of one.

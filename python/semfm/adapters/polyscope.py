@@ -7,6 +7,7 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._paint import PathLike
 from .._semfm import Region
 from ._parts import Part, library, parts_of
 
@@ -15,18 +16,18 @@ def to_polyscope(
     thing: Any,
     name: Optional[str] = None,
     *,
-    region: Optional[Union[Region, ArrayLike]] = None,
+    region: Optional[Union[Region, PathLike, ArrayLike]] = None,
     colors: Optional[ArrayLike] = None,
 ) -> Any:
     """Registers a structure with polyscope, after ``polyscope.init()``.
 
     Parameters
     ----------
-    thing : Mesh, MeshFile, Shape, PreparedObject, SemanticCloud or Transfer
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or Grasps
     name : str, optional
         Name of the structure, of which ``NAME source`` and ``NAME target`` are made for a transfer.
         ``"mesh"`` or ``"cloud"``, ``"source"`` and ``"target"`` where none is given.
-    region : Region or (n,) array_like, optional
+    region : Region, path or (n,) array_like, optional
         Painted grey to red by weight, and a scalar quantity ``"region"``.
     colors : (n, 3) or (n, 4) array_like, optional
         sRGB of each vertex: uint8, or fractions of one.

@@ -8,7 +8,8 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._semfm import Pinhole, Region, View
+from .._paint import PathLike
+from .._semfm import Grasps, Pinhole, Region, View
 from ._parts import Part, color_bytes, library, parts_of
 
 
@@ -16,7 +17,7 @@ def to_rerun(
     thing: Any,
     path: Optional[str] = None,
     *,
-    region: Optional[Union[Region, ArrayLike]] = None,
+    region: Optional[Union[Region, PathLike, ArrayLike]] = None,
     colors: Optional[ArrayLike] = None,
     recording: Optional[Any] = None,
 ) -> list[str]:
@@ -24,12 +25,13 @@ def to_rerun(
 
     Parameters
     ----------
-    thing : Mesh, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, Pinhole, View or list
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer, Grasps,
+        Pinhole, View or list
         A list of cameras or views is numbered.
     path : str, optional
         Entity to log to, below which a transfer has ``source`` and ``target``. Named after the kind
         of object where none is given.
-    region : Region or (n,) array_like, optional
+    region : Region, path or (n,) array_like, optional
         Painted grey to red by weight.
     colors : (n, 3) or (n, 4) array_like, optional
         sRGB of each vertex: uint8, or fractions of one.
@@ -52,10 +54,11 @@ def to_rerun(
     if isinstance(thing, (Pinhole, View)):
         return view(rerun, thing, path or "view", recording)
     parts = parts_of(thing, region, colors)
+    base = path or ("grasps" if isinstance(thing, Grasps) else "transfer")
     entities = []
     for part in parts:
         single = len(parts) == 1
-        entity = (path or part.name) if single else f"{path or 'transfer'}/{part.name}"
+        entity = (path or part.name) if single else f"{base}/{part.name}"
         if part.offset.any():
             beside = rerun.Transform3D(translation=part.offset)
             rerun.log(entity, beside, static=True, recording=recording)

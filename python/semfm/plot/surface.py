@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._paint import Colors, colors_of, per_vertex, weight_colors, weights_of
+from .._paint import Colors, PathLike, colors_of, per_vertex, weight_colors, weights_of
 from .._semfm import Pinhole, Mesh, MeshFile, PreparedObject, Region, Shape, View, render, rig
-from ..errors import InvalidInput
+from ..errors import InvalidInput, InvalidType
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,22 +30,26 @@ def as_mesh(thing: Any) -> Mesh:
         return thing.mesh
     if isinstance(thing, Shape):
         return thing.original
-    if hasattr(thing, "vertices") and hasattr(thing, "faces"):
+    if hasattr(thing, "faces") or hasattr(thing, "geometry"):
         return Mesh.from_trimesh(thing)
-    if hasattr(thing, "vertices") and hasattr(thing, "triangles"):
+    if hasattr(thing, "triangles"):
         return Mesh.from_open3d(thing)
-    return Mesh.read(thing)
+    if isinstance(thing, (str, os.PathLike)):
+        return Mesh.read(thing)
+    raise InvalidType(
+        f"mesh: expected a mesh, a path or what has a mesh, found {type(thing).__name__}", "type", "mesh"
+    )
 
 
 def best_camera(
-    mesh: Any, weights: Optional[Union[Region, ArrayLike]] = None, *, size: int = SIDE
+    mesh: Any, weights: Optional[Union[Region, PathLike, ArrayLike]] = None, *, size: int = SIDE
 ) -> Pinhole:
     """From where a region shows the most pixels, and then the object the most of its surface.
 
     Parameters
     ----------
     mesh : mesh_like, Shape or PreparedObject
-    weights : Region or (n,) array_like, optional
+    weights : Region, path or (n,) array_like, optional
         What is to be seen; a vertex counts from one half on. Everything where none is given.
     size : int, default 640
         Side of the square image, in pixels.
@@ -57,7 +62,7 @@ def best_camera(
     faces = np.asarray(found.faces)
     inside = np.zeros(found.n_vertices)
     if weights is not None:
-        inside = weights_of(weights, found.n_vertices)
+        inside = weights_of(weights, found)
     marked: NDArray[np.bool_] = np.any(inside[faces] >= 0.5, axis=1)
     areas = face_areas(found)
     shown = []
@@ -142,7 +147,7 @@ def mesh(
 
 def region(
     mesh: Any,
-    region: Union[Region, ArrayLike],
+    region: Union[Region, PathLike, ArrayLike],
     *,
     camera: Optional[Pinhole] = None,
     title: Optional[str] = None,
@@ -154,7 +159,7 @@ def region(
     Parameters
     ----------
     mesh : mesh_like, Shape or PreparedObject
-    region : Region or (n,) array_like
+    region : Region, path or (n,) array_like
         A region of that mesh, or weights in [0, 1].
     camera : Pinhole, optional
     title : str, optional
@@ -167,7 +172,7 @@ def region(
     matplotlib.axes.Axes
     """
     found = as_mesh(mesh)
-    weights = weights_of(region, found.n_vertices)
+    weights = weights_of(region, found)
     seen = camera or best_camera(found, weights, size=size)
     return show(found, weight_colors(weights), seen, title=title, ax=ax)
 

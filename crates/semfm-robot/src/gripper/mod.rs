@@ -13,6 +13,7 @@ mod link_shape;
 mod motion;
 mod pads;
 mod part;
+mod surface;
 
 use std::ops::RangeInclusive;
 

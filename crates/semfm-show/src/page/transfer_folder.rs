@@ -3,11 +3,9 @@
 use std::path::Path;
 
 use semfm::files::{
-    HypothesisRecord, PointMapFile, TransferReportFile, TransferredRegionFile, read_region,
+    HypothesisRecord, PointMapFile, StoredTransfer, TransferReportFile, read_region,
 };
 use semfm::fmap::metrics::iou;
-use semfm::geom::MeshHash;
-use semfm::geom::io::{FormatError, read_mesh};
 use semfm::weight_colors::{MARKED, PLAIN, color_bytes};
 use semfm::{Mesh, Region, Task};
 
@@ -92,14 +90,8 @@ struct TransferFolder {
 
 impl TransferFolder {
     fn read(folder: &Path) -> Result<Self> {
-        let report = TransferReportFile::read(&folder.join("report.json"))?;
-        let map = PointMapFile::read(&folder.join("point_map.json"))?;
-        let source = read_mesh(folder.join("source.ply"))?.mesh;
-        let target = read_mesh(folder.join("target.ply"))?.mesh;
-        check_hash(&folder.join("source.ply"), &source, map.source)?;
-        check_hash(&folder.join("target.ply"), &target, map.target)?;
-        map.check(&folder.join("point_map.json"), &source, &target)?;
-        let mut places = TransferredRegionFile::read(&folder.join("region.json"))?.hypotheses;
+        let StoredTransfer { source, target, map, region, report } = StoredTransfer::read(folder)?;
+        let mut places = region.hypotheses;
         let n = target.n_vertices();
         places.retain(|place| place.vertices.iter().all(|&v| (v as usize) < n));
         Ok(Self { source, target, map, places, report })
@@ -189,14 +181,6 @@ impl TransferFolder {
             hands: None,
         }
     }
-}
-
-fn check_hash(path: &Path, mesh: &Mesh, hash: MeshHash) -> Result<()> {
-    if mesh.hash() == hash {
-        return Ok(());
-    }
-    let expected = format!("the mesh {hash} of point_map.json");
-    Err(FormatError::new(path, "mesh", expected, mesh.hash().to_string()).into())
 }
 
 fn panel(name: &str, mesh: Mesh, viewpoints: Viewpoints) -> Panel {

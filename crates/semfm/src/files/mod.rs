@@ -10,7 +10,7 @@
 //! | `aligned.json`, the pose of an object before a camera | `semfm.aligned/1` | [`AlignedFile`] |
 //! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
 //!
-//! [`write_transfer`] writes the folder of a transfer. Grasps are also written as Isaac's YAML
+//! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
 //! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`). From other
 //! programs come depth images, masks and intrinsics ([`read_depth_image`], [`read_mask`],
 //! [`read_intrinsics`]), per-vertex features ([`read_vertex_features`]) and obstacles
@@ -32,6 +32,7 @@ mod point_map;
 mod region;
 #[cfg(feature = "mcap")]
 mod ros2_grasps;
+mod stored_transfer;
 mod transfer_folder;
 mod transfer_report;
 mod transferred_region;
@@ -58,6 +59,7 @@ pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
+pub use stored_transfer::StoredTransfer;
 pub use transfer_folder::{
     ANSWERS as TRANSFER_ANSWERS, AnchorRanks, FILES as TRANSFER_FILES, ObjectAnchors,
     TransferResult, put_transfer, write_answer, write_transfer,
