@@ -240,7 +240,6 @@ class Caller:
                 named[name] = value
             else:
                 positional.append(value)
-        what = positional, named
         if signature.kind in ("function", "static"):
             words, target = str(signature), getattr(owner, signature.name)
         elif signature.name == "__init__":
@@ -251,8 +250,8 @@ class Caller:
             if signature.kind == "property":
                 return words, lambda: getattr(value, signature.name)
             target = getattr(value, signature.name)
-        words += f"({', '.join([*map(short, positional), *(f'{k}={short(v)}' for k, v in named.items())])})"
-        return words, lambda: target(*what[0], **what[1])
+        given = [*map(short, positional), *(f"{name}={short(value)}" for name, value in named.items())]
+        return f"{words}({', '.join(given)})", lambda: target(*positional, **named)
 
 
 def split(text: str) -> list[str]:
@@ -297,7 +296,8 @@ def ordinary_objects() -> list[Any]:
     triangle = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     flat = semfm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     twice = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]] * 5)
-    apart = semfm.Mesh(np.vstack([ball.vertices, ball.vertices + 5]), np.vstack([ball.faces, ball.faces + ball.n_vertices]))
+    two = np.vstack([ball.vertices, ball.vertices + 5])
+    apart = semfm.Mesh(two, np.vstack([ball.faces, ball.faces + ball.n_vertices]))
     huge = semfm.Mesh(ball.vertices * 1e150, ball.faces)
     tiny = semfm.Mesh(ball.vertices * 1e-150, ball.faces)
     alone = semfm.Mesh(np.vstack([triangle.vertices, [[9, 9, 9]]]), triangle.faces)
@@ -321,8 +321,12 @@ def main() -> int:
     os.environ["SEMFM_CACHE"] = str(folder / "cache")
     caller = Caller(int(seed), folder)
     known = signatures(STUBS.read_text("utf-8"))
-    known = [each for each in known if str(each) not in os.environ.get("SKIP_CALLS", "").split(",")]
-    known = [each for each in known if each.owner is None or each.name == "__init__" or each.owner in caller.pool or each.kind == "static"]
+    needs_no_object = ("function", "static")
+    known = [
+        each
+        for each in known
+        if each.kind in needs_no_object or each.name == "__init__" or each.owner in caller.pool
+    ]
     # Half of the stubs are properties, and most of them have nothing to go wrong.
     weights = [0.15 if each.kind == "property" else 1.0 for each in known]
     answered = 0

@@ -131,6 +131,10 @@ def test_a_picture_of_another_size_is_resized_and_the_grid_still_covers_it(tmp_p
         ({"outputs": "mean"}, "outputs"),
         ({"layout": "CHW"}, "layout"),
         ({"onnx": ""}, "onnx"),
+        ({"onnx": "../tiny.onnx"}, "inside the folder"),
+        ({"onnx": "a/../../tiny.onnx"}, "inside the folder"),
+        ({"onnx": "/tmp/tiny.onnx"}, "inside the folder"),
+        ({"onnx": "a\0b"}, "inside the folder"),
         ({"pach": 8}, "pach"),
     ],
 )
@@ -139,6 +143,17 @@ def test_a_wrong_description_is_refused_by_field(tmp_path, changes, reason):
     with pytest.raises(SidecarError, match=reason) as error:
         read_description(path)
     assert str(path) in str(error.value)
+
+
+def test_any_text_is_a_description_or_refused_in_a_line(tmp_path):
+    good = write_encoder(tmp_path).read_bytes()
+    path = tmp_path / "m.json"
+    path.write_bytes(b"\xef\xbb\xbf" + good)  # a byte-order mark
+    assert read_description(path).patch == 8
+    for text in (b"", b"[]", b"\xff\xfe", b"[" * 100_000, good[:-3], b'{"format": 5}'):
+        path.write_bytes(text)
+        with pytest.raises(SidecarError, match="m.json"):
+            read_description(path)
 
 
 @pytest.mark.parametrize(

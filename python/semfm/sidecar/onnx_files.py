@@ -29,6 +29,7 @@ _FIELDS = {
     "SparseTensor": {1: "Tensor", 2: "Tensor"},
     "Tensor": {13: "Entry"},
 }
+_ORT_FORMAT = b"ORTM"
 #: Graphs lie in attributes of nodes of graphs; no real network goes as deep.
 _DEEPEST = 64
 
@@ -48,6 +49,8 @@ def external_files(network: str | os.PathLike[str], content: bytes) -> list[str]
     SidecarError
         If the file is no ONNX network, or names weights outside of its folder.
     """
+    if content[4:8] == _ORT_FORMAT:
+        return []  # onnxruntime's own format keeps its weights inside
     try:
         found = set(_locations(memoryview(content), "Model", 0))
     except (IndexError, ValueError) as error:  # UnicodeDecodeError is a ValueError
