@@ -34,8 +34,10 @@ def position_colors(points: ArrayLike) -> Colors:
 
 
 def weights_of(region: Union[Region, PathLike, ArrayLike], mesh: Mesh) -> Colors:
-    """The (n,) weights of a region, of a region file or of an array; `InvalidInput` where their number
-    is not that of the mesh's vertices."""
+    """The (n,) weights of a region, of a region file or of an array.
+
+    `InvalidInput` where their number is not that of the mesh's vertices.
+    """
     if isinstance(region, (str, os.PathLike)):
         region = Region.read(region, mesh)
     weights = region.weights if isinstance(region, Region) else np.asarray(region)

@@ -11,8 +11,10 @@ INTERVAL = 5.0
 
 
 class Bar:
-    """A tqdm bar for each stage on a terminal or in a notebook (a plain line without tqdm); in a log a
-    line when a stage begins, every few seconds, and when it ends."""
+    """A bar of tqdm for each stage on a terminal or in a notebook, or a plain line without tqdm.
+
+    In a log it is a line when a stage begins, every few seconds, and when it ends.
+    """
 
     def __init__(self) -> None:
         self._bars: dict[str, Any] = {}

@@ -2,9 +2,10 @@
 
     python random_calls.py SEED COUNT JOURNAL FOLDER
 
-Each call is written to JOURNAL before it is made, so that whoever finds the process dead knows the call.
-An answer, a `SemfmError` (but no `InternalError`), a `TypeError`, a `ValueError` or an `OverflowError` is
-right; the first other exception ends the run with exit code 1, a call that takes too long with a traceback.
+Each call is written to JOURNAL before it is made, so that whoever finds the process dead knows it.
+An answer, a `SemfmError` (but no `InternalError`), a `TypeError`, a `ValueError` or an
+`OverflowError` is right; the first other exception ends the run with exit code 1, a call that takes
+too long with a traceback.
 """
 
 from __future__ import annotations

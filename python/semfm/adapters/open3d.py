@@ -22,7 +22,8 @@ def to_open3d(
 
     Parameters
     ----------
-    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or Grasps
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or
+        Grasps
     region : Region, path or (n,) array_like, optional
         Painted grey to red by weight.
     colors : (n, 3) or (n, 4) array_like, optional

@@ -23,7 +23,8 @@ def to_polyscope(
 
     Parameters
     ----------
-    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or Grasps
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or
+        Grasps
     name : str, optional
         Name of the structure, of which ``NAME source`` and ``NAME target`` are made for a transfer.
         ``"mesh"`` or ``"cloud"``, ``"source"`` and ``"target"`` where none is given.

@@ -23,7 +23,8 @@ def to_trimesh(
 
     Parameters
     ----------
-    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or Grasps
+    thing : Mesh, path, MeshFile, Shape, PreparedObject, SemanticCloud, Transfer, StoredTransfer or
+        Grasps
     region : Region, path or (n,) array_like, optional
         Painted grey to red by weight, and kept as the vertex attribute ``"region"``.
     colors : (n, 3) or (n, 4) array_like, optional
@@ -72,8 +73,10 @@ def geometry(trimesh: Any, part: Part) -> Any:
 
 
 def scene_arrays(scene: Any) -> tuple[Floats, NDArray[np.uint32]]:
-    """Vertices (n, 3) and faces (m, 3) of all meshes of a scene, in the order of its graph, each where
-    its node stands."""
+    """Vertices (n, 3) and faces (m, 3) of all meshes of a scene.
+
+    They are in the order of its graph, each where its node stands.
+    """
     vertices: list[Floats] = [np.zeros((0, 3))]
     faces: list[NDArray[np.uint32]] = [np.zeros((0, 3), np.uint32)]
     first = 0

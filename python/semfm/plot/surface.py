@@ -36,9 +36,8 @@ def as_mesh(thing: Any) -> Mesh:
         return Mesh.from_open3d(thing)
     if isinstance(thing, (str, os.PathLike)):
         return Mesh.read(thing)
-    raise InvalidType(
-        f"mesh: expected a mesh, a path or what has a mesh, found {type(thing).__name__}", "type", "mesh"
-    )
+    wanted = "a mesh, a path or what has a mesh"
+    raise InvalidType(f"mesh: expected {wanted}, found {type(thing).__name__}", "type", "mesh")
 
 
 def best_camera(

@@ -1,8 +1,8 @@
 """The files that an ONNX network keeps its weights in, beside the network itself.
 
-A tensor may lie in another file, which the network names: ``TensorProto.external_data`` with the key
-``location`` (onnx.proto3 of ONNX 1.14). Only the fields on the way to those tensors are read here; all
-others, weights among them, are passed over by their length.
+A tensor may lie in another file, which the network names: ``TensorProto.external_data`` with the
+key ``location`` (onnx.proto3 of ONNX 1.14). Only the fields on the way to those tensors are read
+here; all others, weights among them, are passed over by their length.
 """
 
 from __future__ import annotations
