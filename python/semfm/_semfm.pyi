@@ -68,6 +68,14 @@ class Alignment:
     def scale_std(self) -> float:
         """float: standard deviation of the scale."""
         ...
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `aligned.json`.
+
+        Returns
+        -------
+        dict
+        """
+        ...
     @property
     def verdict(self) -> str:
         """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
@@ -75,6 +83,15 @@ class Alignment:
     @property
     def visibility(self) -> float:
         """float: of the model's side that faces the camera, the share that was seen where it is."""
+        ...
+    def write(self, path: _Path) -> None:
+        """Writes `aligned.json`, whole or not at all: what `semfm-cli align` writes and
+        ``semfm-cli grasp --aligned`` reads.
+
+        Parameters
+        ----------
+        path : path
+        """
         ...
 
 class Anchors:
@@ -297,6 +314,8 @@ class Eigenbasis:
         Parameters
         ----------
         functions : (n,) or (n, p) array_like
+            On the working vertices, for the basis of a `Shape`: `Shape.onto_working` makes them of
+            functions on the mesh as given.
 
         Returns
         -------
@@ -628,6 +647,18 @@ class FunctionalMap:
 class Grasp:
     """One parallel-jaw grasp, in the frame of the object scaled to metres."""
     @property
+    def approach(self) -> NDArray[numpy.float64]:
+        """(3,) float64 array: the unit direction in which the hand comes (+z of the TCP), in the object's
+        frame.
+        """
+        ...
+    @property
+    def camera_from_tcp(self) -> Optional[NDArray[numpy.float64]]:
+        """(4, 4) float64 array, optional: the same in the camera's frame; None where `find_grasps` was told
+        no `camera_from_object`.
+        """
+        ...
+    @property
     def contacts(self) -> NDArray[numpy.float64]:
         """(2, 3) float64 array: one contact for each pad, metres."""
         ...
@@ -646,6 +677,10 @@ class Grasp:
     @property
     def opening(self) -> float:
         """float: distance between the pads on the way in, metres."""
+        ...
+    @property
+    def position(self) -> NDArray[numpy.float64]:
+        """(3,) float64 array: the TCP, between the pads, in the object's frame, metres."""
         ...
     @property
     def score(self) -> float:
@@ -675,6 +710,10 @@ class Grasps:
         """Gripper: the gripper."""
         ...
     @property
+    def mesh(self) -> Mesh:
+        """Mesh: the object, in its own units."""
+        ...
+    @property
     def n_candidates(self) -> int:
         """int: gripper poses examined."""
         ...
@@ -689,8 +728,16 @@ class Grasps:
         """(g, 4, 4) float64 array: the gripper's TCP frames in the object's frame, metres."""
         ...
     @property
+    def region(self) -> Region:
+        """Region: where the pads close."""
+        ...
+    @property
     def rejected(self) -> dict[str, Any]:
         """dict: candidates refused, by the first thing that each failed."""
+        ...
+    @property
+    def scale(self) -> float:
+        """float: metres per unit of the mesh."""
         ...
     @property
     def scores(self) -> NDArray[numpy.float64]:
@@ -774,6 +821,20 @@ class Gripper:
         -------
         dict
             Metres or radians; empty where the joints are not known by name.
+        """
+        ...
+    def mesh_at(self, width: float) -> Mesh:
+        """The gripper's collision shapes as a mesh, for pictures and viewers.
+
+        Parameters
+        ----------
+        width : float
+            Distance between the pads, metres; outside of the opening, the nearest inside.
+
+        Returns
+        -------
+        Mesh
+            In the TCP frame, metres.
         """
         ...
     @property
@@ -1027,13 +1088,14 @@ class Mesh:
         ...
     @staticmethod
     def from_trimesh(mesh: Any) -> Mesh:
-        """The mesh of a `trimesh.Trimesh`, vertex by vertex (load it with ``process=False``, or trimesh
-        will have merged vertices).
+        """The mesh of a `trimesh.Trimesh` or `trimesh.Scene` (what ``trimesh.load`` returns for GLB), vertex
+        by vertex: load it with ``process=False``, or trimesh will have merged vertices.
 
         Parameters
         ----------
         mesh : object
-            Anything with `vertices` (n, 3) and `faces` (m, 3).
+            Anything with `vertices` (n, 3) and `faces` (m, 3); or a scene, whose meshes are put behind each
+            other in the order of its graph, each where its node stands. Points and lines are left out.
 
         Returns
         -------
@@ -1051,6 +1113,20 @@ class Mesh:
     @property
     def n_vertices(self) -> int:
         """int: number of vertices n."""
+        ...
+    def picture(self, *, region: Optional[Union[Region, _Path]] = None) -> bytes:
+        """A picture from two sides, which notebooks show by themselves.
+
+        Parameters
+        ----------
+        region : Region or path, optional
+            Painted grey to red by weight; the sides are those from which it is seen best.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
         ...
     @staticmethod
     def read(path: _Path) -> Mesh:
@@ -1196,6 +1272,33 @@ class Pinhole:
     def camera_from_world(self) -> NDArray[numpy.float64]:
         """(4, 4) float64 array: rigid motion from the world's frame to the camera's."""
         ...
+    def cloud(self, depth: ArrayLike, *, mask: Optional[ArrayLike] = None) -> NDArray[numpy.float64]:
+        """The points of a depth image, for `align` and for scenes of `find_grasps`.
+
+        Parameters
+        ----------
+        depth : (height, width) array_like
+            Depth along the camera's axis, in metres for `align`. What is 0, negative or not finite is no
+            point.
+        mask : (height, width) array_like, optional
+            Of dtype bool: only the pixels where it is true.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the world's frame, row by row of the image.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import semfm
+        >>> camera = semfm.Pinhole.from_matrix([[50, 0, 1], [0, 50, 1], [0, 0, 1]], 3, 3)
+        >>> depth = np.zeros((3, 3))
+        >>> depth[1, 1] = 0.5
+        >>> camera.cloud(depth).tolist()
+        [[0.0, 0.0, 0.5]]
+        """
+        ...
     @property
     def cx(self) -> float:
         """float: principal point, x, in pixels."""
@@ -1207,6 +1310,35 @@ class Pinhole:
     @property
     def eye(self) -> NDArray[numpy.float64]:
         """(3,) float64 array: where the camera stands, in the world's frame."""
+        ...
+    @staticmethod
+    def from_matrix(matrix: ArrayLike, width: int, height: int, *, camera_from_world: Optional[ArrayLike] = None) -> Pinhole:
+        """A camera from a calibration's matrix ``[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]``, counted as by
+        `with_pixel_centres_at_integers`.
+
+        Parameters
+        ----------
+        matrix : (3, 3) array_like
+            K of OpenCV, ROS `CameraInfo` and most calibration tools, in pixels.
+        width : int
+            Pixels.
+        height : int
+            Pixels.
+        camera_from_world : (4, 4) array_like, optional
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+            the camera's own frame is the world.
+
+        Returns
+        -------
+        Pinhole
+
+        Examples
+        --------
+        >>> import semfm
+        >>> camera = semfm.Pinhole.from_matrix([[70, 0, 31.5], [0, 70, 23.5], [0, 0, 1]], 64, 48)
+        >>> camera.cx, camera.cy
+        (32.0, 24.0)
+        """
         ...
     @property
     def fx(self) -> float:
@@ -1234,12 +1366,48 @@ class Pinhole:
             u, v, and depth z; u and v mean nothing where z ≤ 0.
         """
         ...
+    def rays(self, pixels: ArrayLike) -> NDArray[numpy.float64]:
+        """Directions of the lines of sight through pixel positions. They start at `eye`.
+
+        Parameters
+        ----------
+        pixels : (n, 2) array_like
+            u to the right and v down, in pixels; the centre of pixel (0, 0) is at (½, ½).
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the world's frame, scaled so that the depth is 1: the point at depth z is
+            ``eye + z * ray``.
+
+        Examples
+        --------
+        >>> import semfm
+        >>> camera = semfm.Pinhole.with_pixel_centres_at_half(64, 48, 70, 70, 32, 24)
+        >>> camera.rays([[32, 24], [67, 24]]).tolist()
+        [[0.0, 0.0, 1.0], [0.5, 0.0, 1.0]]
+        """
+        ...
+    def unproject(self, pixels: ArrayLike) -> NDArray[numpy.float64]:
+        """The points that the camera sees at pixel positions and depths: undoes `project`.
+
+        Parameters
+        ----------
+        pixels : (n, 3) array_like
+            u, v, and depth z along the camera's axis, as `project` gives them.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the world's frame.
+        """
+        ...
     @property
     def width(self) -> int:
         """int: pixels."""
         ...
     @staticmethod
-    def with_pixel_centres_at_half(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
+    def with_pixel_centres_at_half(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: Optional[ArrayLike] = None) -> Pinhole:
         """A camera whose numbers count as ours do: the centre of pixel (0, 0) is at (½, ½).
 
         Parameters
@@ -1256,8 +1424,9 @@ class Pinhole:
             Principal point, x, in pixels.
         cy : float
             Principal point, y, in pixels.
-        camera_from_world : (4, 4) array_like
-            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+        camera_from_world : (4, 4) array_like, optional
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+            the camera's own frame is the world.
 
         Returns
         -------
@@ -1265,7 +1434,7 @@ class Pinhole:
         """
         ...
     @staticmethod
-    def with_pixel_centres_at_integers(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: ArrayLike) -> Pinhole:
+    def with_pixel_centres_at_integers(width: int, height: int, fx: float, fy: float, cx: float, cy: float, camera_from_world: Optional[ArrayLike] = None) -> Pinhole:
         """A camera whose numbers come from a calibration (OpenCV, ROS `CameraInfo`), in which the centre
         of pixel (0, 0) is at (0, 0): half a pixel is added to its principal point.
 
@@ -1283,8 +1452,9 @@ class Pinhole:
             Principal point, x, in pixels.
         cy : float
             Principal point, y, in pixels.
-        camera_from_world : (4, 4) array_like
-            Rigid motion from the world's frame to the camera's, as a homogeneous matrix.
+        camera_from_world : (4, 4) array_like, optional
+            Rigid motion from the world's frame to the camera's, as a homogeneous matrix; without one
+            the camera's own frame is the world.
 
         Returns
         -------
@@ -1346,6 +1516,23 @@ class PointMap:
         Returns
         -------
         (n_target, ...) array
+        """
+        ...
+    @staticmethod
+    def read(path: _Path) -> PointMap:
+        """Reads the `point_map.json` of a transfer's folder.
+
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        PointMap
+
+        See Also
+        --------
+        read_transfer : the whole folder.
         """
         ...
     @property
@@ -1766,6 +1953,48 @@ class Shape:
         """(n,) uint32 array: the working vertex that stands for each original one, a read-only view."""
         ...
 
+class StoredTransfer:
+    """A transfer as its folder has it: what `semfm-cli transfer` and `Transfer.write` leave behind.
+
+    Made by `read_transfer`.
+    """
+    @property
+    def confidence(self) -> float:
+        """float: the probability that the region is right."""
+        ...
+    @property
+    def hypotheses(self) -> list[Hypothesis]:
+        """list of Hypothesis: where the region may belong, by falling probability."""
+        ...
+    @property
+    def point_map(self) -> PointMap:
+        """PointMap: one source vertex for each target vertex."""
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the region on the target, of the vertices that count with their weights."""
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: the content of `report.json`."""
+        ...
+    @property
+    def source(self) -> Mesh:
+        """Mesh: the demonstrated object."""
+        ...
+    @property
+    def source_region(self) -> Region:
+        """Region: the demonstrated region on the source, its weights to four digits."""
+        ...
+    @property
+    def target(self) -> Mesh:
+        """Mesh: the one to act on."""
+        ...
+    @property
+    def verdict(self) -> str:
+        """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
+        ...
+
 class SurfaceIndex:
     """A tree over the triangles of a mesh: built once, asked often.
 
@@ -1837,6 +2066,16 @@ class Transfer:
     @property
     def other_rule(self) -> Optional[Region]:
         """Region, optional: the region under the other rule, where the method computes both (``semfm``)."""
+        ...
+    def picture(self) -> bytes:
+        """A picture of both objects with the region, which notebooks show by themselves: `transfer.png` of
+        `write`.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
         ...
     @property
     def point_map(self) -> PointMap:
@@ -2227,7 +2466,7 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
     Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
@@ -2238,7 +2477,7 @@ def find_grasps(mesh: _MeshLike, region: Region, gripper: Union[Gripper, _Path],
     ----------
     mesh : mesh_like
         The object.
-    region : Region
+    region : Region or path
         Where the pads shall close; of the mesh.
     gripper : Gripper or path
         A gripper, or what `Gripper` takes.
@@ -2523,6 +2762,34 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     Returns
     -------
     MeshFile
+    """
+    ...
+
+def read_transfer(folder: _Path) -> StoredTransfer:
+    """Reads the folder of a transfer, and checks that its files belong together.
+
+    Parameters
+    ----------
+    folder : path
+        As `semfm-cli transfer -o` and `Transfer.write` make it.
+
+    Returns
+    -------
+    StoredTransfer
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import semfm
+    >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=400) for i in (0, 1))
+    >>> result = semfm.transfer(
+    ...     mug.mesh, kettle.mesh, mug.region,
+    ...     source_features=mug.shared_features(), target_features=kettle.shared_features())
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = result.write(folder)
+    ...     again = semfm.read_transfer(folder)
+    >>> again.verdict == result.verdict and again.point_map == result.point_map
+    True
     """
     ...
 

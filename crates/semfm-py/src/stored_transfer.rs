@@ -43,7 +43,7 @@ impl StoredTransfer {
         Ok(Region { inner: Shared::new(guard(py, || self.inner.source_region())?) })
     }
 
-    /// Region: the region on the target.
+    /// Region: the region on the target, of the vertices that count with their weights.
     #[getter]
     fn region(&self, py: Python<'_>) -> PyResult<Region> {
         let path = self.folder.join("region.json");
