@@ -282,8 +282,6 @@ def test_wks_needs_no_features(pair, tmp_path):
     assert semfm.Matching(again, again, method="wks").transfer(source.region).region.n_vertices
     with pytest.raises(semfm.InvalidInput, match="wks"):
         semfm.Matching(prepared, prepared)
-    with pytest.raises(semfm.InvalidInput, match="wks"):
-        semfm.transfer(source.mesh, target.mesh, source.region, method="nearest")
     bare.write(tmp_path)
     assert np.array_equal(semfm.read_transfer(tmp_path).region.mask, bare.region.mask)
 
