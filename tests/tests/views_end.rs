@@ -11,7 +11,8 @@ use semfm_tests::shell::run;
 const ALL_RUNS: usize = 2000;
 const SAMPLE: usize = 40;
 
-const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+const TETRAHEDRON: &str =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 fn n_runs() -> usize {
     if std::env::var_os("SEMFM_FULL").is_some_and(|full| full == "1") { ALL_RUNS } else { SAMPLE }

@@ -38,10 +38,10 @@ mod region;
 mod settings;
 mod shape;
 mod shared;
+mod stored_transfer;
 mod surface;
 mod synth;
 mod transfer;
-mod stored_transfer;
 mod transfer_function;
 mod view;
 mod views_file;
@@ -98,6 +98,8 @@ mod _semfm {
     #[pymodule_export]
     use crate::shape::{_restore_shape, Shape};
     #[pymodule_export]
+    use crate::stored_transfer::{StoredTransfer, read_transfer};
+    #[pymodule_export]
     use crate::surface::{
         SurfaceIndex, farthest_points, icosphere, sample_even, sample_uniform, torus,
     };
@@ -105,8 +107,6 @@ mod _semfm {
     use crate::synth::{_restore_demo_object, DemoObject, demo_object};
     #[pymodule_export]
     use crate::transfer::{_restore_hypothesis, _restore_transfer, Hypothesis, Transfer};
-    #[pymodule_export]
-    use crate::stored_transfer::{StoredTransfer, read_transfer};
     #[pymodule_export]
     use crate::transfer_function::transfer;
     #[pymodule_export]

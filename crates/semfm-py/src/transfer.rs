@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use semfm::files::{Provenance, TransferResult};
 use semfm::fmap;
-use semfm_show::{TransferFiles, TransferFigure, write_transfer};
+use semfm_show::{TransferFigure, TransferFiles, write_transfer};
 use serde_json::{Value, json};
 
 use crate::interruptible::run;

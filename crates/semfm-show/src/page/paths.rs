@@ -184,8 +184,8 @@ mod tests {
     #[cfg(feature = "mcap")]
     #[test]
     fn a_views_file_of_a_mesh_with_the_zero_below_zero_is_shown() {
-        use semfm::geom::math::DVec3;
         use semfm::encoder::rendered_views::{RenderedObject, ViewSettings};
+        use semfm::geom::math::DVec3;
         use semfm::views::{Renderer, RigSettings};
 
         let folder = tempfile::tempdir().unwrap();

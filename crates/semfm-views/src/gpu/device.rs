@@ -115,8 +115,7 @@ impl Drop for Device {
     /// Waits for what was submitted and closes the device, so that no thread of the driver is at work
     /// when the process ends.
     fn drop(&mut self) {
-        let poll =
-            wgpu::PollType::Wait { submission_index: None, timeout: Some(DRIVER_TIMEOUT) };
+        let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(DRIVER_TIMEOUT) };
         // A driver that is lost has nothing to wait for, and the library panics.
         let _ = catch_unwind(AssertUnwindSafe(|| self.device.poll(poll)));
         self.device.destroy();
