@@ -19,8 +19,8 @@ from .._semfm import (
     Region,
     SemanticCloud,
     Shape,
-    Transfer,
     StoredTransfer,
+    Transfer,
 )
 from ..errors import InvalidInput, InvalidType, MissingPackage
 
