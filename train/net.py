@@ -115,14 +115,19 @@ def folded(student: Student) -> list[Layer]:
 
 def without_norms(student: Student) -> Student:
     """The same function with norms merged into their convolutions, to be trained on."""
+    return student_of(folded(student))
+
+
+def student_of(layers: list[Layer]) -> Student:
+    """The net without norms that computes these layers; further outputs of the head are dropped."""
     merged = Student(normed=False)
-    convs = [layer for layer in folded(student) if isinstance(layer, Conv)]
+    convs = [layer for layer in layers if isinstance(layer, Conv)]
     with torch.no_grad():
         # modules are made in the order in which they run, so parameters come in the layers' order
         modules = [m for m in merged.modules() if isinstance(m, nn.Conv2d)]
         for module, conv in zip(modules, convs, strict=True):
-            module.weight.copy_(conv.weight)
-            module.bias.copy_(conv.bias)
+            module.weight.copy_(conv.weight[: module.out_channels])
+            module.bias.copy_(conv.bias[: module.out_channels])
     return merged
 
 

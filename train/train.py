@@ -6,7 +6,8 @@
 The rate warms up, stays, and falls to zero over the last `--decay` share of the pictures; a piece
 with `--decay 0` can be gone on from at any time. Every piece writes its checkpoint as it goes, and
 objects that have been added to the folder since are taken up at each report. See `workers.py` for
-training with several processes.
+training with several processes. `--from FILE.net` starts from exported weights: those before the
+head are kept, the head is learnt anew, since the axes that it answered on are not in the file.
 
 Loss, over patches with weight w, target t (length 1 on average) and token z:
 
@@ -30,7 +31,8 @@ from . import workers
 from .augment import as_input, augmented
 from .checkpoint import Checkpoint
 from .examples import Batch, Examples, fit_axes
-from .net import Student, without_norms
+from .export import read_net
+from .net import Student, student_of, without_norms
 
 #: Tried: .02. Larger slows learning down, smaller was not told apart.
 _WEIGHT_DECAY = 0.02
@@ -91,11 +93,18 @@ class Trainer:
     """A student, its running mean and its optimiser."""
 
     def __init__(
-        self, settings: Settings, start: Checkpoint | None = None, merge_norms: bool = False
+        self,
+        settings: Settings,
+        start: Checkpoint | None = None,
+        merge_norms: bool = False,
+        trunk: Student | None = None,
     ) -> None:
         torch.manual_seed(settings.seed)
         self.settings = settings
-        student = start.student_in_training() if start is not None else Student()
+        if start is not None:
+            student = start.student_in_training()
+        else:
+            student = trunk if trunk is not None else Student()
         mean = start.student() if start is not None else copy.deepcopy(student)
         merged = merge_norms and student.normed
         if merged:
@@ -191,7 +200,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path, help="folder of train.dataset")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CHECKPOINT")
-    parser.add_argument("--from", dest="start", type=Path, metavar="CHECKPOINT")
+    parser.add_argument("--from", dest="start", type=Path, metavar="CHECKPOINT|FILE.net")
     parser.add_argument("--pictures", type=int, required=True, help="passes through the net")
     parser.add_argument(
         "--minutes", type=float, default=math.inf, help="end by the clock where that is earlier"
@@ -209,7 +218,14 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
     workers.start()
-    start = Checkpoint.read(arguments.start) if arguments.start else None
+    start, trunk, before = None, None, {"pictures": 0, "cpu_minutes": 0.0, "pieces": []}
+    if arguments.start and arguments.start.suffix == ".net":
+        description, layers = read_net(arguments.start.read_bytes())
+        trunk, before = student_of(layers), description["provenance"]
+        trunk.head.reset_parameters()
+    elif arguments.start:
+        start = Checkpoint.read(arguments.start)
+        before = start.provenance
     axes = start.axes if start else fit_axes(arguments.data, "train_*.npz")
     seen, left_out = Examples.empty(), Examples.empty()
     settings = Settings(
@@ -220,8 +236,7 @@ def main() -> None:
         arguments.seed,
         arguments.minutes,
     )
-    trainer = Trainer(settings, start, arguments.merge_norms)
-    before = start.provenance if start else {"pictures": 0, "cpu_minutes": 0.0, "pieces": []}
+    trainer = Trainer(settings, start, arguments.merge_norms, trunk)
 
     def load_new() -> None:
         seen.load_new(

@@ -130,6 +130,11 @@ def test_the_exported_file_reads_back_exactly(tmp_path):
     assert tokens[:, -1].eq(export.CONSTANT).all()
     cosine = torch.nn.functional.cosine_similarity(tokens[:, :-1], trained, dim=1)
     assert cosine.min() > 0.9999, "folding and rounding change next to nothing"
+    with torch.no_grad():
+        again_in_training = net.student_of(again)(picture)
+    assert torch.allclose(again_in_training, tokens[:, :-1], atol=1e-4), (
+        "it can be trained on"
+    )
     with pytest.raises(ValueError, match="damaged"):
         export.read_net(content[:-40] + bytes([content[-40] ^ 1]) + content[-39:])
 
