@@ -31,6 +31,10 @@ __version__: str
 class Alignment:
     """Pose and scale of an object before a camera, and how far to trust them: see `align`."""
     @property
+    def alternatives(self) -> NDArray[numpy.float64]:
+        """(a, 4, 4) float64 array: other values of `camera_from_object` that explain what was seen as well."""
+        ...
+    @property
     def camera_from_object(self) -> NDArray[numpy.float64]:
         """(4, 4) float64 array: from the mesh's frame and units to the camera's frame in metres; the
         scale is included.
@@ -57,8 +61,16 @@ class Alignment:
         """(4, 4) float64 array: the same once the object is measured in metres, for `find_grasps`."""
         ...
     @property
+    def rival(self) -> float:
+        """float: what the best pose that puts some of the surface elsewhere explains of what was seen, as a
+        share of what this one does.
+        """
+        ...
+    @property
     def rotation_std(self) -> float:
-        """float: standard deviation of the rotation about its least certain axis, radians."""
+        """float: standard deviation of the rotation about its least certain axis, radians; π where what
+        was seen does not determine it.
+        """
         ...
     @property
     def scale(self) -> float:
@@ -74,6 +86,13 @@ class Alignment:
         Returns
         -------
         dict
+        """
+        ...
+    @property
+    def undetermined(self) -> list[dict[str, Any]]:
+        """list of dict: axes about which what was seen does not determine the rotation: ``axis``, a unit
+        vector (x, y, z) in the mesh's frame, and ``turns``, the ranges of turns about it (radians, 0
+        the pose itself) that fit as well.
         """
         ...
     @property
@@ -2274,7 +2293,8 @@ def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float
     points : (n, 3) array_like
         What the camera saw of the object, metres, in the camera's frame.
     viewpoint : tuple of float, float, float, optional
-        Where the camera stands; None for a cloud merged from many views, of which nothing can be
+        Where the camera stands. The origin says that the frame is the camera's own (x right, y down,
+        z forward), in which nothing it sees lies behind it. None for a cloud merged from many views, of which nothing can be
         said about what should have been seen.
     init : (4, 4) array_like, optional
         A guess of `Alignment.camera_from_object`.

@@ -6,6 +6,7 @@ use semfm_geom::{Mesh, Task, Verdict};
 
 use crate::Result;
 use crate::alignment::Alignment;
+use crate::ambiguity::{BETTER, Rival};
 use crate::correspondence::Problem;
 use crate::judgement::judge;
 use crate::model::AlignModel;
@@ -20,6 +21,9 @@ const FIRST_WIDTH: f64 = 0.03;
 
 /// How near (as a factor) the scale may come to a border of its range and still be inside.
 const AT_BORDER: f64 = 1.0001;
+
+/// How often a rival that explains more may take the pose's place.
+const MAX_MOVES: usize = 3;
 
 /// Aligns a mesh to an observation; [`align_model`] is the same for a mesh that is prepared.
 ///
@@ -90,41 +94,43 @@ pub fn align_model(
     let search_ms = milliseconds(start);
 
     let start = Instant::now();
-    let ids = observed.subset(observed.points.len());
-    let widest = FIRST_WIDTH * observed.diameter();
-    let mut refined = problem.refine(searched.best.pose, &ids, widest, &[], task)?;
-    let mut uncertainty = Uncertainty::of(&problem, &refined.pose, &ids, refined.width);
-    let refine_ms = milliseconds(start);
+    let mut settled = problem.settle(searched.best, task)?;
+    let mut candidates = searched.others;
+    candidates.push(searched.best);
+    let settle_ms = milliseconds(start);
 
     let start = Instant::now();
-    let weak = uncertainty.weak_directions();
-    if !weak.is_empty() {
-        let RefinedPose { pose, width, iterations } = refined;
-        let moved = problem.move_along_weak_directions(pose, &weak, width, task)?;
-        let again = problem.refine(moved.pose, &ids, 2.0 * width, &weak, task)?;
-        refined = RefinedPose { iterations: iterations + again.iterations, ..again };
-        uncertainty = Uncertainty::of(&problem, &refined.pose, &ids, refined.width);
-        for (direction, &std) in weak.iter().zip(&moved.stds) {
-            uncertainty.limit_std_along(direction, std);
-        }
-    }
-    let weak_ms = milliseconds(start);
+    let mut moves = 0;
+    let ambiguity = loop {
+        let ambiguity = problem.ambiguity(&settled, &candidates, moves < MAX_MOVES, task)?;
+        let Some(better) = ambiguity.better else { break ambiguity };
+        candidates.push(settled.refined.pose);
+        settled = problem.settle_rival(better, settled.refined.width, task)?;
+        moves += 1;
+    };
+    let rivals_ms = milliseconds(start);
 
     let start = Instant::now();
-    let RefinedPose { pose, width, iterations } = refined;
+    let Settled { refined: RefinedPose { pose, width, iterations }, uncertainty, n_weak } = settled;
     // A sample within the points' noise, or within the width of their cells, was seen.
     let tolerance = width.max(0.02 * observed.diameter());
     let visibility = problem.visibility(&pose, tolerance, 2, true).share();
-    let camera_from_object = pose * model.object_from_unit.inverse();
+    let from_unit = model.object_from_unit.inverse();
+    let camera_from_object = pose * from_unit;
+    let ids = problem.all_ids();
     let mut found = Alignment {
         camera_from_object,
         scale_std: uncertainty.growth_std() * camera_from_object.scale,
-        rotation_std: uncertainty.rotation_std(&problem, &pose, &ids, width),
-        position_std: uncertainty.shift_std() * pose.scale,
+        rotation_std: uncertainty
+            .rotation_std(&problem, &pose, &ids, width)
+            .max(ambiguity.rotation_std),
+        position_std: uncertainty.shift_std().max(ambiguity.shift_std) * pose.scale,
         residual_m: uncertainty.residual_m,
         inlier_share: uncertainty.inlier_share,
         visibility,
-        rival: searched.rival.map_or(0.0, |rival| rival.score / searched.best.score),
+        rival: ambiguity.rival,
+        undetermined: ambiguity.axes,
+        alternatives: ambiguity.poses.iter().map(|&pose| pose * from_unit).collect(),
         n_starts: searched.n_starts,
         iterations,
         verdict: Verdict::Refuse,
@@ -132,16 +138,69 @@ pub fn align_model(
         stages_ms: Vec::new(),
     };
     let at_border = pose.scale <= scales[0] * AT_BORDER || pose.scale >= scales[1] / AT_BORDER;
-    let judgement = judge(&found, weak.len(), at_border);
+    let judgement = judge(&found, n_weak, at_border);
     found.verdict = judgement.verdict;
     found.reasons = judgement.reasons;
     found.stages_ms = vec![
         ("search", search_ms),
-        ("polish", refine_ms),
-        ("settle", weak_ms),
+        ("settle", settle_ms),
+        ("rivals", rivals_ms),
         ("judge", milliseconds(start)),
     ];
     Ok(found)
+}
+
+/// A pose after its last steps, with its uncertainty.
+pub(crate) struct Settled {
+    pub refined: RefinedPose,
+    pub uncertainty: Uncertainty,
+    /// Directions that the outline alone determined.
+    pub n_weak: usize,
+}
+
+impl Problem<'_> {
+    /// Ids of all points.
+    pub fn all_ids(&self) -> Vec<u32> {
+        self.observed.subset(self.observed.points.len())
+    }
+
+    /// The exact pose from a searched one, moved to where the outline has it along what the points
+    /// leave open.
+    fn settle(&self, start: Sim3, task: &Task) -> Result<Settled> {
+        let ids = self.all_ids();
+        let widest = FIRST_WIDTH * self.observed.diameter();
+        let mut refined = self.refine(start, &ids, widest, &[], task)?;
+        let mut uncertainty = Uncertainty::of(self, &refined.pose, &ids, refined.width);
+        let weak = uncertainty.weak_directions();
+        if !weak.is_empty() {
+            let RefinedPose { pose, width, iterations } = refined;
+            let moved = self.move_along_weak_directions(pose, &weak, width, task)?;
+            let again = self.refine(moved.pose, &ids, 2.0 * width, &weak, task)?;
+            refined = RefinedPose { iterations: iterations + again.iterations, ..again };
+            uncertainty = Uncertainty::of(self, &refined.pose, &ids, refined.width);
+            for (direction, &std) in weak.iter().zip(&moved.stds) {
+                uncertainty.limit_std_along(direction, std);
+            }
+        }
+        Ok(Settled { refined, uncertainty, n_weak: weak.len() })
+    }
+
+    /// As [`Self::settle`], for a pose that explains more than the one before, of which `width` is the
+    /// final kernel's: where that would lead away again, the pose stays where it is.
+    fn settle_rival(&self, rival: Rival, width: f64, task: &Task) -> Result<Settled> {
+        let ids = self.all_ids();
+        let evidence = self.evidence_width(width);
+        let settled = self.settle(rival.pose, task)?;
+        let unexplained = self.unexplained(&settled.refined.pose, &ids, evidence);
+        if unexplained < rival.unexplained + BETTER {
+            return Ok(settled);
+        }
+        let width = self.kernel_width(&rival.pose, &ids, evidence);
+        let refined = RefinedPose { pose: rival.pose, width, iterations: 0 };
+        let uncertainty = Uncertainty::of(self, &rival.pose, &ids, width);
+        let n_weak = uncertainty.weak_directions().len();
+        Ok(Settled { refined, uncertainty, n_weak })
+    }
 }
 
 /// What no start led to: the guess, or the identity, refused.
@@ -159,6 +218,8 @@ fn nothing_found(problem: &Problem<'_>, guess: Option<Sim3>, search_ms: f64) -> 
         inlier_share: 0.0,
         visibility: 0.0,
         rival: 0.0,
+        undetermined: Vec::new(),
+        alternatives: Vec::new(),
         n_starts: 0,
         iterations: 0,
         verdict: Verdict::Refuse,

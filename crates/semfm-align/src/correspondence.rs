@@ -7,7 +7,7 @@
 use semfm_geom::math::DMat3;
 
 use crate::extent::order_statistic;
-use crate::model::AlignModel;
+use crate::model::{AlignModel, agreement};
 use crate::observation::Observation;
 use crate::sim3::{Sim3, Tangent};
 
@@ -49,6 +49,13 @@ pub(crate) struct Correspondence {
 }
 
 impl Problem<'_> {
+    /// Whether the sign of a normal says nothing: of the model's, where its triangles are wound
+    /// anyhow; of the observed ones, where no viewpoint tells the inside of a vessel from its
+    /// outside. Matched to the outer wall, points of the inner one would shrink the model.
+    pub fn unsigned(&self) -> bool {
+        self.model.both_sides || self.observed.all_around()
+    }
+
     /// Calls `visit` with every point that has a match within three widths of the kernel.
     ///
     /// With the pose (k, R, t) and an observed point y: the query q = Rᵀ(y − t)/k in the model's
@@ -71,14 +78,13 @@ impl Problem<'_> {
         let back = DMat3::from_quat(pose.rotation).transpose();
         let k = pose.scale;
         let reach = 3.0 * width / k;
+        let unsigned = self.unsigned();
         for &id in ids {
             let query = back * (self.observed.points[id as usize] - pose.translation) / k;
             let facing = back * self.observed.normals[id as usize];
             let found = match nearest_by {
-                NearestBy::Table => {
-                    self.model.nearest.nearest(query, facing).map(|id| self.model.samples[id])
-                }
-                NearestBy::Triangles => self.model.closest(query, facing, reach),
+                NearestBy::Table => self.model.closest_sample(query, facing, unsigned),
+                NearestBy::Triangles => self.model.closest(query, facing, reach, unsigned),
             };
             let Some(matched) = found else { continue };
             let (point, normal) = (matched.point, matched.normal);
@@ -93,7 +99,7 @@ impl Problem<'_> {
                 }
                 NearestBy::Triangles => offset.length_squared(),
             };
-            let agreement = self.model.agreement(normal, facing).max(0.0);
+            let agreement = agreement(normal, facing, unsigned).max(0.0);
             if squared > reach * reach || agreement <= 0.0 {
                 continue;
             }

@@ -85,7 +85,7 @@ impl Problem<'_> {
     }
 
     /// Steps under a kernel that narrows geometrically from the first of `widths` to the second,
-    /// metres. `None` where nothing matches.
+    /// metres, none of them along the directions (unit) that are held. `None` where nothing matches.
     ///
     /// > σᵢ = σ₀ (σₙ₋₁/σ₀)^(i/(n − 1))
     pub fn anneal(
@@ -95,6 +95,7 @@ impl Problem<'_> {
         widths: [f64; 2],
         n_steps: usize,
         nearest_by: NearestBy,
+        held: &[Tangent],
     ) -> Option<Sim3> {
         let [from, to] = widths;
         let mut pose = start;
@@ -105,7 +106,7 @@ impl Problem<'_> {
             self.for_each_correspondence(&pose, ids, width, nearest_by, |c| {
                 correspondences.push(c);
             });
-            pose = self.gauss_newton_step(&pose, &correspondences, width, &[])?.pose;
+            pose = self.gauss_newton_step(&pose, &correspondences, width, held)?.pose;
         }
         Some(pose)
     }
@@ -151,7 +152,7 @@ mod tests {
         let unit = truth * model.object_from_unit;
         let off = Sim3 { rotation: DQuat::from_rotation_z(0.03), ..unit };
         let ids = observed.subset(600);
-        let found = problem.anneal(off, &ids, [0.05, 0.02], 6, NearestBy::Triangles).unwrap();
+        let found = problem.anneal(off, &ids, [0.05, 0.02], 6, NearestBy::Triangles, &[]).unwrap();
         assert!(found.rotation.angle_between(unit.rotation) < 2e-3);
         let mut correspondences = Vec::new();
         problem.for_each_correspondence(&off, &ids, 0.05, NearestBy::Triangles, |c| {

@@ -18,10 +18,12 @@
 
 mod align;
 mod alignment;
+mod ambiguity;
 mod correspondence;
 mod depth_image;
 mod downsample;
 mod error;
+mod evidence;
 mod extent;
 mod gauss_newton;
 mod initial_pose;
@@ -43,6 +45,7 @@ mod weak_directions;
 
 pub use align::{align, align_model};
 pub use alignment::Alignment;
+pub use ambiguity::UndeterminedAxis;
 pub use depth_image::{DepthImage, DepthPoints};
 pub use error::{Error, Result};
 pub use model::AlignModel;

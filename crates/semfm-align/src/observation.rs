@@ -13,6 +13,14 @@ use crate::{Error, Result};
 /// is then about .1 %; twice as many cost twice the time and gain 30 %.
 const N_POINTS: usize = 600;
 
+/// An object larger than this (metres), or farther away, is none that a hand takes: rather, the points
+/// count millimetres.
+const LARGEST: f64 = 10.0;
+const FARTHEST: f64 = 50.0;
+
+/// An object smaller than this (metres) is below what any depth camera resolves.
+const SMALLEST: f64 = 0.0005;
+
 /// Fewer points cannot hold seven unknowns against noise.
 const LEAST_POINTS: usize = 30;
 
@@ -50,11 +58,14 @@ struct View<'a> {
 }
 
 impl Observation {
-    /// A cloud seen from one place: from the frame's origin, or from `viewpoint`.
+    /// A cloud seen from one place, metres. A viewpoint at the origin says that the frame is the camera's
+    /// own (x right, y down, z forward), in which nothing that it sees lies behind it; in any other
+    /// frame the viewpoint is where the camera stood.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for fewer than 30 points, a coordinate that is not finite, points
-    /// all on one spot, or a viewpoint among the points.
+    /// all on one spot, a viewpoint among the points, points behind a camera at the origin, and a
+    /// cloud that is too large, too far away or too small for one of an object in metres.
     pub fn from_view(points: &[DVec3], viewpoint: DVec3) -> Result<Self> {
         Self::from_one_view(&View { object: points, context: &[], viewpoint, bounds: None })
     }
@@ -62,14 +73,15 @@ impl Observation {
     /// A cloud put together from many views: every side of the object may be in it.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for fewer than 30 points, a coordinate that is not finite, or points
-    /// all on one spot.
+    /// [`Error::OutOfRange`] for fewer than 30 points, a coordinate that is not finite, points
+    /// all on one spot, and a cloud that is too large or too small for one of an object in metres.
     pub fn from_many_views(points: &[DVec3]) -> Result<Self> {
         check_points(points)?;
         let (kept, mut normals): (Vec<_>, Vec<_>) =
-            downsample(points, N_POINTS).into_iter().map(|p| (p.point, p.normal)).unzip();
+            downsample(&in_order(points), N_POINTS).into_iter().map(|p| (p.point, p.normal)).unzip();
         let axes = ViewAxes::along(DVec3::Z);
         let extent = extent(&kept, axes)?;
+        check_metres(&extent, None)?;
         // Which way is out is not known; away from the middle is right more often than not.
         let middle: DVec3 = kept.iter().sum::<DVec3>() / kept.len() as f64;
         for (normal, point) in normals.iter_mut().zip(&kept) {
@@ -102,6 +114,11 @@ impl Observation {
     fn from_one_view(view: &View<'_>) -> Result<Self> {
         let View { object, context, viewpoint, bounds } = *view;
         check_points(object)?;
+        if viewpoint == DVec3::ZERO {
+            check_in_front(object)?;
+        }
+        let n_given = object.len();
+        let object = &in_order(object);
         let sampled = downsample(object, N_POINTS);
         let middle: DVec3 = sampled.iter().map(|p| p.point).sum::<DVec3>() / sampled.len() as f64;
         if !viewpoint.is_finite() || middle.distance(viewpoint) <= 0.0 {
@@ -119,9 +136,10 @@ impl Observation {
             .collect();
         let axes = ViewAxes::along(middle - viewpoint);
         let extent = extent(&kept, axes)?;
+        check_metres(&extent, Some(middle.distance(viewpoint)))?;
         let silhouette = Silhouette::new(object, context, viewpoint, axes, bounds);
         let coverage = Coverage::SingleView(silhouette);
-        Ok(Self { points: kept, normals, coverage, extent, axes, n_given: object.len() })
+        Ok(Self { points: kept, normals, coverage, extent, axes, n_given })
     }
 
     /// Number of points given.
@@ -154,18 +172,64 @@ impl Observation {
     }
 }
 
+/// The points in an order of their own, each once: neither the order in which they were given nor
+/// what was given twice has a part in the answer.
+fn in_order(points: &[DVec3]) -> Vec<DVec3> {
+    let mut points = points.to_vec();
+    points.sort_unstable_by(|a, b| {
+        a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
+    });
+    points.dedup();
+    points
+}
+
 fn check_points(points: &[DVec3]) -> Result<()> {
     if points.len() < LEAST_POINTS {
         let expected = format!("at least {LEAST_POINTS} points");
         let found = points.len().to_string();
         return Err(Error::OutOfRange { what: "observed cloud", expected, found });
     }
-    if let Some(id) = points.iter().position(|p| !p.is_finite()) {
-        let (expected, found) =
-            ("finite coordinates".into(), format!("{} at point {id}", points[id]));
+    // Beyond this, squares of differences leave the range of numbers.
+    let usable = |p: &DVec3| p.is_finite() && p.abs().max_element() < 1e100;
+    if let Some(id) = points.iter().position(|p| !usable(p)) {
+        let (expected, found) = (
+            "finite coordinates below 1e100 (leave points without a return away)".into(),
+            format!("{} at point {id}", points[id]),
+        );
         return Err(Error::OutOfRange { what: "observed cloud", expected, found });
     }
     Ok(())
+}
+
+/// Refuses points behind a camera that looks along z from the origin.
+fn check_in_front(points: &[DVec3]) -> Result<()> {
+    let behind = points.iter().filter(|p| p.z <= 0.0).count();
+    if behind == 0 {
+        return Ok(());
+    }
+    let expected = "points before the camera, z > 0 (x right, y down, z forward): turn a cloud of \
+                    another frame into the camera's, or name the viewpoint in its frame";
+    let found = format!("{behind} of {} with z ≤ 0", points.len());
+    Err(Error::OutOfRange { what: "observed cloud", expected: expected.into(), found })
+}
+
+/// Refuses what cannot be an object in metres: its size, and its distance from the viewpoint where
+/// that is known.
+fn check_metres(extent: &Extent, distance: Option<f64>) -> Result<()> {
+    let size = extent.diameter();
+    let far = distance.filter(|&distance| distance > FARTHEST);
+    let (expected, found) = if size > LARGEST {
+        (format!("at most {LARGEST} m"), format!("{size:.4} m across: is this in millimetres?"))
+    } else if let Some(far) = far {
+        let found = format!("{far:.4} m from the viewpoint: is this in millimetres?");
+        (format!("an object at most {FARTHEST} m away"), found)
+    } else if size < SMALLEST {
+        let found = format!("{size:.1e} m across: is its unit right? For a depth image, --depth-scale");
+        (format!("at least {SMALLEST} m"), found)
+    } else {
+        return Ok(());
+    };
+    Err(Error::OutOfRange { what: "observed cloud", expected, found })
 }
 
 fn extent(points: &[DVec3], axes: ViewAxes) -> Result<Extent> {
@@ -189,6 +253,36 @@ mod tests {
         assert!(seen.normals.iter().all(|n| n.z < -0.99));
         let seen = Observation::from_view(&patch(), DVec3::Z).unwrap();
         assert!(seen.normals.iter().all(|n| n.z > 0.99));
+    }
+
+    #[test]
+    fn neither_order_nor_repetition_has_a_part() {
+        let points = patch();
+        let shuffled: Vec<DVec3> = (0..900).map(|i| points[i * 7 % 900]).collect();
+        let repeated = [&shuffled[..], &points[..450]].concat();
+        let of = |points: &[DVec3]| Observation::from_view(points, DVec3::ZERO).unwrap().points;
+        assert_eq!(of(&points), of(&shuffled));
+        assert_eq!(of(&points), of(&repeated));
+    }
+
+    #[test]
+    fn a_cloud_in_another_unit_or_behind_the_camera_is_asked_about() {
+        let scaled = |factor: f64| patch().iter().map(|p| factor * p).collect::<Vec<DVec3>>();
+        let far: Vec<DVec3> = patch().iter().map(|p| p + 60.0 * DVec3::Z).collect();
+        for (points, words) in [
+            (scaled(1000.0), "in millimetres?"),
+            (scaled(1e80), "in millimetres?"),
+            (far, "in millimetres?"),
+            (scaled(1e-5), "unit"),
+            (scaled(-1.0), "900 of 900"),
+            (scaled(1e120), "point 0"),
+        ] {
+            let error = Observation::from_view(&points, DVec3::ZERO).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        assert!(Observation::from_many_views(&scaled(1000.0)).is_err());
+        // In a frame of its own, a cloud may lie on any side of the origin.
+        assert!(Observation::from_view(&scaled(-1.0), DVec3::new(0.1, 0.1, 0.3)).is_ok());
     }
 
     #[test]

@@ -36,6 +36,16 @@ pub(crate) struct RefinedPose {
 }
 
 impl Problem<'_> {
+    /// The width of the kernel that belongs to the noise around a pose, `widest` (metres) at most.
+    pub fn kernel_width(&self, pose: &Sim3, ids: &[u32], widest: f64) -> f64 {
+        let mut correspondences = Vec::with_capacity(ids.len());
+        self.for_each_correspondence(pose, ids, widest, NearestBy::Triangles, |c| {
+            correspondences.push(c);
+        });
+        let noise = noise(&correspondences, widest).unwrap_or(widest);
+        (WIDTH_PER_NOISE * noise).clamp(LEAST_WIDTH * self.observed.diameter(), widest)
+    }
+
     /// All points, exact matches, a kernel as wide as the noise (`widest` at first), no step along
     /// the directions (unit) that are held.
     ///

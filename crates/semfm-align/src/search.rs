@@ -40,6 +40,11 @@ const SCORE_WIDTH: f64 = 0.025;
 /// A point whose normal agrees this well with its match's counts in full for the score.
 const FULL_AGREEMENT: f64 = 0.7;
 
+/// Other ends of the search that are handed on, at most, and the share of the best one's score that
+/// each has at least.
+const OTHERS: usize = 8;
+const OTHERS_SCORE: f64 = 0.7;
+
 /// An initial pose that scores this much is believed without trying others.
 const GOOD_ENOUGH: f64 = 0.7;
 
@@ -54,11 +59,11 @@ pub(crate) struct ScoredPose {
 }
 
 /// What a search found.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct SearchResult {
-    pub best: ScoredPose,
-    /// The best of the poses with another place of the surface.
-    pub rival: Option<ScoredPose>,
+    pub best: Sim3,
+    /// The other poses that it ended in.
+    pub others: Vec<Sim3>,
     /// Starts tried.
     pub n_starts: usize,
 }
@@ -76,8 +81,8 @@ struct Round {
 }
 
 impl Problem<'_> {
-    /// The best pose found, and the best of those that place the surface elsewhere. `None` where no
-    /// start leads anywhere.
+    /// The best pose found, and the others that the search ended in. `None` where no start leads
+    /// anywhere.
     ///
     /// # Errors
     /// [`semfm_geom::Error::Cancelled`].
@@ -91,9 +96,9 @@ impl Problem<'_> {
         if let Some(guess) = guess {
             let starts = self.starts(guess.rotation, Some(guess));
             n_tried += starts.len();
-            let found = self.all_rounds(starts, task)?;
-            if found.first().is_some_and(|best| best.score >= GOOD_ENOUGH) {
-                return Ok(self.best_and_rival(&found, n_tried));
+            let found = self.all_rounds(starts, n_tried, task)?;
+            if found.as_ref().is_some_and(|(_, score)| *score >= GOOD_ENOUGH) {
+                return Ok(found.map(|(found, _)| found));
             }
         }
         let starts: Vec<Sim3> = match guess {
@@ -107,8 +112,7 @@ impl Problem<'_> {
             }
         };
         n_tried += starts.len();
-        let found = self.all_rounds(starts, task)?;
-        Ok(self.best_and_rival(&found, n_tried))
+        Ok(self.all_rounds(starts, n_tried, task)?.map(|(found, _)| found))
     }
 
     /// The given start and the one with this rotation that fits the observed extent, scales brought
@@ -121,8 +125,13 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// All three rounds; the best first.
-    fn all_rounds(&self, starts: Vec<Sim3>, task: &Task) -> Result<Vec<ScoredPose>> {
+    /// All three rounds: what they found, and the best one's score.
+    fn all_rounds(
+        &self,
+        starts: Vec<Sim3>,
+        n_starts: usize,
+        task: &Task,
+    ) -> Result<Option<(SearchResult, f64)>> {
         let [wide, narrow, fine] = WIDTHS.map(|share| share * self.observed.diameter());
         let first = Round {
             ids: self.observed.subset(FIRST_POINTS),
@@ -149,9 +158,15 @@ impl Problem<'_> {
         let n_all = n + SECOND_POSES + THIRD_POSES;
         let found = self.round(&first, starts, task)?;
         task.step("align", n, n_all)?;
-        let found = self.round(&second, distinct(&found, SECOND_POSES), task)?;
+        let second = self.round(&second, distinct(&found, SECOND_POSES), task)?;
         task.step("align", n + SECOND_POSES, n_all)?;
-        self.round(&third, distinct(&found, THIRD_POSES), task)
+        let third = self.round(&third, distinct(&second, THIRD_POSES), task)?;
+        let Some(&ScoredPose { pose: best, score }) = third.first() else { return Ok(None) };
+        let least = OTHERS_SCORE * second.first().map_or(0.0, |pose| pose.score);
+        let rest = second.into_iter().filter(|pose| pose.score >= least);
+        let all: Vec<ScoredPose> = third.into_iter().chain(rest).collect();
+        let others = distinct(&all, 1 + OTHERS).split_off(1);
+        Ok(Some((SearchResult { best, others, n_starts }, score)))
     }
 
     /// The poses refined and scored, the highest score first, ties in order.
@@ -175,7 +190,7 @@ impl Problem<'_> {
     ) -> semfm_geom::Result<Option<ScoredPose>> {
         task.check()?;
         let Round { ids, widths, n_steps, nearest_by, every } = round;
-        let refined = self.anneal(start, ids, *widths, *n_steps, *nearest_by);
+        let refined = self.anneal(start, ids, *widths, *n_steps, *nearest_by, &[]);
         Ok(refined.map(|pose| {
             let score = self.score(&pose, ids, *nearest_by, *every);
             ScoredPose { pose, score }
@@ -215,31 +230,6 @@ impl Problem<'_> {
                 visibility
             }
         }
-    }
-
-    /// The best, and the best of those that place the surface elsewhere: a symmetric object turned
-    /// about its axis is no rival. `found` has the best first.
-    fn best_and_rival(&self, found: &[ScoredPose], n_starts: usize) -> Option<SearchResult> {
-        let best = *found.first()?;
-        let rival = found
-            .iter()
-            .skip(1)
-            .find(|other| self.surface_distance(&best.pose, &other.pose) > SAME / 2.0)
-            .copied();
-        Some(SearchResult { best, rival, n_starts })
-    }
-
-    /// Mean distance from the surface at one pose to the surface at another, in radii (ADD-S,
-    /// Hinterstoisser et al. 2012, on both sides' nearest points).
-    fn surface_distance(&self, a: &Sim3, b: &Sim3) -> f64 {
-        let (mut sum, mut n) = (0.0, 0);
-        let b_from_a = b.inverse() * *a;
-        for sample in self.model.samples.iter().step_by(self.model.samples.len().div_ceil(150)) {
-            let query = b_from_a.apply(sample.point);
-            sum += self.model.surface.closest(query).map_or(0.0, |hit| hit.distance);
-            n += 1;
-        }
-        sum / f64::from(n.max(1)) * b.scale / a.scale
     }
 }
 

@@ -24,9 +24,16 @@ const COARSER: f64 = 3.0;
 /// depends on a pixel.
 const GRAZING: f64 = 0.25;
 
+/// The same where samples count by the area that they show: less of it is left out.
+const STEEP: f64 = 0.08;
+
 /// How far behind the nearest sample in its cell of the depth buffer a sample still counts as
 /// visible, in radii of the object.
 const THICKNESS: f64 = 0.12;
+
+/// Where other things were seen, the grid reaches so far beyond the object on each side, as a share of
+/// its larger side: a handle that may stand behind one of them is no conflict.
+const MARGIN: f64 = 0.5;
 
 /// Shares of the tangents that the grid's lower and upper borders have below them.
 const BORDERS: [f64; 2] = [0.002, 0.998];
@@ -46,6 +53,11 @@ pub(crate) struct Silhouette {
     object: Vec<DepthRange>,
     /// Least depth of anything else in each cell.
     context: Vec<f32>,
+    /// Least depth of the object in each cell and its eight neighbours.
+    front: Vec<f32>,
+    /// For each cell, how many cells away the nearest one is that shows the object, see
+    /// [`Self::measure_gaps`].
+    gaps: Vec<f32>,
     /// What the image covers, in the camera's own axes.
     bounds: Option<ImageBounds>,
 }
@@ -80,6 +92,8 @@ struct FacingSample<'a> {
     sample: &'a OrientedPoint,
     /// In the camera's frame.
     place: DVec3,
+    /// Between its normal and the line of sight.
+    cosine: f64,
     projected: Projected,
 }
 
@@ -100,11 +114,14 @@ impl Silhouette {
             side: [1; 2],
             object: Vec::new(),
             context: Vec::new(),
+            front: Vec::new(),
+            gaps: Vec::new(),
             bounds,
         };
         let seen: Vec<Projected> =
             points.iter().filter_map(|&point| silhouette.project(point)).collect();
-        silhouette.lay_grid(&seen, points.len());
+        let margin = if context.is_empty() { 0.0 } else { MARGIN };
+        silhouette.lay_grid(&seen, points.len(), margin);
         for &Projected { uv, depth } in &seen {
             if let Some(cell) = silhouette.cell(uv) {
                 let here = DepthRange { near: depth as f32, far: depth as f32 };
@@ -118,18 +135,115 @@ impl Silhouette {
             }
         }
         silhouette.close_holes();
+        silhouette.front = (0..silhouette.object.len()).map(|at| silhouette.front_at(at)).collect();
+        silhouette.measure_gaps();
         silhouette
     }
 
-    /// A grid of empty cells over what was seen of the `n_points` points.
-    fn lay_grid(&mut self, seen: &[Projected], n_points: usize) {
+    /// Where the camera stands.
+    pub fn viewpoint(&self) -> DVec3 {
+        self.viewpoint
+    }
+
+    /// How much of the surface a pose shows where the camera saw that nothing is, as a share of the
+    /// area of the observed silhouette: surface in front of what was seen, or beside the silhouette
+    /// and in front of whatever lies there. `width` (metres) is how far it may stand out before it
+    /// counts half, one cell of the silhouette not counted.
+    ///
+    /// > Σ ρ(dᵢ) aᵢ / A,  ρ(d) = d²/(d² + width²)
+    ///
+    /// over the visible samples, each with the solid angle aᵢ of its piece of surface.
+    pub fn conflict(&self, model: &AlignModel, camera_from_unit: &Sim3, width: f64) -> f64 {
+        let eye = camera_from_unit.inverse().apply(self.viewpoint);
+        let cell = 1.0 / self.per_unit;
+        let of_sample = model.area * camera_from_unit.scale.powi(2) / model.samples.len() as f64;
+        let mut sum = 0.0;
+        for FacingSample { sample, place, cosine, projected: Projected { uv, depth } } in
+            self.facing_samples(model, camera_from_unit, 1, STEEP)
+        {
+            let out = self.distance_out(uv, depth);
+            if out <= 0.0
+                || self.bounds.is_some_and(|bounds| !bounds.contains(place))
+                || model.surface.blocked(eye, sample.point, 1e-3)
+            {
+                continue;
+            }
+            let share = out * out / (out * out + width * width);
+            sum += share * cosine * of_sample / (depth * depth);
+        }
+        let n_cells = self.object.iter().filter(|&&range| range != DepthRange::EMPTY).count();
+        sum / (n_cells.max(1) as f64 * cell * cell)
+    }
+
+    /// How far (metres) a place stands out into space that the camera looked through; 0 where it does
+    /// not.
+    fn distance_out(&self, uv: [f64; 2], depth: f64) -> f64 {
+        let [column, row] = [0, 1].map(|k| (uv[k] - self.low[k]) * self.per_unit);
+        let nearest = |x: f64, n: usize| (x.max(0.0) as usize).min(n - 1);
+        let (c, r) = (nearest(column, self.side[0]), nearest(row, self.side[1]));
+        let at = r * self.side[0] + c;
+        let beyond = (column - c as f64 - 0.5).hypot(row - r as f64 - 0.5);
+        let inside = self.cell(uv).is_some();
+        if inside && depth > f64::from(self.context[at]) {
+            return 0.0;
+        }
+        let range = self.object[at];
+        if inside && range != DepthRange::EMPTY {
+            return f64::from(self.front[at]) - depth;
+        }
+        // What stands beside the silhouette is at least so far from it across the line of sight.
+        let cells = f64::from(self.gaps[at]) + if inside { 0.0 } else { beyond } - 1.0;
+        cells.max(0.0) / self.per_unit * depth
+    }
+
+    /// Least depth of the object in a cell and its neighbours: at a rim before a far wall, a place may be
+    /// off by a cell.
+    fn front_at(&self, at: usize) -> f32 {
+        let [width, height] = self.side;
+        let (column, row) = (at % width, at / width);
+        let rows = row.saturating_sub(1)..(row + 2).min(height);
+        rows.flat_map(|r| (column.saturating_sub(1)..(column + 2).min(width)).map(move |c| (r, c)))
+            .map(|(r, c)| self.object[r * width + c].near)
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    /// Distances to the nearest cell that shows the object, in cells, by two sweeps with steps of 1 and
+    /// √2 (Borgefors 1986).
+    fn measure_gaps(&mut self) {
+        let [width, height] = self.side;
+        let seen = |cell: &DepthRange| if *cell == DepthRange::EMPTY { f32::INFINITY } else { 0.0 };
+        let mut gaps: Vec<f32> = self.object.iter().map(seen).collect();
+        let ids: Vec<usize> = (0..gaps.len()).collect();
+        for (order, steps) in [
+            (ids.clone(), [(-1, 0), (0, -1), (-1, -1), (1, -1)]),
+            (ids.into_iter().rev().collect(), [(1, 0), (0, 1), (1, 1), (-1, 1)]),
+        ] {
+            for at in order {
+                let (column, row) = ((at % width) as isize, (at / width) as isize);
+                for (right, down) in steps {
+                    let (c, r) = (column + right, row + down);
+                    if c < 0 || r < 0 || c >= width as isize || r >= height as isize {
+                        continue;
+                    }
+                    let step = if right != 0 && down != 0 { std::f32::consts::SQRT_2 } else { 1.0 };
+                    gaps[at] = gaps[at].min(gaps[r as usize * width + c as usize] + step);
+                }
+            }
+        }
+        self.gaps = gaps;
+    }
+
+    /// A grid of empty cells over what was seen of the `n_points` points, wider on each side by
+    /// `margin` (a share of the larger side).
+    fn lay_grid(&mut self, seen: &[Projected], n_points: usize, margin: f64) {
         let [low, high] = BORDERS.map(|share| [0, 1].map(|k| border(seen, k, share)));
         let size = [0, 1].map(|k| (high[k] - low[k]).max(1e-9));
         let n_cells = (n_points as f64 / POINTS_PER_CELL).clamp(SIDE[0].powi(2), SIDE[1].powi(2));
         self.per_unit =
             (n_cells / (size[0] * size[1])).sqrt().min(4.0 * SIDE[1] / size[0].max(size[1]));
-        self.low = [0, 1].map(|k| low[k] - 1.0 / self.per_unit);
-        self.side = size.map(|size| (size * self.per_unit).ceil() as usize + 2);
+        let beside = (margin * size[0].max(size[1]) * self.per_unit).ceil() + 1.0;
+        self.low = low.map(|low| low - beside / self.per_unit);
+        self.side = size.map(|size| (size * self.per_unit + 2.0 * beside).ceil() as usize);
         self.object = vec![DepthRange::EMPTY; self.side[0] * self.side[1]];
         self.context = vec![f32::INFINITY; self.object.len()];
     }
@@ -145,12 +259,12 @@ impl Silhouette {
         every: usize,
         exact: bool,
     ) -> Visibility {
-        let facing = self.facing_samples(model, camera_from_unit, every);
+        let facing = self.facing_samples(model, camera_from_unit, every, GRAZING);
         let buffer = (!exact).then(|| DepthBuffer::new(self, &facing));
         let eye = camera_from_unit.inverse().apply(self.viewpoint);
         let slack = THICKNESS * camera_from_unit.scale;
         let mut visibility = Visibility::default();
-        for FacingSample { sample, place, projected: Projected { uv, depth } } in facing {
+        for FacingSample { sample, place, projected: Projected { uv, depth }, .. } in facing {
             let shown = match &buffer {
                 None => !model.surface.blocked(eye, sample.point, 1e-3),
                 Some(buffer) => depth <= buffer.nearest(self, uv) + slack,
@@ -174,13 +288,14 @@ impl Silhouette {
         visibility
     }
 
-    /// Every `every`th sample of the model, where the line of sight meets its front at more than a
-    /// grazing angle.
+    /// Every `every`th sample of the model, where the line of sight meets its front at this cosine or
+    /// more.
     fn facing_samples<'a>(
         &self,
         model: &'a AlignModel,
         camera_from_unit: &Sim3,
         every: usize,
+        grazing: f64,
     ) -> Vec<FacingSample<'a>> {
         let turn = DMat3::from_quat(camera_from_unit.rotation) * camera_from_unit.scale;
         let mut facing = Vec::with_capacity(model.samples.len() / 2);
@@ -188,11 +303,12 @@ impl Silhouette {
             let place = turn * sample.point + camera_from_unit.translation;
             let cosine = -(turn * sample.normal).dot(place - self.viewpoint)
                 / (camera_from_unit.scale * place.distance(self.viewpoint));
-            if (if model.both_sides { cosine.abs() } else { cosine }) < GRAZING {
+            let cosine = if model.both_sides { cosine.abs() } else { cosine };
+            if cosine < grazing {
                 continue;
             }
             let Some(projected) = self.project(place) else { continue };
-            facing.push(FacingSample { sample, place, projected });
+            facing.push(FacingSample { sample, place, cosine, projected });
         }
         facing
     }

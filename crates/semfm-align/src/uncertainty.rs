@@ -78,6 +78,11 @@ impl Uncertainty {
             + direction * direction.transpose() * variance.min(std * std);
     }
 
+    /// Covariance of turn, shift and growth in the model's inner frame.
+    pub fn covariance(&self) -> &Matrix7 {
+        &self.covariance
+    }
+
     /// Standard deviation of the scale relative to itself.
     pub fn growth_std(&self) -> f64 {
         self.covariance[(6, 6)].max(0.0).sqrt()

@@ -14,7 +14,7 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show, transfer,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show, transfer,
     views,
 };
 use options::Common;
@@ -107,7 +107,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Ok(Outcome::Interrupted) => process::INTERRUPTED,
         Err(error) => {
             console::error(&error);
-            2
+            if error.is::<NoAnswer>() { 1 } else { 2 }
         }
     }
 }

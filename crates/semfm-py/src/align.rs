@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use semfm::align::Alignment as Found;
 use semfm::align::{self, AlignSettings, Observation, Sim3};
 use semfm::files::AlignedFile;
@@ -88,7 +89,8 @@ impl Alignment {
         self.found.scale_std
     }
 
-    /// float: standard deviation of the rotation about its least certain axis, radians.
+    /// float: standard deviation of the rotation about its least certain axis, radians; π where what
+    /// was seen does not determine it.
     #[getter]
     fn rotation_std(&self) -> f64 {
         self.found.rotation_std
@@ -116,6 +118,36 @@ impl Alignment {
     #[getter]
     fn visibility(&self) -> f64 {
         self.found.visibility
+    }
+
+    /// float: what the best pose that puts some of the surface elsewhere explains of what was seen, as a
+    /// share of what this one does.
+    #[getter]
+    fn rival(&self) -> f64 {
+        self.found.rival
+    }
+
+    /// list of dict: axes about which what was seen does not determine the rotation: ``axis``, a unit
+    /// vector (x, y, z) in the mesh's frame, and ``turns``, the ranges of turns about it (radians, 0
+    /// the pose itself) that fit as well.
+    #[getter]
+    fn undetermined<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let one = |open: &align::UndeterminedAxis| {
+            let entry = PyDict::new(py);
+            entry.set_item("axis", <(f64, f64, f64)>::from(open.axis))?;
+            let turns: Vec<(f64, f64)> = open.turns.iter().map(|&[from, to]| (from, to)).collect();
+            entry.set_item("turns", turns)?;
+            Ok(entry)
+        };
+        self.found.undetermined.iter().map(one).collect()
+    }
+
+    /// (a, 4, 4) float64 array: other values of `camera_from_object` that explain what was seen as well.
+    #[getter]
+    fn alternatives<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let numbers: Vec<f64> =
+            self.found.alternatives.iter().flat_map(|pose| pose.to_rows().concat()).collect();
+        arrays_out::owned(py, numbers).call_method1("reshape", (-1, 4, 4))
     }
 
     /// str: ``"accept"``, ``"check"`` or ``"refuse"``.
@@ -184,7 +216,8 @@ impl Alignment {
 /// points : (n, 3) array_like
 ///     What the camera saw of the object, metres, in the camera's frame.
 /// viewpoint : tuple of float, float, float, optional
-///     Where the camera stands; None for a cloud merged from many views, of which nothing can be
+///     Where the camera stands. The origin says that the frame is the camera's own (x right, y down,
+///     z forward), in which nothing it sees lies behind it. None for a cloud merged from many views, of which nothing can be
 ///     said about what should have been seen.
 /// init : (4, 4) array_like, optional
 ///     A guess of `Alignment.camera_from_object`.

@@ -6,11 +6,13 @@
 use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
+use semfm_align::Sim3;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, find_grasps};
 use semfm_robot::Gripper;
 
+use crate::pose_dependence::shares_of_poses;
 use crate::{GraspResult, ObjectSize, Result};
 
 /// Metres that a gripper keeps from the points of a cloud, unless said otherwise: the noise of a
@@ -25,6 +27,8 @@ pub struct GraspRequest {
     /// Where the object, scaled to metres, stands before a camera: the answer's frame is then the
     /// camera's.
     pub camera_from_object: Option<Pose>,
+    /// Other poses (camera from the mesh in its own units) that explain what the camera saw as well.
+    pub alternatives: Vec<Sim3>,
     /// A table, in the answer's frame.
     pub table: Option<Table>,
     /// What else the gripper must not touch, in the answer's frame, metres.
@@ -59,6 +63,7 @@ impl GraspRequest {
         Self {
             object_scale,
             camera_from_object: None,
+            alternatives: Vec::new(),
             table: None,
             obstacles: Vec::new(),
             point_margin: POINT_MARGIN,
@@ -84,6 +89,7 @@ impl GraspRequest {
             mesh,
             object_scale: self.object_scale,
             camera_from_object: self.camera_from_object,
+            alternatives: self.alternatives,
             gripper,
         })
     }
@@ -130,6 +136,7 @@ pub struct GraspProblem {
     mesh: Arc<Mesh>,
     object_scale: f64,
     camera_from_object: Option<Pose>,
+    alternatives: Vec<Sim3>,
     gripper: Gripper,
     object: GraspObject,
     scene: Scene,
@@ -144,6 +151,27 @@ impl GraspProblem {
     pub fn find(&self, weights: &[f64], task: &Task) -> Result<Grasps> {
         let Self { object, gripper, scene, settings, .. } = self;
         Ok(find_grasps(object, weights, gripper, scene, settings, task)?)
+    }
+
+    /// For each grasp found in a region the share of [`GraspRequest::alternatives`] under which its
+    /// contacts still lie on the object and in the region ([`shares_of_poses`]); `None` where there
+    /// are none.
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::NoArea`].
+    pub fn shares_of_poses(&self, weights: &[f64], found: &Grasps) -> Result<Option<Vec<f64>>> {
+        let Some(pose) = self.camera_from_object.filter(|_| !self.alternatives.is_empty()) else {
+            return Ok(None);
+        };
+        let Pose { rotation, translation } = pose;
+        let pose = Sim3 { scale: self.object_scale, rotation, translation };
+        let contacts: Vec<[DVec3; 2]> = found.grasps.iter().map(|grasp| grasp.contacts).collect();
+        shares_of_poses(&self.mesh, weights, &pose, &self.alternatives, &contacts).map(Some)
+    }
+
+    /// Other poses of the object that explain what the camera saw as well.
+    pub fn alternatives(&self) -> &[Sim3] {
+        &self.alternatives
     }
 
     /// What was found, with the object, the gripper and the camera that it refers to.

@@ -61,6 +61,7 @@ mod grasp_result;
 pub mod object_encoder;
 mod object_size;
 mod pipeline;
+mod pose_dependence;
 pub mod weight_colors;
 
 pub use error::{Error, Result};
@@ -72,6 +73,7 @@ pub use grasp::find_grasps;
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
 pub use object_size::ObjectSize;
+pub use pose_dependence::shares_of_poses;
 pub use pipeline::{
     EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
     prepare, semantic_cloud,

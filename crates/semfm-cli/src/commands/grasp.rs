@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use semfm::align::Verdict;
 use semfm::demonstration::is_one_sided;
 use semfm::files::{
-    GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle, read_region,
+    AlignedPose, GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle, read_region,
     write_isaac_grasps, write_ros2_grasps,
 };
 use semfm::geom::io::{read_mesh, refuse_input};
@@ -18,8 +19,8 @@ use semfm::{GraspProblem, GraspRequest, Mesh, POINT_MARGIN, Table, Task};
 use semfm_show::write_grasp_picture;
 use serde_json::{Map, Value, json};
 
-use super::Outcome;
 use super::size::print_size;
+use super::{NoAnswer, Outcome};
 use crate::console;
 use crate::options::{Common, numbers, parse_package};
 use crate::output::{OutputFile, check_distinct, check_file};
@@ -33,7 +34,8 @@ const APPROACH_CONE: f64 = 45.0;
     semfm-cli grasp mug.obj --region grip.json --gripper franka --metres -o grasps.json\n  \
     semfm-cli grasp mug.obj --region grip.json --gripper hand.urdf --aligned aligned.json \\\n    \
     --scene table.ply --format ros2 -o grasps.mcap\n\n\
-    Exit code 0: grasps. 1: none survived; the file is written all the same and says why. 2: bad input.")]
+    Exit code 0: grasps. 1: none survived; the file is written all the same and says why. Also 1, without a file: \
+    the pose of --aligned has the verdict `refuse`. 2: bad input.")]
 pub struct GraspCommand {
     /// The object's mesh
     mesh: PathBuf,
@@ -73,6 +75,9 @@ enum Format {
 pub struct GraspOptions {
     #[command(flatten)]
     metric: MetricOptions,
+    /// Grasp at a pose whose verdict is `refuse`, too
+    #[arg(long, requires = "aligned", help_heading = "Metres")]
+    use_refused: bool,
     /// Folder of a package that the gripper's URDF names (`package://NAME/…`)
     #[arg(long, value_name = "NAME=FOLDER", value_parser = parse_package, help_heading = "Gripper")]
     package: Vec<(String, PathBuf)>,
@@ -160,7 +165,9 @@ impl GraspCommand {
         }
         let path = output.path();
         match self.format {
-            Format::Json => grasps_file(&problem, &found).write(path)?,
+            Format::Json => {
+                grasps_file_in_region(&problem, region.weights(), &found)?.write(path)?;
+            }
             Format::Ros2 => write_ros2_grasps(path, &result)?,
             Format::Isaac => write_isaac_grasps(path, &result)?,
         }
@@ -169,6 +176,7 @@ impl GraspCommand {
         } else {
             print_grasps(&found, common);
         }
+        warn_of_dependent_grasps(&problem, region.weights(), &found)?;
         if found.grasps.is_empty() && !common.quiet {
             let reason = small_region(&problem, region.weights())?;
             reason.iter().for_each(console::message);
@@ -195,6 +203,7 @@ impl GraspOptions {
         let GraspSettings { top, n_samples, friction, limits, .. } = GraspSettings::default();
         Self {
             metric: MetricOptions { aligned: None, scale: Some(scale), metres: false },
+            use_refused: false,
             package: Vec::new(),
             scene: Vec::new(),
             scene_margin: POINT_MARGIN,
@@ -218,7 +227,7 @@ impl GraspOptions {
 
     /// Reads everything that grasps of `mesh` need.
     pub fn prepare(&self, gripper: &str, seed: u64, mesh: Mesh) -> Result<GraspProblem> {
-        let mut request = self.metric.request(&mesh)?;
+        let mut request = self.metric.request(&mesh, self.use_refused)?;
         let packages = self.package.iter().cloned().collect();
         let gripper = Gripper::open(gripper, &GripperSettings { packages, ..Default::default() })
             .context("--gripper")?;
@@ -251,11 +260,14 @@ impl GraspOptions {
 
 impl MetricOptions {
     /// A request with metres per unit, and the pose before the camera where one is given.
-    fn request(&self, mesh: &Mesh) -> Result<GraspRequest> {
+    fn request(&self, mesh: &Mesh, use_refused: bool) -> Result<GraspRequest> {
         if let Some(path) = &self.aligned {
-            let pose = read_aligned(path, Some(mesh))?.camera_from_object;
+            let aligned = read_aligned(path, Some(mesh))?;
+            warn_of_pose(path, &aligned, use_refused)?;
+            let AlignedPose { camera_from_object: pose, alternatives, .. } = aligned;
             let camera_from_object = Some(pose.rigid());
-            return Ok(GraspRequest { camera_from_object, ..GraspRequest::new(pose.scale) });
+            let request = GraspRequest::new(pose.scale);
+            return Ok(GraspRequest { camera_from_object, alternatives, ..request });
         }
         match (self.scale, self.metres) {
             (Some(scale), _) => Ok(GraspRequest::new(scale)),
@@ -282,6 +294,65 @@ fn small_region(problem: &GraspProblem, weights: &[f64]) -> Result<Option<String
             1e6 * needed
         )
     }))
+}
+
+/// Says what speaks against a pose; one with the verdict `refuse` is no answer unless told otherwise.
+fn warn_of_pose(path: &Path, aligned: &AlignedPose, use_refused: bool) -> Result<()> {
+    let file = path.display();
+    let reasons = aligned.reasons.join("; ");
+    match aligned.verdict {
+        Some(Verdict::Refuse) if !use_refused => Err(NoAnswer(format!(
+            "{file}: the pose has the verdict `refuse` ({reasons}): align again, or grasp all the \
+             same with --use-refused"
+        ))
+        .into()),
+        Some(verdict @ (Verdict::Refuse | Verdict::Check)) => {
+            console::message(format_args!(
+                "warning: {file}: the pose has the verdict `{verdict}`: {reasons}"
+            ));
+            Ok(())
+        }
+        Some(Verdict::Accept) | None => Ok(()),
+    }
+}
+
+/// Says which grasps depend on what the pose leaves open.
+pub fn warn_of_dependent_grasps(
+    problem: &GraspProblem,
+    weights: &[f64],
+    found: &Grasps,
+) -> Result<()> {
+    let shares = problem.shares_of_poses(weights, found)?.unwrap_or_default();
+    let n_poses = problem.alternatives().len();
+    let dependent: Vec<String> =
+        (0..shares.len()).filter(|&i| shares[i] < 1.0).map(|i| i.to_string()).collect();
+    if shares.is_empty() {
+        return Ok(());
+    }
+    let least = shares.iter().copied().fold(1.0, f64::min);
+    if dependent.is_empty() {
+        console::message(format_args!(
+            "the contacts of every grasp lie in the region under all {n_poses} poses that fit as well"
+        ));
+        return Ok(());
+    }
+    console::message(format_args!(
+        "warning: grasps {} depend on the pose: of {n_poses} other poses that fit as well, as few as \
+         {:.0} % keep their contacts in the region",
+        dependent.join(", "),
+        100.0 * least
+    ));
+    Ok(())
+}
+
+/// The content of `grasps.json`, with what each grasp owes to an uncertain pose.
+pub fn grasps_file_in_region(
+    problem: &GraspProblem,
+    weights: &[f64],
+    found: &Grasps,
+) -> Result<GraspsFile> {
+    let shares = problem.shares_of_poses(weights, found)?.unwrap_or_default();
+    Ok(grasps_file(problem, found).with_pose_shares(&shares))
 }
 
 /// The content of `grasps.json`, with the table and the settings of the search.

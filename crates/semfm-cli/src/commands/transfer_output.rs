@@ -14,7 +14,10 @@ use semfm_show::{TransferFiles, write_transfer};
 use serde_json::{Value, json};
 
 use super::Outcome;
-use super::grasp::{draw_grasps, grasps_file, print_grasps, summary as grasps_summary};
+use super::grasp::{
+    draw_grasps, grasps_file_in_region, print_grasps, summary as grasps_summary,
+    warn_of_dependent_grasps,
+};
 use crate::console;
 use crate::options::Common;
 
@@ -46,7 +49,8 @@ impl TransferOutput<'_> {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
             let [file, picture] = GRASPS.map(|name| staged.path().join(name));
-            grasps_file(problem, &found).write(&file)?;
+            grasps_file_in_region(problem, weights, &found)?.write(&file)?;
+            warn_of_dependent_grasps(problem, weights, &found)?;
             if self.files == TransferFiles::All {
                 draw_grasps(&picture, problem, weights, &found, task)?;
             }

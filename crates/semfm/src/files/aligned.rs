@@ -43,8 +43,15 @@ pub struct AlignedFile {
     pub inlier_share: Option<f64>,
     /// Of the model's side that faces the camera, the share that was seen where it is.
     pub visibility: Option<f64>,
-    /// Score of the best pose with another place of the surface, as a share of this one's.
+    /// What the best pose that puts some of the surface elsewhere explains of what was seen, as a share
+    /// of what this one does.
     pub rival: Option<f64>,
+    /// Axes of the mesh about which the rotation is not determined.
+    #[serde(default)]
+    pub undetermined: Vec<UndeterminedAxisRecord>,
+    /// Other values of `camera_from_object` that explain what was seen as well.
+    #[serde(default)]
+    pub alternatives: Vec<MatrixRows>,
     /// What to do with the pose.
     pub verdict: Option<Verdict>,
     /// What speaks against accepting it, in words.
@@ -59,6 +66,15 @@ pub struct AlignedFile {
     /// Milliseconds by stage.
     #[serde(default)]
     pub stages_ms: BTreeMap<String, f64>,
+}
+
+/// An axis about which what was seen does not determine the rotation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UndeterminedAxisRecord {
+    /// Unit vector in the mesh's frame.
+    pub axis: [f64; 3],
+    /// Ranges of turns about it that fit as well, radians; 0 is the pose itself.
+    pub turns: Vec<[f64; 2]>,
 }
 
 /// The settings of a search as `aligned.json` has them.
@@ -90,6 +106,15 @@ impl AlignedFile {
             inlier_share: Some(found.inlier_share),
             visibility: Some(found.visibility),
             rival: Some(found.rival),
+            undetermined: found
+                .undetermined
+                .iter()
+                .map(|open| UndeterminedAxisRecord {
+                    axis: open.axis.to_array(),
+                    turns: open.turns.clone(),
+                })
+                .collect(),
+            alternatives: found.alternatives.iter().map(Sim3::to_rows).collect(),
             verdict: Some(found.verdict),
             reasons: found.reasons.clone(),
             n_starts: Some(found.n_starts),
@@ -119,7 +144,7 @@ impl AlignedFile {
 }
 
 /// The pose of an object before a camera, read from a file and checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct AlignedPose {
     /// From the mesh's frame and units to the camera's frame in metres. In a robot's chain,
     /// `camera_from_tcp = camera_from_object.rigid() * object_from_tcp`.
@@ -131,6 +156,10 @@ pub struct AlignedPose {
     pub residual_m: Option<f64>,
     /// What to do with the pose; `None` where the file does not say.
     pub verdict: Option<Verdict>,
+    /// What speaks against accepting it, in words.
+    pub reasons: Vec<String>,
+    /// Other poses that explain what was seen as well.
+    pub alternatives: Vec<Sim3>,
 }
 
 /// Reads `aligned.json`. Where it names its mesh and `mesh` is given, they must be the same.
@@ -162,8 +191,16 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<AlignedPose> {
             return Err(FormatError::new(path, place, expected, number.to_string()).into());
         }
     }
-    let (scale_std, residual_m) = (file.scale_std, file.residual_m);
-    Ok(AlignedPose { camera_from_object, scale_std, residual_m, verdict: file.verdict })
+    let alternatives: Result<Vec<Sim3>> =
+        file.alternatives.iter().map(|&rows| similarity(path, "alternatives", rows)).collect();
+    Ok(AlignedPose {
+        camera_from_object,
+        scale_std: file.scale_std,
+        residual_m: file.residual_m,
+        verdict: file.verdict,
+        reasons: file.reasons,
+        alternatives: alternatives?,
+    })
 }
 
 /// Reads an initial pose: `aligned.json`, any object with a field `camera_from_object`, or a bare

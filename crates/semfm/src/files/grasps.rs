@@ -107,6 +107,10 @@ pub struct GraspRecord {
     pub score: f64,
     /// The terms of the score, each 0 to 1.
     pub terms: BTreeMap<String, f64>,
+    /// Where the object's pose leaves something open: the share of the other poses that fit as well under
+    /// which both contacts still lie on the object and in the region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_share: Option<f64>,
     /// Poses of the gripper's parts.
     pub hand: HandRecord,
 }
@@ -186,6 +190,15 @@ impl GraspsFile {
         }
     }
 
+    /// With what [`GraspProblem::shares_of_poses`](crate::GraspProblem::shares_of_poses) tells of each
+    /// grasp.
+    pub fn with_pose_shares(mut self, shares: &[f64]) -> Self {
+        for (grasp, &share) in self.grasps.iter_mut().zip(shares) {
+            grasp.pose_share = Some(share);
+        }
+        self
+    }
+
     /// Its JSON.
     pub fn to_json(&self) -> Value {
         super::to_json(self)
@@ -235,6 +248,7 @@ impl GraspRecord {
             epsilon: grasp.epsilon,
             score: grasp.score,
             terms: terms.collect(),
+            pose_share: None,
             hand: HandRecord {
                 closed: parts_at(gripper, grasp.width, grasp.width),
                 open: parts_at(gripper, grasp.width, grasp.opening),

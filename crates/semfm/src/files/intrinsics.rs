@@ -14,7 +14,8 @@ use crate::Result;
 /// Reads intrinsics: `{"fx", "fy", "cx", "cy"}`, or `{"K": …}` with a 3 × 3 matrix or its nine
 /// numbers row by row, or these bare. In the file, pixel centres have whole coordinates, as
 /// calibration tools count ([`Pinhole::with_pixel_centres_at_integers`]). Where it has `width` and
-/// `height`, they must be the image's.
+/// `height`, they must be the image's. Coefficients of distortion (`D`, `coeffs`, `k1`, …) must be 0: a
+/// pinhole has none, and a pixel's ray would be wrong by as much as they bend it.
 ///
 /// # Errors
 /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not JSON,
@@ -26,6 +27,11 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
             let expected = format!("{has}, as the depth image");
             return Err(FormatError::new(path, field, expected, found.to_string()).into());
         }
+    }
+    if let Some((field, coefficient)) = distortion(&value) {
+        let expected = "no distortion: undistort the image first (OpenCV's undistort, ROS's \
+                        image_proc) and give the intrinsics of what comes out";
+        return Err(FormatError::new(path, field, expected, coefficient.to_string()).into());
     }
     let [fx, fy, cx, cy] = match value.get("K").or_else(|| value.get("k")) {
         Some(matrix) => from_matrix(path, matrix)?,
@@ -47,6 +53,52 @@ pub fn read_intrinsics(path: &Path, image: &DepthImage) -> Result<Pinhole> {
             other => other.into(),
         }
     })
+}
+
+/// The first field that holds coefficients of distortion, and the first of them that is not 0: as ROS
+/// (`D`), librealsense (`coeffs`), OpenCV (`distortion_coefficients`, `dist_coeffs`), COLMAP and
+/// nerfstudio (`k1` … `p2`) name them, at any depth.
+fn distortion(value: &Value) -> Option<(&str, f64)> {
+    match value {
+        Value::Object(fields) => fields.iter().find_map(|(name, field)| {
+            let coefficient = is_distortion(name).then(|| not_zero(field)).flatten();
+            coefficient.map(|x| (name.as_str(), x)).or_else(|| distortion(field))
+        }),
+        _ => None,
+    }
+}
+
+fn is_distortion(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let numbered = |letter: char, most: char| {
+        let mut rest = name.strip_prefix(letter).unwrap_or_default().chars();
+        rest.next().is_some_and(|digit| ('1'..=most).contains(&digit)) && rest.next().is_none()
+    };
+    name == "d"
+        || name == "dist"
+        || name.starts_with("dist_")
+        || name.starts_with("distcoef")
+        || name.contains("distortion")
+        || name == "coeffs"
+        || name == "coefficients"
+        || name == "radial"
+        || name == "tangential"
+        || numbered('k', '6')
+        || numbered('p', '2')
+        || numbered('s', '4')
+}
+
+/// The first number in it that is not 0. `rows` and `cols` of an OpenCV matrix are no coefficients.
+fn not_zero(value: &Value) -> Option<f64> {
+    match value {
+        Value::Number(number) => number.as_f64().filter(|&x| x != 0.0),
+        Value::Array(items) => items.iter().find_map(not_zero),
+        Value::Object(fields) => match fields.get("data") {
+            Some(data) => not_zero(data),
+            None => fields.values().find_map(not_zero),
+        },
+        _ => None,
+    }
 }
 
 fn number(path: &Path, value: &Value, field: &str) -> Result<f64> {
@@ -96,6 +148,10 @@ mod tests {
             r#"{"K": [[500, 0, 0.5], [0, 510, 0.25], [0, 0, 1]]}"#,
             r#"{"k": [500, 0, 0.5, 0, 510, 0.25, 0, 0, 1]}"#,
             "[500, 0, 0.5, 0, 510, 0.25, 0, 0, 1]",
+            r#"{"k": [500, 0, 0.5, 0, 510, 0.25, 0, 0, 1], "d": [0, 0.0, 0, 0, 0],
+                "distortion_model": "plumb_bob"}"#,
+            r#"{"fx": 500, "fy": 510, "cx": 0.5, "cy": 0.25, "k1": 0, "p2": 0.0,
+                "distortion": {"rows": 1, "cols": 5, "data": [0, 0, 0, 0, 0]}}"#,
         ] {
             assert_eq!(intrinsics(text).unwrap(), same, "{text}");
         }
@@ -104,6 +160,14 @@ mod tests {
             (r#"{"fx": "a", "fy": 510, "cx": 0.5, "cy": 0}"#, "fx"),
             (r#"{"fx": 0, "fy": 510, "cx": 0.5, "cy": 0}"#, "fx"),
             (r#"{"K": [500, 0, 0.5], "width": 2}"#, "K"),
+            (r#"{"fx": 500, "fy": 510, "cx": 0.5, "cy": 0, "D": [0, 0, 1e-3, 0, 0]}"#, "D"),
+            (r#"{"fx": 500, "fy": 510, "cx": 0.5, "cy": 0, "k1": -0.1}"#, "k1"),
+            (r#"{"fx": 500, "fy": 510, "cx": 0.5, "cy": 0, "coeffs": [0.1, 0]}"#, "coeffs"),
+            (
+                r#"{"K": [500, 0, 0.5, 0, 510, 0, 0, 0, 1],
+                    "distortion_coefficients": {"rows": 1, "cols": 2, "data": [0, 0.2]}}"#,
+                "distortion_coefficients",
+            ),
             (r#"{"K": [500, 7, 0.5, 0, 510, 0.25, 0, 0, 1]}"#, "K"),
             (r#"{"K": [500, 0, 0.5, 0, 510, 0.25, 0, 0, 1], "width": 640}"#, "width"),
             ("{", "line 1"),

@@ -43,7 +43,9 @@ use std::path::Path;
 use semfm_geom::io::refuse_input;
 use serde::Serialize;
 
-pub use aligned::{AlignSettingsRecord, AlignedFile, AlignedPose, read_aligned, read_pose};
+pub use aligned::{
+    AlignSettingsRecord, AlignedFile, AlignedPose, UndeterminedAxisRecord, read_aligned, read_pose,
+};
 pub use depth_image::read_depth_image;
 #[cfg(feature = "mcap")]
 pub use embeddings::read_embeddings;
