@@ -16,9 +16,9 @@ use objects::{Labelled, Mug, bottle, cuboid, label_error, lumpy, mug, render, vi
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use semfm_align::{AlignModel, AlignSettings, Observation, Verdict, align_model};
+use semfm_geom::Task;
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
-use semfm_geom::Task;
 
 struct Case {
     name: String,
@@ -99,8 +99,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if verbose && odd {
                 println!(
                     "    {} {seed}: shown {:.3} off {:.1} mm, {} std {:.4} rival {:.3} init {} elev {elevation:.2} down {down} noise {noise} {:?} {ms:.0} ms",
-                    case.name, seen.labelled_share, 1e3 * error, found.verdict, found.rotation_std,
-                    found.rival, init.is_some(), found.reasons
+                    case.name,
+                    seen.labelled_share,
+                    1e3 * error,
+                    found.verdict,
+                    found.rotation_std,
+                    found.rival,
+                    init.is_some(),
+                    found.reasons
                 );
             }
         }
@@ -129,7 +135,9 @@ fn print_counts(name: &str, counts: &[Counts; 3]) {
     for (class, Counts { n, accepted, accepted_wrong, refused, right }) in
         ["hidden", "sliver", "seen"].iter().zip(counts)
     {
-        print!(" | {class} {n}: right {right} accepted {accepted} (wrong {accepted_wrong}) refused {refused}");
+        print!(
+            " | {class} {n}: right {right} accepted {accepted} (wrong {accepted_wrong}) refused {refused}"
+        );
     }
     println!();
 }
@@ -144,7 +152,10 @@ fn cases(meshes: &[String]) -> Result<Vec<Case>, Box<dyn std::error::Error>> {
     same("mug, 24 segments", mug(Mug::default(), 24));
     let tall = Mug { radius: 0.03, height: 0.12, taper: 0.75, handle: 0.025, ..Mug::default() };
     same("tall mug, tapered", mug(tall, 72));
-    same("wide cup", mug(Mug { radius: 0.055, height: 0.06, taper: 0.6, handle: 0.02, ..Mug::default() }, 64));
+    same(
+        "wide cup",
+        mug(Mug { radius: 0.055, height: 0.06, taper: 0.6, handle: 0.02, ..Mug::default() }, 64),
+    );
     same("bottle", bottle(64));
     same("tumbler", mug(Mug { handle: 0.0, taper: 0.8, ..Mug::default() }, 64));
     same("box", cuboid(DVec3::new(0.04, 0.1, 0.16)));

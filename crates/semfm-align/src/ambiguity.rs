@@ -92,15 +92,23 @@ pub struct UndeterminedAxis {
 impl fmt::Display for UndeterminedAxis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let DVec3 { x, y, z } = self.axis;
-        write!(f, "the rotation about ({x:.2}, {y:.2}, {z:.2}) of the mesh is not determined by what was seen: ")?;
+        write!(
+            f,
+            "the rotation about ({x:.2}, {y:.2}, {z:.2}) of the mesh is not determined by what was seen: "
+        )?;
         let [first, last] = [self.turns[0][0], self.turns[self.turns.len() - 1][1]];
         if self.turns.len() == 1 && last - first > 2.0 * PI - 2.0 * STEP {
             return f.write_str("any turn fits as well");
         }
         f.write_str("turns of ")?;
-        for (i, [from, to]) in self.turns.iter().map(|range| range.map(f64::to_degrees)).enumerate() {
+        for (i, [from, to]) in self.turns.iter().map(|range| range.map(f64::to_degrees)).enumerate()
+        {
             f.write_str(if i > 0 { ", " } else { "" })?;
-            if to - from < 1.0 { write!(f, "{from:.0}°")? } else { write!(f, "{from:.0}° to {to:.0}°")? }
+            if to - from < 1.0 {
+                write!(f, "{from:.0}°")?
+            } else {
+                write!(f, "{from:.0}° to {to:.0}°")?
+            }
         }
         f.write_str(" fit as well")
     }

@@ -8,11 +8,11 @@ use semfm_geom::math::DVec3;
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Mesh, SurfaceIndex, Task};
 
-use crate::{Error, Result};
 use crate::nearest_table::NearestTable;
 use crate::oriented_point::OrientedPoint;
 use crate::rotations::super_fibonacci;
 use crate::sim3::Sim3;
+use crate::{Error, Result};
 
 /// Samples of the surface, uniform by area: about 3 % of the diagonal apart on a round object.
 const N_SAMPLES: usize = 2000;
@@ -69,8 +69,7 @@ impl AlignModel {
         if radius <= 0.0 || mesh.area() <= 0.0 {
             return Err(semfm_geom::Error::NoArea { n_faces: mesh.n_faces() }.into());
         }
-        let points: Vec<DVec3> =
-            mesh.vertices().iter().map(|&p| (p - centre) / radius).collect();
+        let points: Vec<DVec3> = mesh.vertices().iter().map(|&p| (p - centre) / radius).collect();
         let faces = without_copies(&points, mesh.faces());
         let unit = Mesh::new(points, faces)?;
         let surface = SurfaceIndex::new(&unit)?;
@@ -145,7 +144,8 @@ fn check_range(mesh: &Mesh) -> Result<()> {
 /// The triangles, each once: of those whose corners lie in the same cells of a fine grid and are wound
 /// alike, the first. Thousands in one place would all be asked for each point that lies near.
 fn without_copies(points: &[DVec3], faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let cell = |vertex: u32| (points[vertex as usize] / COPIES).round().to_array().map(|x| x as i32);
+    let cell =
+        |vertex: u32| (points[vertex as usize] / COPIES).round().to_array().map(|x| x as i32);
     let mut seen = HashSet::with_capacity(faces.len());
     let is_new = |face: &&[u32; 3]| {
         let mut cells = face.map(cell);

@@ -77,8 +77,10 @@ impl Observation {
     /// all on one spot, and a cloud that is too large or too small for one of an object in metres.
     pub fn from_many_views(points: &[DVec3]) -> Result<Self> {
         check_points(points)?;
-        let (kept, mut normals): (Vec<_>, Vec<_>) =
-            downsample(&in_order(points), N_POINTS).into_iter().map(|p| (p.point, p.normal)).unzip();
+        let (kept, mut normals): (Vec<_>, Vec<_>) = downsample(&in_order(points), N_POINTS)
+            .into_iter()
+            .map(|p| (p.point, p.normal))
+            .unzip();
         let axes = ViewAxes::along(DVec3::Z);
         let extent = extent(&kept, axes)?;
         check_metres(&extent, None)?;
@@ -224,7 +226,8 @@ fn check_metres(extent: &Extent, distance: Option<f64>) -> Result<()> {
         let found = format!("{far:.4} m from the viewpoint: is this in millimetres?");
         (format!("an object at most {FARTHEST} m away"), found)
     } else if size < SMALLEST {
-        let found = format!("{size:.1e} m across: is its unit right? For a depth image, --depth-scale");
+        let found =
+            format!("{size:.1e} m across: is its unit right? For a depth image, --depth-scale");
         (format!("at least {SMALLEST} m"), found)
     } else {
         return Ok(());

@@ -6,8 +6,8 @@ mod objects;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use objects::{Labelled, Mug, bottle, camera, cuboid, label_error, lumpy, mug, render, view};
-use rand::seq::SliceRandom;
 use rand::SeedableRng;
+use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use semfm_align::{AlignSettings, Alignment, Observation, Sim3, Verdict, align};
 use semfm_geom::Task;
@@ -22,7 +22,13 @@ fn aligned(model: &Labelled, observed: &Observation, settings: &AlignSettings) -
 }
 
 /// The pose of `model` in a picture of `object`, and how far its labelled part is off, metres.
-fn seen(object: &Labelled, model: &Labelled, pose: &Sim3, noise: f64, seed: u64) -> (Alignment, f64) {
+fn seen(
+    object: &Labelled,
+    model: &Labelled,
+    pose: &Sim3,
+    noise: f64,
+    seed: u64,
+) -> (Alignment, f64) {
     let seen = render(object, pose, noise, 1.5, seed);
     let observed = Observation::from_depth(&seen.image, &camera(), Some(&seen.mask)).unwrap();
     let found = aligned(model, &observed, &AlignSettings { seed, ..Default::default() });
@@ -39,9 +45,12 @@ fn mug_at(heading: f64, down: bool) -> (Labelled, Sim3) {
 
 #[test]
 fn a_hidden_handle_is_to_be_checked_and_the_axis_is_named() {
-    for (seed, heading, noise, down) in
-        [(0, FRAC_PI_2, 0.0, false), (1, 1.4, 0.001, false), (2, 1.75, 0.001, false), (3, -1.5, 0.001, true)]
-    {
+    for (seed, heading, noise, down) in [
+        (0, FRAC_PI_2, 0.0, false),
+        (1, 1.4, 0.001, false),
+        (2, 1.75, 0.001, false),
+        (3, -1.5, 0.001, true),
+    ] {
         let (object, pose) = mug_at(heading, down);
         assert!(render(&object, &pose, 0.0, 1.5, 0).labelled_share < 0.001, "{heading}");
         for model in [&object, &lumpy(&object, 0.001, 3)] {
@@ -50,7 +59,11 @@ fn a_hidden_handle_is_to_be_checked_and_the_axis_is_named() {
             assert!(found.rotation_std > 2.5, "{heading}: {found:?}");
             let axis = found.undetermined[0].axis;
             assert!(axis.z.abs() > 0.97, "{heading}: {axis}");
-            assert!(found.reasons.iter().any(|r| r.contains("rotation about")), "{:?}", found.reasons);
+            assert!(
+                found.reasons.iter().any(|r| r.contains("rotation about")),
+                "{:?}",
+                found.reasons
+            );
             // Whatever the heading, the body is where it is.
             let foot = object.mesh.vertices()[0];
             let off = pose.apply(foot).distance(found.camera_from_object.apply(foot));
@@ -125,7 +138,10 @@ fn a_handle_that_hardly_shows_is_found_by_every_seed_or_to_be_checked() {
         let (object, pose) = mug_at(heading, false);
         for seed in 0..3 {
             let (found, off) = seen(&object, &object, &pose, 0.0007, seed);
-            assert!(off < OFF || found.verdict != Verdict::Accept, "{heading}: off by {off}, {found:?}");
+            assert!(
+                off < OFF || found.verdict != Verdict::Accept,
+                "{heading}: off by {off}, {found:?}"
+            );
         }
     }
 }
@@ -146,7 +162,11 @@ fn the_inside_of_a_thin_vessel_belongs_to_it() {
         let found = aligned(&object, &observed, &AlignSettings::default());
         let scale = found.camera_from_object.scale;
         assert!((scale - 1.0).abs() < 0.002, "wall {wall}: scale {scale}");
-        assert!((scale - 1.0).abs() < 5.0 * found.scale_std.max(1e-5), "{scale} ± {}", found.scale_std);
+        assert!(
+            (scale - 1.0).abs() < 5.0 * found.scale_std.max(1e-5),
+            "{scale} ± {}",
+            found.scale_std
+        );
         assert_eq!(found.verdict, Verdict::Accept, "{found:?}");
         let off = label_error(&object, &pose, &found.camera_from_object);
         assert!(off < 0.002, "wall {wall}: the handle is {off} off");
@@ -161,8 +181,11 @@ fn thousands_of_copies_of_a_triangle_cost_nothing() {
     let mesh = semfm_geom::Mesh::new(points, faces).unwrap();
     let object = Labelled { mesh, labelled: vec![0] };
     let pose = view(&object.mesh, 1.0, 0.3, 0.4, false, 0.5);
-    let points: Vec<DVec3> =
-        sample_uniform(&object.mesh, 3000, 1).unwrap().iter().map(|s| pose.apply(s.point)).collect();
+    let points: Vec<DVec3> = sample_uniform(&object.mesh, 3000, 1)
+        .unwrap()
+        .iter()
+        .map(|s| pose.apply(s.point))
+        .collect();
     let start = std::time::Instant::now();
     let observed = Observation::from_view(&points, DVec3::ZERO).unwrap();
     let _ = aligned(&object, &observed, &AlignSettings::default());

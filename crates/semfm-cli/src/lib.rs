@@ -14,8 +14,8 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show, transfer,
-    views,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show,
+    transfer, views,
 };
 use options::Common;
 pub use process::own_process;

@@ -73,8 +73,8 @@ pub use grasp::find_grasps;
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
 pub use object_size::ObjectSize;
-pub use pose_dependence::shares_of_poses;
 pub use pipeline::{
     EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
     prepare, semantic_cloud,
 };
+pub use pose_dependence::shares_of_poses;

@@ -71,8 +71,7 @@ mod tests {
         let turned = |angle: f64| Sim3 { rotation: DQuat::from_rotation_z(angle), ..pose };
         let alternatives = [0.3, 0.6, -0.6, 3.0].map(turned);
         // A cap around x, and all of the ball.
-        let cap: Vec<f64> =
-            ball.vertices().iter().map(|p| f64::from(p.x > 0.88)).collect();
+        let cap: Vec<f64> = ball.vertices().iter().map(|p| f64::from(p.x > 0.88)).collect();
         let whole = vec![1.0; ball.n_vertices()];
         let at = |angle: f64| 0.05 * DVec3::new(angle.cos(), angle.sin(), 0.0);
         let contacts = [[at(0.0), at(0.1)], [at(0.0), at(std::f64::consts::PI)]];

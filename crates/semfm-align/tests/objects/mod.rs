@@ -43,8 +43,11 @@ pub fn mug(of: Mug, segments: u32) -> Labelled {
     let mut profile = vec![[0.0, 0.0]];
     profile.extend((0..=4).map(|i| [at(0.0) * f64::from(i + 1) / 5.0, 0.0]));
     profile.extend((1..=rows).map(|i| height * f64::from(i) / f64::from(rows)).map(|z| [at(z), z]));
-    profile.extend((0..rows).map(|i| height - (height - wall) * f64::from(i) / f64::from(rows))
-        .map(|z| [at(z) - wall, z]));
+    profile.extend(
+        (0..rows)
+            .map(|i| height - (height - wall) * f64::from(i) / f64::from(rows))
+            .map(|z| [at(z) - wall, z]),
+    );
     profile.extend((0..5).map(|i| [(at(wall) - wall) * f64::from(4 - i) / 5.0, wall]));
     let (mut points, mut faces) = lathe(&profile, segments);
     let first = points.len() as u32;
@@ -94,8 +97,19 @@ pub fn lathe(profile: &[[f64; 2]], segments: u32) -> (Vec<DVec3>, Vec<[u32; 3]>)
 /// A bottle with a shoulder and a neck; what is labelled is a strip of its wall.
 pub fn bottle(segments: u32) -> Labelled {
     let profile = [
-        [0.0, 0.0], [0.015, 0.0], [0.03, 0.0], [0.03, 0.03], [0.03, 0.06], [0.03, 0.09], [0.03, 0.12],
-        [0.026, 0.14], [0.018, 0.16], [0.012, 0.175], [0.012, 0.2], [0.006, 0.2], [0.0, 0.2],
+        [0.0, 0.0],
+        [0.015, 0.0],
+        [0.03, 0.0],
+        [0.03, 0.03],
+        [0.03, 0.06],
+        [0.03, 0.09],
+        [0.03, 0.12],
+        [0.026, 0.14],
+        [0.018, 0.16],
+        [0.012, 0.175],
+        [0.012, 0.2],
+        [0.006, 0.2],
+        [0.0, 0.2],
     ];
     let (points, faces) = lathe(&profile, segments);
     let labelled = strip(&points, 0.03);
@@ -160,11 +174,19 @@ pub fn lumpy(of: &Labelled, height: f64, seed: u64) -> Labelled {
 
 /// A pose in which the camera looks at the object from `elevation` above its middle, the object
 /// turned by `heading` about its own z; upside down where told.
-pub fn view(mesh: &Mesh, scale: f64, heading: f64, elevation: f64, down: bool, distance: f64) -> Sim3 {
+pub fn view(
+    mesh: &Mesh,
+    scale: f64,
+    heading: f64,
+    elevation: f64,
+    down: bool,
+    distance: f64,
+) -> Sim3 {
     let centre = mesh.bounding_sphere().0;
     // World z up; the camera looks along +y of the world, tilted down.
     let flip = if down { DQuat::from_rotation_x(PI) } else { DQuat::IDENTITY };
-    let camera_from_world = DQuat::from_rotation_x(elevation) * DQuat::from_rotation_x(-PI / 2.0).inverse();
+    let camera_from_world =
+        DQuat::from_rotation_x(elevation) * DQuat::from_rotation_x(-PI / 2.0).inverse();
     let rotation = camera_from_world * flip * DQuat::from_rotation_z(heading);
     let translation = DVec3::new(0.01, -0.02, distance) - scale * (rotation * centre);
     Sim3 { scale, rotation, translation }
@@ -199,9 +221,8 @@ pub fn render(of: &Labelled, pose: &Sim3, noise: f64, wall: f64, seed: u64) -> S
     for pixel in 0..320 * 240u32 {
         let ray = camera.ray_in_camera(f64::from(pixel % 320) + 0.5, f64::from(pixel / 320) + 0.5);
         let away = centre.cross(ray.normalize()).length();
-        let hit = (away < radius)
-            .then(|| surface.first_hit(origin, back.apply(ray) - origin))
-            .flatten();
+        let hit =
+            (away < radius).then(|| surface.first_hit(origin, back.apply(ray) - origin)).flatten();
         if let Some(hit) = hit {
             let corners = of.mesh.faces()[hit.face as usize];
             n_labelled += usize::from(corners.iter().all(|&v| is_labelled[v as usize]));

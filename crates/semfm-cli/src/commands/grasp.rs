@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use semfm::align::Verdict;
 use semfm::demonstration::is_one_sided;
 use semfm::files::{
-    AlignedPose, GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle, read_region,
-    write_isaac_grasps, write_ros2_grasps,
+    AlignedPose, GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle,
+    read_region, write_isaac_grasps, write_ros2_grasps,
 };
 use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
