@@ -875,7 +875,8 @@ class Gripper:
 
 class HeatGeodesics:
     """Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
-    once, then every question costs two triangular solves.
+    once, then every question costs two triangular solves. Distances are those of the surface: vertices
+    at the same place (a UV seam, flat shading) are one point of it.
 
     Parameters
     ----------
@@ -1165,8 +1166,15 @@ class Mesh:
         read_mesh : the same with the colours of the file.
         """
         ...
-    def report(self) -> dict[str, Any]:
+    def report(self, *, stored: bool = False) -> dict[str, Any]:
         """What is regular and what is not: edges, components, boundaries, manifoldness.
+
+        They are those of the surface: vertices at the same place (a UV seam, flat shading) count as one.
+
+        Parameters
+        ----------
+        stored : bool, default False
+            Count vertices at the same place apart, as the file stores them.
 
         Returns
         -------
@@ -1191,6 +1199,29 @@ class Mesh:
     @property
     def vertices(self) -> NDArray[numpy.float64]:
         """(n, 3) float64 array: positions, a read-only view."""
+        ...
+    def weld(self) -> tuple[Mesh, NDArray[numpy.uint32]]:
+        """The surface that the vertices describe: those at the same place joined.
+
+        `Laplacian`, `Eigenbasis` and neighbours go by vertex ids, so that a UV seam is a cut to them;
+        give them this mesh. `Shape` and `HeatGeodesics` join by themselves.
+
+        Returns
+        -------
+        Mesh
+            The joined mesh (n_joined vertices), triangles in their order.
+        (n,) uint32 array
+            For each vertex of this mesh, its vertex in the joined one.
+
+        Examples
+        --------
+        >>> import numpy as np, semfm, semfm.zoo
+        >>> ball = semfm.zoo.icosphere(1)
+        >>> soup = semfm.Mesh(ball.vertices[ball.faces.ravel()], np.arange(240).reshape(80, 3))
+        >>> joined, of_original = soup.weld()
+        >>> joined.n_vertices, of_original.shape
+        (42, (240,))
+        """
         ...
     def write(self, path: _Path, *, colors: Optional[ArrayLike] = None, scalars: Optional[Mapping[str, Any]] = None) -> None:
         """Writes a mesh file, whole or not at all, in a format that ``mesh_formats()`` says is written.
@@ -1741,7 +1772,8 @@ class Region:
         ----------
         mesh : mesh_like
         contact : (3,) array_like
-            In the mesh's frame and units.
+            In the mesh's frame and units; refused where it is farther from the surface than 0.3 of
+            the bounding box's diagonal.
         radius : float
             In the mesh's units.
 

@@ -1,4 +1,7 @@
-//! Tests of the built binary and of the readers: what they share.
+//! Tests of the built binary, what they share, and the readers that are tried on damaged files.
 
+pub mod mutation;
+pub mod readers;
 pub mod sample;
+pub mod seeds;
 pub mod shell;

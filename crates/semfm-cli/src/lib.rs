@@ -3,6 +3,7 @@
 //! stdout is data, stderr is messages. Exit codes: 0 success, 1 a sound run without an answer (verdict
 //! `refuse`), 2 bad input or failure, a bug of ours included; 130 after Ctrl-C.
 
+mod address_space;
 mod commands;
 mod console;
 mod options;

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
+use crate::address_space::workers_that_fit;
+
 /// Options of every command.
 #[derive(Clone, Copy, Debug, Args)]
 #[command(next_help_heading = "General")]
@@ -24,10 +26,11 @@ pub struct Common {
 }
 
 impl Common {
-    /// Worker threads of this command's own: a process may run several commands, one after another.
+    /// Worker threads of this command's own: a process may run several commands, one after another. Under a limit of
+    /// address space there are no more than fit into it.
     pub fn workers(&self) -> Result<rayon::ThreadPool> {
         rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads)
+            .num_threads(workers_that_fit(self.threads))
             .build()
             .context("cannot start the worker threads")
     }

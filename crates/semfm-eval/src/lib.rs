@@ -36,7 +36,7 @@ pub mod workers;
 pub use bootstrap::{BootstrapSettings, PairDraws, PairKey};
 pub use calibration::{Calibration, RIGHT, ReliabilityBin, VerdictScore};
 pub use correspondence::{
-    CorrespondenceDataset, CorrespondenceSet, MAP_FORMAT, MapMethod, MapResults, MapRow,
+    AnnotatedMesh, CorrespondenceDataset, CorrespondenceSet, MAP_FORMAT, MapMethod, MapResults, MapRow,
     MapSettings, MapSummary, run_maps,
 };
 pub use dataset::Dataset;

@@ -22,8 +22,8 @@ impl FunctionalMap {
     /// C f = f ∘ T in the two bases: Φ_targetᵀ M_target Φ_source\[T\], of size `k` × `k`.
     ///
     /// # Errors
-    /// [`Error::BasisTooSmall`] where a basis holds fewer than `k` pairs, [`Error::Length`] where
-    /// the point map is not one of the target.
+    /// [`Error::OutOfRange`] for a `k` of 0, [`Error::BasisTooSmall`] where a basis holds fewer than `k` pairs,
+    /// [`Error::Length`] where the point map is not one of the target.
     pub fn from_point_map(
         map: &PointMap,
         source: &Eigenbasis,
@@ -90,6 +90,9 @@ impl FunctionalMap {
     /// ‖C Cᵀ − I‖ / √k_target (Frobenius): 0 where the map keeps areas.
     pub fn orthogonality(&self) -> f64 {
         let k = self.k_target();
+        if k == 0 {
+            return 0.0;
+        }
         let mut gram = &self.matrix * self.matrix.transpose();
         (0..k).for_each(|i| gram[(i, i)] -= 1.0);
         gram.norm_l2() / (k as f64).sqrt()
@@ -97,6 +100,9 @@ impl FunctionalMap {
 
     /// ‖C Λ_source − Λ_target C‖ / (λ_max ‖C‖) (Frobenius): 0 where the map keeps lengths.
     pub fn commutativity(&self, source: &Eigenbasis, target: &Eigenbasis) -> f64 {
+        if self.k_source() == 0 || self.k_target() == 0 {
+            return 0.0;
+        }
         let (c, s, t) = (&self.matrix, &source.values, &target.values);
         let largest = s[self.k_source() - 1].max(t[self.k_target() - 1]);
         let defect = Mat::from_fn(c.nrows(), c.ncols(), |i, j| c[(i, j)] * (s[j] - t[i]));
@@ -110,6 +116,9 @@ pub(crate) fn check_size(
     source: &Eigenbasis,
     target: &Eigenbasis,
 ) -> Result<()> {
+    if asked == 0 {
+        return Error::out_of_range(what, "at least one pair of basis functions", asked);
+    }
     for (side, basis) in [("source", source), ("target", target)] {
         let available = basis.k();
         if asked > available {

@@ -264,12 +264,17 @@ impl PreparedObject {
         out
     }
 
-    /// Whether each working vertex (n) is in a region of the original mesh. A region so small that
-    /// simplification left none of its vertices keeps the working vertices nearest to it.
+    /// Whether each working vertex (n) is in a region of the original mesh: of doubled vertices at one place (a UV seam)
+    /// any will do. A region so small that simplification left none of its vertices keeps the working vertices nearest
+    /// to it.
     pub(crate) fn region_on_working(&self, inside: &[bool]) -> Vec<bool> {
-        let working = self.shape().working();
+        let (working, vertices) = (self.shape().working(), self.shape().original().vertices());
         let mut on_working: Vec<bool> =
             working.to_original.iter().map(|&v| inside[v as usize]).collect();
+        for (v, &w) in working.of_original.iter().enumerate().filter(|&(v, _)| inside[v]) {
+            let kept = working.to_original[w as usize] as usize;
+            on_working[w as usize] |= vertices[v] == vertices[kept];
+        }
         if !on_working.contains(&true) {
             for (&w, _) in working.of_original.iter().zip(inside).filter(|(_, inside)| **inside) {
                 on_working[w as usize] = true;

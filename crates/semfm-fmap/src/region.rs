@@ -24,6 +24,9 @@ impl Region {
     /// The weight from which a vertex counts as inside.
     pub const COUNTS: f64 = 0.5;
 
+    /// Most vertices of the mesh that a region of named vertices may belong to: a weight each makes a gigabyte.
+    pub const MOST_VERTICES: usize = 1 << 27;
+
     /// A region from one weight per vertex (n).
     ///
     /// # Errors
@@ -39,8 +42,13 @@ impl Region {
     /// A region of full weight on the named vertices of a mesh with `n_vertices`; ids may repeat.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for an id that the mesh does not have.
+    /// [`Error::OutOfRange`] for an id that the mesh does not have, and for more vertices than
+    /// [`Region::MOST_VERTICES`].
     pub fn from_vertices(n_vertices: usize, vertices: &[u32]) -> Result<Self> {
+        if n_vertices > Self::MOST_VERTICES {
+            let expected = format!("at most {}", Self::MOST_VERTICES);
+            return Error::out_of_range("vertices of a region's mesh", expected, n_vertices);
+        }
         let mut weights = vec![0.0; n_vertices];
         for &v in vertices {
             let Some(weight) = weights.get_mut(v as usize) else {
@@ -97,6 +105,8 @@ mod tests {
         assert_eq!(by_id, Region::from_mask(&by_id.mask()));
         let beyond = Region::from_vertices(4, &[4]).unwrap_err().to_string();
         assert!(beyond.contains("below 4") && beyond.contains("found 4"), "{beyond}");
+        let many = Region::from_vertices(1 << 31, &[]).unwrap_err().to_string();
+        assert!(many.contains("at most 134217728"), "{many}");
         let nan = Region::from_weights(vec![0.0, f64::NAN]).unwrap_err().to_string();
         assert!(nan.contains("vertex 1"), "{nan}");
         assert!(Region::from_weights(vec![0.49; 3]).unwrap().is_empty());

@@ -1,11 +1,12 @@
 //! Cleaning: a mesh from anywhere made fit for a Laplacian, with every step counted.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use crate::disjoint_sets::DisjointSets;
+use crate::weld::first_at_place;
 use crate::{Error, Mesh, Result};
 
 /// How a mesh is cleaned.
@@ -130,15 +131,6 @@ pub fn clean(mesh: &Mesh, settings: &CleanSettings) -> Result<Cleaned> {
         report.n_vertices_before - report.welded_vertices - mesh.n_vertices();
     (report.n_vertices, report.n_faces) = (mesh.n_vertices(), mesh.n_faces());
     Ok(Cleaned { mesh, of_original, to_original, report })
-}
-
-/// For each vertex the first one with exactly its coordinates (−0 is 0).
-fn first_at_place(mesh: &Mesh) -> Vec<u32> {
-    let mut first = HashMap::with_capacity(mesh.n_vertices());
-    (0u32..)
-        .zip(mesh.vertices())
-        .map(|(id, p)| *first.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert(id))
-        .collect()
 }
 
 /// The triangles with three different corners, once each, on welded ids.

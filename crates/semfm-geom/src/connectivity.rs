@@ -4,14 +4,15 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Mesh;
+use crate::{Mesh, Welded};
 use crate::disjoint_sets::DisjointSets;
 use crate::math::DVec3;
 
 /// What is regular and what is not about the connectivity of a mesh.
 ///
-/// An edge is a pair of vertices that a triangle with three different vertices joins. Counts are of the mesh as it
-/// stands: vertices at the same place are different vertices until somebody merges them.
+/// Vertices, triangles and isolated vertices are those of the file. Edges, components, boundaries and what follows from
+/// them are those of the surface: vertices at the same place count as one ([`Welded`]), so that a UV seam or flat
+/// shading is no boundary. An edge is a pair of places that a triangle with three different ones joins.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MeshReport {
     /// Vertices.
@@ -20,7 +21,7 @@ pub struct MeshReport {
     pub n_triangles: usize,
     /// Edges.
     pub n_edges: usize,
-    /// Parts that share no vertex, isolated vertices not counted.
+    /// Parts that share no place, isolated vertices not counted.
     pub components: usize,
     /// Edges of exactly one triangle.
     pub boundary_edges: usize,
@@ -30,7 +31,7 @@ pub struct MeshReport {
     pub non_manifold_vertices: usize,
     /// Triangles that name a vertex twice or have no area.
     pub degenerate_faces: usize,
-    /// Triangles that name the same three vertices as one before them.
+    /// Triangles on the same three places as one before them.
     pub duplicate_faces: usize,
     /// Vertices of no triangle.
     pub isolated_vertices: usize,
@@ -45,12 +46,22 @@ pub struct MeshReport {
 }
 
 impl MeshReport {
-    /// Looks at a mesh.
+    /// Looks at the surface of a mesh.
     pub fn new(mesh: &Mesh) -> Self {
+        let Welded { mesh: welded, to_original, .. } = Welded::new(mesh);
+        let duplicate_positions = mesh.n_vertices() - to_original.len();
+        Self {
+            n_vertices: mesh.n_vertices(),
+            isolated_vertices: isolated_vertices(mesh),
+            duplicate_positions,
+            ..Self::as_stored(&welded)
+        }
+    }
+
+    /// Looks at a mesh as it is stored: vertices at the same place are different ones, and every seam is a boundary.
+    pub fn as_stored(mesh: &Mesh) -> Self {
         let sides = Sides::new(mesh);
-        let mut used = vec![false; mesh.n_vertices()];
-        mesh.faces().iter().flatten().for_each(|&id| used[id as usize] = true);
-        let isolated_vertices = used.iter().filter(|&&used| !used).count();
+        let isolated_vertices = isolated_vertices(mesh);
         let (mut n_edges, mut boundary_edges, mut non_manifold_edges) = (0, 0, 0);
         let mut oriented = true;
         for edge in sides.by_edge() {
@@ -64,14 +75,14 @@ impl MeshReport {
             n_vertices: mesh.n_vertices(),
             n_triangles: mesh.n_faces(),
             n_edges,
-            components: components(mesh).count - isolated_vertices,
+            components: parts(mesh).count - isolated_vertices,
             boundary_edges,
             non_manifold_edges,
             non_manifold_vertices: non_manifold_vertices(mesh, &sides),
             degenerate_faces: (0..mesh.n_faces()).filter(|&face| is_degenerate(mesh, face)).count(),
             duplicate_faces: duplicate_faces(mesh),
             isolated_vertices,
-            duplicate_positions: duplicate_positions(mesh),
+            duplicate_positions: mesh.n_vertices() - Welded::new(mesh).to_original.len(),
             edge_manifold: non_manifold_edges == 0,
             watertight: non_manifold_edges == 0 && boundary_edges == 0 && n_edges > 0,
             oriented,
@@ -79,13 +90,14 @@ impl MeshReport {
     }
 }
 
-/// The edges of a mesh, each once, lower id first, sorted.
+/// The edges of a mesh as it is stored, each once, lower id first, sorted. Those of its surface, seams closed, are the
+/// edges of [`Welded::mesh`].
 pub fn edges(mesh: &Mesh) -> Vec<[u32; 2]> {
     let sides = Sides::new(mesh);
     sides.by_edge().map(|edge| sides.ends(edge[0])).collect()
 }
 
-/// Which part of the mesh each vertex belongs to.
+/// Which part of the surface each vertex belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Components {
     /// For each vertex (n), the number of its part, from 0 in the order of their lowest vertices.
@@ -94,8 +106,15 @@ pub struct Components {
     pub count: usize,
 }
 
-/// Parts of the mesh that no triangle joins.
+/// Parts of the surface that no triangle joins; vertices at one place belong to one part ([`Welded`]).
 pub fn components(mesh: &Mesh) -> Components {
+    let Welded { mesh: welded, of_original, .. } = Welded::new(mesh);
+    let Components { of_vertex, count } = parts(&welded);
+    Components { of_vertex: of_original.iter().map(|&id| of_vertex[id as usize]).collect(), count }
+}
+
+/// Parts of the mesh as it is stored.
+fn parts(mesh: &Mesh) -> Components {
     let mut sets = DisjointSets::new(mesh.n_vertices());
     for &[a, b, c] in mesh.faces() {
         sets.join(a, b);
@@ -111,7 +130,7 @@ pub fn components(mesh: &Mesh) -> Components {
     Components { of_vertex, count: number_of_root.len() }
 }
 
-/// The neighbours of every vertex along edges.
+/// The neighbours of every vertex along the edges of a mesh as it is stored, see [`edges`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VertexAdjacency {
     starts: Vec<usize>,
@@ -255,12 +274,10 @@ fn duplicate_faces(mesh: &Mesh) -> usize {
     faces.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
 
-fn duplicate_positions(mesh: &Mesh) -> usize {
-    // Adding zero turns −0 into 0, which is the same place.
-    let mut places: Vec<_> =
-        mesh.vertices().iter().map(|p| p.to_array().map(|x| (x + 0.0).to_bits())).collect();
-    places.sort_unstable();
-    places.windows(2).filter(|pair| pair[0] == pair[1]).count()
+fn isolated_vertices(mesh: &Mesh) -> usize {
+    let mut used = vec![false; mesh.n_vertices()];
+    mesh.faces().iter().flatten().for_each(|&id| used[id as usize] = true);
+    used.iter().filter(|&&used| !used).count()
 }
 
 #[cfg(test)]
@@ -304,6 +321,20 @@ mod tests {
         assert_eq!((report.duplicate_faces, report.degenerate_faces), (1, 2));
         assert_eq!((report.isolated_vertices, report.duplicate_positions), (1, 1));
         assert_eq!(report.components, 2);
+    }
+
+    #[test]
+    fn a_seam_is_no_boundary_and_flat_shading_no_crowd_of_parts() {
+        let sphere = crate::zoo::icosphere(2);
+        let soup = crate::zoo::as_soup(&sphere);
+        let (whole, cut) = (MeshReport::new(&sphere), MeshReport::new(&soup));
+        assert!(cut.watertight && cut.oriented);
+        assert_eq!((cut.components, cut.n_edges), (1, whole.n_edges));
+        assert_eq!((cut.n_vertices, cut.duplicate_positions), (960, 960 - 162));
+        let stored = MeshReport::as_stored(&soup);
+        assert_eq!((stored.components, stored.boundary_edges), (320, 960));
+        assert_eq!(stored.duplicate_positions, cut.duplicate_positions);
+        assert_eq!(components(&soup), Components { of_vertex: vec![0; 960], count: 1 });
     }
 
     #[test]

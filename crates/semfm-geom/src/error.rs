@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::Mesh;
 use crate::io::FormatError;
+use crate::math::DVec3;
 
 /// Result of a call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -27,6 +29,22 @@ pub enum Error {
     NotFinite {
         /// Vertex id, 0-based.
         vertex: usize,
+        /// First coordinate.
+        x: f64,
+        /// Second coordinate.
+        y: f64,
+        /// Third coordinate.
+        z: f64,
+    },
+    /// A coordinate is so large that areas and volumes of it lose their meaning.
+    #[error(
+        "vertex {vertex} has a coordinate beyond ±{most:e}: ({x:e}, {y:e}, {z:e}); is the file damaged, or its unit odd?"
+    )]
+    TooFar {
+        /// Vertex id, 0-based.
+        vertex: usize,
+        /// Largest coordinate that is taken.
+        most: f64,
         /// First coordinate.
         x: f64,
         /// Second coordinate.
@@ -140,6 +158,19 @@ pub enum Error {
 }
 
 impl Error {
+    /// [`Error::NotFinite`] or [`Error::TooFar`] for the first point that cannot be one of a surface.
+    pub(crate) fn check_points(points: &[DVec3]) -> Result<()> {
+        // The largest of several numbers passes over NaN.
+        let far = |p: &DVec3| !p.is_finite() || p.abs().max_element() > Mesh::MAX_COORDINATE;
+        let Some(vertex) = points.iter().position(far) else { return Ok(()) };
+        let DVec3 { x, y, z } = points[vertex];
+        Err(if points[vertex].is_finite() {
+            Self::TooFar { vertex, most: Mesh::MAX_COORDINATE, x, y, z }
+        } else {
+            Self::NotFinite { vertex, x, y, z }
+        })
+    }
+
     /// [`Error::Length`] unless both counts are the same.
     pub(crate) fn check_length(what: &'static str, expected: usize, found: usize) -> Result<()> {
         if expected == found { Ok(()) } else { Err(Self::Length { what, expected, found }) }
@@ -157,6 +188,7 @@ impl Error {
         match self {
             Self::EmptyMesh { .. } => "no-faces",
             Self::NotFinite { .. } => "non-finite",
+            Self::TooFar { .. } => "too-large",
             Self::VertexOutOfRange { .. } => "index-out-of-range",
             Self::NoArea { .. } => "no-area",
             Self::Length { .. } => "length",
@@ -176,7 +208,7 @@ impl Error {
     /// has no place.
     pub fn place(&self) -> Option<String> {
         match self {
-            Self::NotFinite { vertex, .. } => Some(format!("vertex {vertex}")),
+            Self::NotFinite { vertex, .. } | Self::TooFar { vertex, .. } => Some(format!("vertex {vertex}")),
             Self::VertexOutOfRange { face, .. } => Some(format!("triangle {face}")),
             Self::NotPositiveDefinite { row, .. } => Some(format!("row {row}")),
             Self::Format(error) => Some(error.place.clone()),

@@ -9,7 +9,7 @@ use crate::connectivity::Components;
 use crate::laplacian::{
     LaplacianKind, PlanarTriangle, TuftedSettings, components, laplacian_and_triangles,
 };
-use crate::{Error, Mesh, Result};
+use crate::{Error, Mesh, Result, Welded, without_repeated_faces};
 
 /// How geodesic distances are computed.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +35,9 @@ const BLOCK: usize = 16;
 /// Geodesic distances on one mesh: two matrices are factorised once, then every set of sources
 /// costs two triangular solves.
 ///
+/// Distances are those of the surface: vertices at one place (a UV seam, flat shading, a soup) are one point of it
+/// ([`Welded`]) and have one distance.
+///
 /// ```
 /// use semfm_geom::{Mesh, geodesic::HeatGeodesics, math::DVec3};
 /// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
@@ -51,7 +54,9 @@ pub struct HeatGeodesics {
     /// S, grounded at one vertex of each component.
     poisson: SparseCholesky,
     triangles: Vec<PlanarTriangle>,
-    /// Connected piece of each vertex (n).
+    /// For each vertex of the mesh (n), its place on the surface.
+    place_of_vertex: Vec<u32>,
+    /// Connected piece of each place (n_places).
     components: Vec<u32>,
 }
 
@@ -68,8 +73,11 @@ impl HeatGeodesics {
                 ("heat method time", "a positive number of squared mean edges".into());
             return Err(Error::OutOfRange { what, expected, found: settings.time.to_string() });
         }
+        let Welded { mesh: welded, of_original: place_of_vertex, .. } = Welded::new(mesh);
+        // Layers upon layers of one triangle change no distance.
+        let surface = without_repeated_faces(&welded).unwrap_or(welded);
         let (laplacian, triangles) =
-            laplacian_and_triangles(mesh, settings.kind, &TuftedSettings::default())?;
+            laplacian_and_triangles(&surface, settings.kind, &TuftedSettings::default())?;
         let Components { of_vertex: components, count: n_components } =
             components(laplacian.n_vertices(), &laplacian.stiffness);
         let time = settings.time * mean_edge(&triangles).powi(2);
@@ -92,13 +100,14 @@ impl HeatGeodesics {
             heat: SparseCholesky::new(heat.as_ref())?,
             poisson: SparseCholesky::new(poisson.as_ref())?,
             triangles,
+            place_of_vertex,
             components,
         })
     }
 
     /// Number of vertices n.
     pub fn n_vertices(&self) -> usize {
-        self.components.len()
+        self.place_of_vertex.len()
     }
 
     /// Distance of every vertex (n) from the nearest of `sources`, in the units of the mesh;
@@ -112,7 +121,7 @@ impl HeatGeodesics {
     /// [`Error::Length`] for no sources, [`Error::OutOfRange`] for an id beyond the vertices.
     pub fn distances(&self, sources: &[u32]) -> Result<Vec<f64>> {
         let distances = self.solve(&[sources])?;
-        Ok(distances.col(0).iter().copied().collect())
+        Ok(self.place_of_vertex.iter().map(|&place| distances[(place as usize, 0)]).collect())
     }
 
     /// Distances (n × s) from each of s sources alone, one column each: a little faster
@@ -125,12 +134,15 @@ impl HeatGeodesics {
         for (block, ids) in sources.chunks(BLOCK).enumerate() {
             let sets: Vec<&[u32]> = ids.chunks(1).collect();
             let columns = self.solve(&sets)?;
-            all.as_mut().subcols_mut(block * BLOCK, ids.len()).copy_from(columns);
+            let mut block = all.as_mut().subcols_mut(block * BLOCK, ids.len());
+            for (i, &place) in self.place_of_vertex.iter().enumerate() {
+                block.as_mut().row_mut(i).copy_from(columns.row(place as usize));
+            }
         }
         Ok(all)
     }
 
-    /// Distances (n × number of sets) from each set of sources.
+    /// Distances (n_places × number of sets) from each set of sources.
     fn solve(&self, sets: &[&[u32]]) -> Result<Mat<f64>> {
         let n = self.n_vertices();
         for (what, id) in sets.iter().flat_map(|set| set.iter().map(|&id| ("source vertex", id))) {
@@ -142,19 +154,30 @@ impl HeatGeodesics {
         if sets.iter().any(|set| set.is_empty()) {
             return Err(Error::Length { what: "source vertices", expected: 1, found: 0 });
         }
+        // Doubled vertices among the sources are one source.
+        let places: Vec<Vec<u32>> = sets.iter().map(|set| self.places(set)).collect();
         // (M + t S) u = δ: heat after a short time.
-        let mut u = Mat::zeros(n, sets.len());
-        for (j, set) in sets.iter().enumerate() {
+        let mut u = Mat::zeros(self.components.len(), sets.len());
+        for (j, set) in places.iter().enumerate() {
             set.iter().for_each(|&id| u[(id as usize, j)] = 1.0);
         }
         self.heat.solve_in_place(u.as_mut());
         // S φ = −∇ · X with X = −∇u / |∇u|: the function whose gradient runs away from the heat.
         let mut phi = self.negative_divergence(u.as_ref());
         self.poisson.solve_in_place(phi.as_mut());
-        for (j, set) in sets.iter().enumerate() {
+        for (j, set) in places.iter().enumerate() {
             self.anchor(phi.col_as_slice_mut(j), set);
         }
         Ok(phi)
+    }
+
+    /// The places of some vertices, ascending, each once.
+    fn places(&self, vertices: &[u32]) -> Vec<u32> {
+        let mut places: Vec<u32> =
+            vertices.iter().map(|&id| self.place_of_vertex[id as usize]).collect();
+        places.sort_unstable();
+        places.dedup();
+        places
     }
 
     /// Integrated −∇ · X around each vertex (Crane et al. 2013), X = −∇u / |∇u|.
@@ -244,7 +267,9 @@ mod tests {
             let distances = geodesics.distances(&[source]).unwrap();
             assert_eq!(distances[source as usize], 0.0, "{name}");
             for (i, d) in distances.iter().enumerate() {
-                let joined = geodesics.components[i] == geodesics.components[source as usize];
+                let [here, there] = [i, source as usize]
+                    .map(|v| geodesics.components[geodesics.place_of_vertex[v] as usize]);
+                let joined = here == there;
                 assert_eq!(d.is_finite(), joined, "{name}: vertex {i} at {d}");
                 assert!(
                     *d >= 0.0 && (!joined || *d < 4.0 * mesh.diagonal()),
@@ -272,6 +297,26 @@ mod tests {
             let nearest = each[(i, 0)].min(each[(i, 11)]);
             // The longest edge here is 0.25; one function for both sources is good to about that.
             assert!((d - nearest).abs() < 0.25, "vertex {i}: {d} together, {nearest} apart");
+        }
+    }
+
+    #[test]
+    fn a_soup_has_the_distances_of_the_mesh_it_was_cut_from() {
+        for mesh in [zoo::icosphere(3), zoo::open_grid(12, 9)] {
+            let soup = zoo::as_soup(&mesh);
+            let whole = HeatGeodesics::new(&mesh, &Default::default()).unwrap();
+            let cut = HeatGeodesics::new(&soup, &Default::default()).unwrap();
+            // Corners 0 and 1 of triangle 17, which also belong to its neighbours.
+            let there = [mesh.faces()[17][0], mesh.faces()[17][1]];
+            let (a, b) = (whole.distances(&there).unwrap(), cut.distances(&[51, 52]).unwrap());
+            let each = cut.distances_from_each(&[51]).unwrap();
+            let alone = whole.distances(&there[..1]).unwrap();
+            for (corner, &id) in mesh.faces().as_flattened().iter().enumerate() {
+                // The systems are the same up to the order of unknowns.
+                assert!((a[id as usize] - b[corner]).abs() < 1e-9, "corner {corner}");
+                assert!((alone[id as usize] - each[(corner, 0)]).abs() < 1e-9, "corner {corner}");
+            }
+            assert_eq!(cut.n_vertices(), soup.n_vertices());
         }
     }
 

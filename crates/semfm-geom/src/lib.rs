@@ -35,6 +35,7 @@ pub mod suggestion;
 mod surface;
 mod task;
 mod verdict;
+mod weld;
 mod working_mesh;
 #[cfg(any(test, feature = "zoo"))]
 pub mod zoo;
@@ -59,4 +60,5 @@ pub use simplify::{Simplified, SimplifyReport, SimplifySettings, Topology, simpl
 pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::{Progress, Task};
 pub use verdict::Verdict;
+pub use weld::{Welded, without_repeated_faces};
 pub use working_mesh::{BarycentricPoint, PreparedWorkingMesh, WorkingMesh};

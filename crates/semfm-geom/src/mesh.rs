@@ -38,18 +38,20 @@ impl PartialEq for Mesh {
 }
 
 impl Mesh {
+    /// Largest coordinate of a vertex, in any unit: lengths squared, areas squared and volumes of such numbers are
+    /// still finite, in single precision the lengths themselves are.
+    pub const MAX_COORDINATE: f64 = 1e30;
+
     /// Checks and keeps the arrays as they are: no vertex is moved, merged or dropped.
     ///
     /// # Errors
-    /// [`Error::EmptyMesh`], [`Error::NotFinite`] or [`Error::VertexOutOfRange`], naming the item.
+    /// [`Error::EmptyMesh`], [`Error::NotFinite`], [`Error::TooFar`] beyond [`Mesh::MAX_COORDINATE`], or
+    /// [`Error::VertexOutOfRange`], naming the item.
     pub fn new(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Result<Self> {
         if vertices.is_empty() || faces.is_empty() {
             return Err(Error::EmptyMesh { n_vertices: vertices.len(), n_faces: faces.len() });
         }
-        if let Some(vertex) = vertices.iter().position(|p| !p.is_finite()) {
-            let p = vertices[vertex];
-            return Err(Error::NotFinite { vertex, x: p.x, y: p.y, z: p.z });
-        }
+        Error::check_points(&vertices)?;
         let n_vertices = vertices.len();
         for (face, ids) in faces.iter().enumerate() {
             if let Some(&id) = ids.iter().find(|&&id| id as usize >= n_vertices) {
@@ -263,8 +265,13 @@ mod tests {
         let mut points = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
         points[1].y = f64::NAN;
         assert!(matches!(
-            Mesh::new(points, vec![[0, 1, 2]]),
+            Mesh::new(points.clone(), vec![[0, 1, 2]]),
             Err(Error::NotFinite { vertex: 1, .. })
+        ));
+        points[1].y = -1e300;
+        assert!(matches!(
+            Mesh::new(points, vec![[0, 1, 2]]),
+            Err(Error::TooFar { vertex: 1, .. })
         ));
     }
 

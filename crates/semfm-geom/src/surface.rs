@@ -9,6 +9,7 @@ use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray};
 use parry3d_f64::shape::Triangle;
 
 use crate::math::DVec3;
+use crate::weld::repeated_faces;
 use crate::{Error, Mesh, Result};
 
 /// Bounding boxes are widened by this share of the diagonal, so that rounding in the slab test
@@ -43,7 +44,7 @@ pub struct RayHit {
 /// A tree of boxes over the triangles of a mesh: built once, asked often, from any thread.
 ///
 /// Triangles without area are left out: they have no inside, and their neighbours cover their
-/// edges. Both sides of a triangle count, whatever its winding.
+/// edges. So are those that coincide with an earlier one. Both sides of a triangle count, whatever its winding.
 ///
 /// ```
 /// use semfm_geom::{Mesh, SurfaceIndex, math::DVec3};
@@ -68,8 +69,10 @@ impl SurfaceIndex {
     /// # Errors
     /// [`Error::NoArea`] where every triangle is degenerate.
     pub fn new(mesh: &Mesh) -> Result<Self> {
+        let repeated = repeated_faces(mesh);
         let triangles: Vec<([DVec3; 3], u32)> = (0..mesh.n_faces())
             .filter(|&face| mesh.face_area(face) > 0.0)
+            .filter(|&face| repeated.as_ref().is_none_or(|repeated| !repeated[face]))
             .map(|face| (mesh.corners(face), face as u32))
             .collect();
         if triangles.is_empty() {

@@ -127,7 +127,7 @@ impl WorkingMesh {
         self.point_of_original.iter().map(|point| point.mix(values)).collect()
     }
 
-    /// Values on the original's vertices, read off at the vertices that were kept.
+    /// Values on the original's vertices, read off at the vertices that were kept; of several at one place, at the first.
     pub fn onto_working(&self, values: &[f64]) -> Vec<f64> {
         assert_eq!(values.len(), self.point_of_original.len(), "one value per original vertex");
         self.to_original.iter().map(|&id| values[id as usize]).collect()

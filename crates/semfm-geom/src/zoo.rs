@@ -221,6 +221,13 @@ pub fn degenerate_faces() -> Mesh {
     mesh(vertices, faces)
 }
 
+/// The same triangles, each with three vertices of its own, as STL files and flat shading have them.
+pub fn as_soup(mesh: &Mesh) -> Mesh {
+    let vertices = mesh.faces().iter().flatten().map(|&id| mesh.vertices()[id as usize]);
+    let faces = (0..mesh.n_faces() as u32).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]);
+    self::mesh(vertices.collect(), faces.collect())
+}
+
 /// `n` points on the unit sphere along a golden-angle spiral (no mesh: for point clouds).
 pub fn spiral_cloud(n: usize) -> Vec<DVec3> {
     let golden = PI * (3.0 - 5f64.sqrt());

@@ -130,7 +130,8 @@ fn the_report_agrees_with_the_features_in_the_manifest() {
         {
             continue;
         }
-        let report = MeshReport::new(&file.mesh);
+        // The manifest counts vertices at one place apart.
+        let report = MeshReport::as_stored(&file.mesh);
         let features = [
             ("boundary-edges", report.boundary_edges, 0),
             ("nonmanifold-edges", report.non_manifold_edges, 0),

@@ -132,6 +132,26 @@ fn a_broken_image_leaves_the_geometry_and_a_reason() {
 }
 
 #[test]
+fn points_that_are_no_return_are_left_out_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
+               nan nan nan 1 2 3\n1 2 3 4 5 6\n0 nan 0 7 8 9\n";
+    let pcd = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\nPOINTS 3\n\
+               DATA ascii\nnan nan nan\n1 2 3\n0 nan 0\n";
+    for (name, text) in [("a.ply", ply), ("a.pcd", pcd), ("a.obj", "v nan 0 0\nv 1 2 3\n")] {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        let cloud = read_points(&path).unwrap();
+        assert_eq!(cloud.points, [DVec3::new(1.0, 2.0, 3.0)], "{name}");
+        let colors = cloud.colors.unwrap_or(vec![[4, 5, 6, 255]]);
+        assert_eq!(colors, [[4, 5, 6, 255]], "{name}");
+        fs::write(&path, text.replace("1 2 3", "1 inf 3")).unwrap();
+        assert_eq!(read_points(&path).unwrap_err().code(), "non-finite", "{name}");
+    }
+}
+
+#[test]
 fn damaged_bytes_never_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let interesting =
@@ -180,6 +200,7 @@ fn errors_say_where_and_what() {
     assert_eq!(place("a.obj", "v 0 0 0\nf 1 2 1\n").1, "line 2");
     assert_eq!(place("a.obj", "v 0 0 0\nl 1 1\n").0, "no-faces");
     assert_eq!(place("a.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3").0, "non-finite");
+    assert_eq!(place("a.obj", "v 0 0 1e300\nv 1 0 0\nv 0 1 0\nf 1 2 3").0, "too-large");
     assert_eq!(place("a.off", "OFF\n1 1 0\n0 0 0\n3 0 0 1\n").1, "line 4");
     let ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n\
                property float y\nproperty float z\nend_header\n";

@@ -207,7 +207,7 @@ impl<'a> Gpg<'a> {
             let y = along.dot(*p);
             let x = across.dot(*p);
             if x.abs() <= half_width && y.abs() < span {
-                let i = ((y + span) / BIN) as usize;
+                let i = self.bin(span, y);
                 let z = ahead.dot(*p);
                 self.first[i] = self.first[i].min(z);
                 self.slab.push((DVec3::new(x, y, z), along.dot(*n)));

@@ -10,7 +10,7 @@ use semfm_geom::math::DVec3;
 
 use crate::solid::Convex;
 use crate::{Error, Result};
-use semfm_robot::{Gripper, Role};
+use semfm_robot::{Gripper, MAX_SPAN, Role};
 
 type Motion = Arc<dyn Fn(f64) -> Vec<Pose> + Send + Sync>;
 
@@ -111,7 +111,7 @@ impl GripperGeometry {
     /// A gripper of three boxes.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for an opening or a pad without size.
+    /// [`Error::OutOfRange`] for an opening or a pad without size, and for lengths beyond any hand's.
     pub fn from_boxes(boxes: &BoxGripper) -> Result<Self> {
         let [width, thickness, length] = boxes.finger.map(|extent| extent / 2.0);
         let palm = DVec3::from_array(boxes.palm) / 2.0;
@@ -152,6 +152,12 @@ impl GripperGeometry {
             return Err(out_of_range("poses of the gripper's parts", "finite numbers", "others"));
         }
         let reach = GripperExtents::of(&pieces, &motion(most), most, pad);
+        let lengths = [most, pad[0], pad[1], reach.tip.abs(), reach.palm.abs(), reach.outer];
+        let lengths = [&lengths[..], &[reach.finger_width, reach.finger_thickness]].concat();
+        if let Some(length) = lengths.iter().find(|length| !(**length <= 2.0 * MAX_SPAN)) {
+            let expected = format!("lengths of at most {} m", 2.0 * MAX_SPAN);
+            return Err(out_of_range("gripper", &expected, &format!("{length:.3e}")));
+        }
         Ok(Self { opening, pad, pieces, motion, reach })
     }
 
@@ -263,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_hand_that_cannot_hold_is_refused() {
-        for opening in [0.08..=0.02, -0.01..=0.08, 0.0..=f64::INFINITY] {
+        for opening in [0.08..=0.02, -0.01..=0.08, 0.0..=f64::INFINITY, 0.0..=1e12] {
             assert!(
                 GripperGeometry::from_boxes(&BoxGripper { opening, ..BoxGripper::default() })
                     .is_err()

@@ -7,7 +7,7 @@ use rand::{Rng, RngExt};
 use semfm_geom::connectivity::{MeshReport, components};
 use semfm_geom::math::{DMat3, DVec3};
 use semfm_geom::sampling::sample_uniform;
-use semfm_geom::{Mesh, PointIndex};
+use semfm_geom::{Mesh, PointIndex, without_repeated_faces};
 
 use crate::obstacle::Obstacle;
 use crate::settings::direction;
@@ -75,6 +75,8 @@ impl GraspObject {
         }
         let vertices = mesh.vertices().iter().map(|&p| p * scale).collect();
         let mesh = Mesh::new(vertices, mesh.faces().to_vec())?;
+        // Of a pile of coincident triangles one is enough to touch, and all of them together are no surface of a body.
+        let mesh = without_repeated_faces(&mesh).unwrap_or(mesh);
         let report = MeshReport::new(&mesh);
         let signed = report.watertight && report.oriented;
         let outward = if signed { outward_signs(&mesh) } else { vec![1.0; mesh.n_faces()] };

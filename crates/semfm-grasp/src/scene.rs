@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use semfm_geom::Mesh;
+use semfm_geom::{Mesh, without_repeated_faces};
 use semfm_geom::math::DVec3;
 
 use crate::obstacle::Obstacle;
@@ -49,7 +49,8 @@ impl Scene {
     /// Adds a mesh: nothing of the gripper may touch a triangle of it, nor be inside where it is
     /// watertight.
     pub fn with_mesh(mut self, mesh: &Mesh) -> Self {
-        self.obstacles.push(Obstacle::of_mesh(mesh));
+        let distinct = without_repeated_faces(mesh);
+        self.obstacles.push(Obstacle::of_mesh(distinct.as_ref().unwrap_or(mesh)));
         self
     }
 

@@ -13,7 +13,8 @@ use crate::mesh::{Mesh, from_any};
 use crate::shared::Shared;
 
 /// Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
-/// once, then every question costs two triangular solves.
+/// once, then every question costs two triangular solves. Distances are those of the surface: vertices
+/// at the same place (a UV seam, flat shading) are one point of it.
 ///
 /// Parameters
 /// ----------

@@ -215,6 +215,13 @@ impl Mesh {
 
     /// What is regular and what is not: edges, components, boundaries, manifoldness.
     ///
+    /// They are those of the surface: vertices at the same place (a UV seam, flat shading) count as one.
+    ///
+    /// Parameters
+    /// ----------
+    /// stored : bool, default False
+    ///     Count vertices at the same place apart, as the file stores them.
+    ///
     /// Returns
     /// -------
     /// dict
@@ -225,9 +232,11 @@ impl Mesh {
     /// >>> import semfm.zoo
     /// >>> semfm.zoo.icosphere(2).report()["watertight"]
     /// True
-    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (*, stored=false))]
+    fn report<'py>(&self, py: Python<'py>, stored: bool) -> PyResult<Bound<'py, PyAny>> {
         let mesh = self.inner.clone();
-        let report = run(py, None, move |_| Ok(MeshReport::new(&mesh)))?;
+        let of = if stored { MeshReport::as_stored } else { MeshReport::new };
+        let report = run(py, None, move |_| Ok(of(&mesh)))?;
         json::to_python(py, &report)
     }
 
@@ -265,6 +274,33 @@ impl Mesh {
 
     fn _repr_png_<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyBytes>> {
         pictures::shown(self.picture(py, None))
+    }
+
+    /// The surface that the vertices describe: those at the same place joined.
+    ///
+    /// `Laplacian`, `Eigenbasis` and neighbours go by vertex ids, so that a UV seam is a cut to them;
+    /// give them this mesh. `Shape` and `HeatGeodesics` join by themselves.
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    ///     The joined mesh (n_joined vertices), triangles in their order.
+    /// (n,) uint32 array
+    ///     For each vertex of this mesh, its vertex in the joined one.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, semfm, semfm.zoo
+    /// >>> ball = semfm.zoo.icosphere(1)
+    /// >>> soup = semfm.Mesh(ball.vertices[ball.faces.ravel()], np.arange(240).reshape(80, 3))
+    /// >>> joined, of_original = soup.weld()
+    /// >>> joined.n_vertices, of_original.shape
+    /// (42, (240,))
+    fn weld<'py>(&self, py: Python<'py>) -> PyResult<(Self, Bound<'py, PyAny>)> {
+        let mesh = self.inner.clone();
+        let welded = run(py, None, move |_| Ok(semfm::geom::Welded::new(&mesh)))?;
+        let of_original = arrays_out::owned(py, welded.of_original);
+        Ok((Self { inner: Shared::new(welded.mesh) }, of_original))
     }
 
     fn __repr__(&self) -> String {

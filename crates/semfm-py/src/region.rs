@@ -88,7 +88,8 @@ impl Region {
     /// ----------
     /// mesh : mesh_like
     /// contact : (3,) array_like
-    ///     In the mesh's frame and units.
+    ///     In the mesh's frame and units; refused where it is farther from the surface than 0.3 of
+    ///     the bounding box's diagonal.
     /// radius : float
     ///     In the mesh's units.
     ///

@@ -25,7 +25,7 @@ mod urdf;
 pub use error::{Error, Result};
 pub use gripper::{
     BUILTIN_GRIPPERS, BuiltinGripper, DriveJoint, Gripper, GripperPart, GripperSettings,
-    JointPosition, Motion, PosedPart, Role,
+    JointPosition, MAX_SPAN, Motion, PosedPart, Role,
 };
 pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
 pub use link::{Geometry, Inertial, Link, LinkGeometry};

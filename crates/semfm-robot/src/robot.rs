@@ -2,7 +2,7 @@
 
 use parry3d_f64::math::Pose;
 
-use crate::joint::Joint;
+use crate::joint::{Joint, Mimic};
 use crate::link::Link;
 
 /// A kinematic tree, checked: one root, every joint between two of its links.
@@ -35,14 +35,23 @@ impl Robot {
     }
 
     /// The top link of the rigid body that a link belongs to: the one that all of it is fixed to.
-    pub fn body_of(&self, mut link: usize) -> usize {
-        while let Some(joint) = self.joint_to(link) {
-            if self.joints[joint].kind.has_position() {
-                break;
-            }
-            link = self.joints[joint].parent;
+    pub fn body_of(&self, link: usize) -> usize {
+        self.bodies()[link]
+    }
+
+    /// For each link, the top link of its rigid body, see [`Robot::body_of`]; all at once in linear time.
+    pub fn bodies(&self) -> Vec<usize> {
+        let mut bodies: Vec<usize> = (0..self.links.len()).collect();
+        // Joints stand in order from the root outwards.
+        for joint in self.joints.iter().filter(|joint| !joint.kind.has_position()) {
+            bodies[joint.child] = bodies[joint.parent];
         }
-        link
+        bodies
+    }
+
+    /// For each joint, the one that it follows at last: the end of its chain of mimics, or itself.
+    pub fn leaders(&self) -> Vec<usize> {
+        self.along_mimics(|joint| joint, |leader, _| leader)
     }
 
     /// The pose of every link in the root's frame (forward kinematics). `positions` (one a joint:
@@ -64,14 +73,41 @@ impl Robot {
     /// Positions with every mimic following its leader. Limits of followers are not applied: the
     /// mechanism couples them, and published descriptions contradict themselves there.
     pub fn with_mimics(&self, positions: &[f64]) -> Vec<f64> {
-        (0..self.joints.len()).map(|joint| self.position(joint, positions)).collect()
+        self.along_mimics(
+            |joint| positions.get(joint).copied().unwrap_or(0.0),
+            |leader, mimic| mimic.multiplier * leader + mimic.offset,
+        )
     }
 
-    fn position(&self, joint: usize, positions: &[f64]) -> f64 {
-        match self.joints[joint].mimic {
-            // Chains end: that was checked when the description was read.
-            Some(mimic) => mimic.multiplier * self.position(mimic.joint, positions) + mimic.offset,
-            None => positions.get(joint).copied().unwrap_or(0.0),
-        }
+    /// A value for every joint: that of `leader` for joints that follow none, else what `follow` makes of the value of
+    /// the joint followed. Chains end: that was checked when the description was read. Each link of a chain is walked
+    /// once, without recursion.
+    fn along_mimics<T: Copy>(
+        &self,
+        leader: impl Fn(usize) -> T,
+        follow: impl Fn(T, Mimic) -> T,
+    ) -> Vec<T> {
+        let mut values: Vec<Option<T>> = vec![None; self.joints.len()];
+        let mut chain = Vec::new();
+        (0..self.joints.len())
+            .map(|joint| {
+                let mut at = joint;
+                let mut value = loop {
+                    match (values[at], self.joints[at].mimic) {
+                        (Some(known), _) => break known,
+                        (None, None) => break leader(at),
+                        (None, Some(mimic)) => {
+                            chain.push((at, mimic));
+                            at = mimic.joint;
+                        }
+                    }
+                };
+                for (follower, mimic) in chain.drain(..).rev() {
+                    value = follow(value, mimic);
+                    values[follower] = Some(value);
+                }
+                value
+            })
+            .collect()
     }
 }

@@ -356,3 +356,101 @@ fn hostile_descriptions_are_refused_with_code_and_place() {
     let description = RobotDescription::parse(twice.as_bytes(), "r.urdf");
     assert_eq!(description.and_then(|d| d.tree()).unwrap_err().code(), "tree");
 }
+
+#[test]
+fn hands_of_kilometres_are_refused_before_anything_is_made_for_them() {
+    let sound = two_fingers(r#"<mimic joint="ja"/>"#);
+    for (from, to) in [
+        (r#"upper="0.03""#, r#"upper="1e12""#),
+        (r#"upper="0.03""#, r#"upper="1e5""#),
+        (r#"upper="0.03""#, r#"upper="30""#),
+        (r#"upper="0.03""#, r#"upper="1e300""#),
+        (r#"xyz="0 0 0.06""#, r#"xyz="0 0 1e6""#),
+        (r#"xyz="0 -0.005 0.02""#, r#"xyz="0 -1e6 0.02""#),
+        (r#"xyz="0 0.005 0.02""#, r#"xyz="0 5e11 0.02""#),
+        (r#"size="0.02 0.01 0.04""#, r#"size="20 10 40""#),
+        (r#"size="0.06 0.2 0.06""#, r#"size="1e9 0.2 0.06""#),
+        (r#"<mimic joint="ja"/>"#, r#"<mimic joint="ja" multiplier="1e9"/>"#),
+    ] {
+        assert!(sound.contains(from), "{from}");
+        let start = std::time::Instant::now();
+        let error = load(&sound.replacen(from, to, 2)).unwrap_err();
+        assert_eq!(error.code(), "no-gripper", "{to}: {error}");
+        assert!(start.elapsed().as_secs_f64() < 1.0, "{to}: {:?}", start.elapsed());
+    }
+    let error = load(&sound.replacen(r#"upper="0.03""#, r#"upper="30""#, 2)).unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("at most 5 m") && text.contains("`ja` from 0 to 30"), "{text}");
+    // Numbers that no robot has, wherever they stand.
+    for (from, to) in [
+        (r#"xyz="0 0 0.06""#, r#"xyz="0 0 1e13""#),
+        (r#"size="0.02 0.01 0.04""#, r#"size="1e200 1 1""#),
+    ] {
+        let text = load(&sound.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(text.contains("at most 1e12"), "{text}");
+    }
+}
+
+#[test]
+fn meshes_of_kilometres_are_refused() {
+    let mesh = "v 0 -0.005 0\nv 0.02 -0.005 0\nv 0 0.005 0\nv 0 0 0.04\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
+    for scale in ["1000 1000 1000", "1e12 1e12 1e12", "1e12 1 1"] {
+        let link = format!(
+            r#"<link name="a"><collision><geometry><mesh filename="f.obj" scale="{scale}"/>
+            </geometry></collision></link>"#
+        );
+        let file = file(&two_fingers(r#"<mimic joint="ja"/>"#).replace(&finger("a", -1.0), &link));
+        fs::write(file.folder.path().join("f.obj"), mesh).unwrap();
+        let error = Gripper::from_urdf(&file.path, &GripperSettings::default()).unwrap_err();
+        assert!(matches!(error.code(), "no-gripper" | "size"), "{scale}: {error}");
+    }
+}
+
+#[test]
+fn a_joint_without_limits_is_named() {
+    let limit = r#"<limit lower="0" upper="0.03" effort="1" velocity="1"/>"#;
+    for instead in ["", r#"<limit effort="1" velocity="1"/>"#] {
+        let text = two_fingers("").replace(limit, instead);
+        let error = load(&text).unwrap_err().to_string();
+        assert!(error.contains("no range of motion") && error.contains("`ja`, `jb`"), "{error}");
+        let description = RobotDescription::parse(text.as_bytes(), "r.urdf").unwrap();
+        let notes = description.notes();
+        assert!(notes.iter().any(|n| n.contains("`ja`: a prismatic joint without limits")), "{notes:?}");
+    }
+}
+
+/// A robot of `n` links: a chain, a star, or pairs of a leader and its mimic.
+fn many_links(n: usize, kind: &str) -> String {
+    let mut text = String::from("<robot name=\"many\"><link name=\"l0\"/>");
+    let shape = r#"<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>"#;
+    for i in 1..n {
+        let parent = if kind == "chain" { i - 1 } else { 0 };
+        let mimic = match kind {
+            "mimics" if i % 2 == 0 => format!(r#"<mimic joint="j{}"/>"#, i - 1),
+            "one leader" if i > 1 => format!(r#"<mimic joint="j{}"/>"#, i - 1),
+            _ => String::new(),
+        };
+        text += &format!(
+            r#"<link name="l{i}">{shape}</link><joint name="j{i}" type="prismatic"><parent link="l{parent}"/>
+            <child link="l{i}"/><origin xyz="0 0.001 0"/><axis xyz="0 1 0"/>
+            <limit lower="0" upper="0.0{}1" effort="1" velocity="1"/>{mimic}</joint>"#,
+            i % 7
+        );
+    }
+    text + "</robot>"
+}
+
+#[test]
+fn the_time_grows_with_the_links_not_with_their_square() {
+    // Ten elements a link: as many as a file may have.
+    const N: usize = 19_000;
+    for kind in ["chain", "star", "mimics", "one leader"] {
+        let text = many_links(N, kind);
+        let start = std::time::Instant::now();
+        let description = RobotDescription::parse(text.as_bytes(), "many.urdf").unwrap();
+        assert_eq!(description.tree().unwrap().links.len(), N);
+        assert!(load(&text).is_err(), "{kind}");
+        // Squares of 20,000 took ten.
+        assert!(start.elapsed().as_secs_f64() < 6.0, "{kind}: {:?}", start.elapsed());
+    }
+}

@@ -2,29 +2,39 @@
 //! view, or from the colours of a painted mesh; and what one camera saw of a part, completed.
 
 use semfm_geom::geodesic::{HeatGeodesics, HeatSettings};
-use semfm_geom::math::DVec3;
+use semfm_geom::math::{DVec3, bounds};
 use semfm_geom::{
     CameraSearch, Mesh, Pinhole, PixelDepth, SurfaceIndex, Viewpoint, complete_patch,
+    surface_vertices,
 };
 
 use crate::{Error, Region, Result};
+
+/// A contact may lie this far from the surface, as a share of the bounding box's diagonal: inside a handle or a few
+/// millimetres in front of it. What is farther off was measured in another unit or another frame.
+const FARTHEST_CONTACT: f64 = 0.3;
 
 /// All vertices within the geodesic `radius` of the surface point nearest to `contact`.
 ///
 /// Both are in the mesh's own frame and units. Distances are those of the heat method (Crane,
 /// Weischedel & Wardetzky 2013) from the corners of the triangle that was touched, each at its own
-/// distance from the contact.
+/// distance from the contact. They run on the surface: vertices doubled at a UV seam or by flat shading stop nothing.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a radius that is not positive or a contact that is not finite, or where
-/// no vertex is that near.
+/// [`Error::Invalid`] for a radius that is not positive, a contact that is not finite or farther from the surface than
+/// 0.3 of the bounding box's diagonal, or where no vertex is within the radius.
 pub fn region_around_contact(mesh: &Mesh, contact: DVec3, radius: f64) -> Result<Region> {
     if !(radius > 0.0 && radius.is_finite()) {
         return Err(Error::invalid("radius", "a positive length", radius.to_string()));
     }
-    let touched = SurfaceIndex::new(mesh)?
+    let surface = SurfaceIndex::new(mesh)?;
+    let touched = surface
         .closest(contact)
         .ok_or_else(|| Error::invalid("contact", "finite coordinates", contact.to_string()))?;
+    let size = surface_box_diagonal(mesh);
+    if touched.distance > FARTHEST_CONTACT * size {
+        return Err(far_contact(mesh, &surface, contact, touched.distance));
+    }
     let corners = mesh.faces()[touched.face as usize];
     let geodesics = HeatGeodesics::new(mesh, &HeatSettings::default())?;
     let from_corners = geodesics.distances_from_each(&corners)?;
@@ -38,6 +48,34 @@ pub fn region_around_contact(mesh: &Mesh, contact: DVec3, radius: f64) -> Result
         return Err(Error::invalid("radius", expected, radius.to_string()));
     }
     Ok(Region::from_mask(&inside))
+}
+
+/// Length of the diagonal of the surface's bounding box.
+fn surface_box_diagonal(mesh: &Mesh) -> f64 {
+    bounds(&surface_vertices(mesh)).map_or(0.0, |(low, high)| low.distance(high))
+}
+
+/// The refusal of a contact that is not on the mesh, with the question that the numbers suggest.
+fn far_contact(mesh: &Mesh, surface: &SurfaceIndex, contact: DVec3, distance: f64) -> Error {
+    let size = surface_box_diagonal(mesh);
+    let near = |factor: f64| {
+        let place = surface.closest(contact * factor);
+        place.is_some_and(|place| place.distance < FARTHEST_CONTACT / 3.0 * size)
+    };
+    let question = if near(1e-3) {
+        "is the contact in millimetres and the mesh in metres?"
+    } else if near(1e-2) {
+        "is the contact in centimetres and the mesh in metres?"
+    } else if near(1e3) {
+        "is the contact in metres and the mesh in millimetres?"
+    } else if near(1e2) {
+        "is the contact in metres and the mesh in centimetres?"
+    } else {
+        "is it in the mesh's frame and units?"
+    };
+    let expected =
+        format!("a point within {:.4} of the surface of a mesh {size:.4} across", FARTHEST_CONTACT * size);
+    Error::invalid("contact", expected, format!("{contact}, {distance:.4} away; {question}"))
 }
 
 /// How far behind the visible surface a vertex may lie and still be seen, as a share of the
@@ -210,6 +248,33 @@ mod tests {
         }
         assert!(region_around_contact(&sphere, DVec3::Z, -1.0).is_err());
         assert!(region_around_contact(&sphere, DVec3::NAN, 0.5).is_err());
+    }
+
+    #[test]
+    fn near_crosses_seams() {
+        let sphere = zoo::icosphere(4);
+        let soup = zoo::as_soup(&sphere);
+        let contact = DVec3::new(0.1, -0.3, 1.0);
+        let whole = region_around_contact(&sphere, contact, 0.4).unwrap().mask();
+        let cut = region_around_contact(&soup, contact, 0.4).unwrap().mask();
+        for (corner, &id) in sphere.faces().as_flattened().iter().enumerate() {
+            assert_eq!(cut[corner], whole[id as usize], "corner {corner}");
+        }
+    }
+
+    #[test]
+    fn a_contact_off_the_mesh_is_refused_with_the_question_that_the_numbers_ask() {
+        let sphere = zoo::icosphere(3);
+        for (contact, question) in [
+            (DVec3::new(0.0, 0.0, 1000.0), "in millimetres and the mesh in metres?"),
+            (DVec3::new(0.0, 90.0, 0.0), "in centimetres and the mesh in metres?"),
+            (DVec3::new(0.0, 0.0, 3.0), "in the mesh's frame and units?"),
+        ] {
+            let refused = region_around_contact(&sphere, contact, 0.5).unwrap_err().to_string();
+            assert!(refused.contains(question), "{refused}");
+        }
+        // Inside, but not far.
+        assert!(region_around_contact(&sphere, DVec3::Z * 0.2, 0.5).is_ok());
     }
 
     #[test]

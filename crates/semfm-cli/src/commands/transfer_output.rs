@@ -101,11 +101,29 @@ impl TransferOutput<'_> {
         summary
     }
 
+    /// Why nothing was found, as far as the demonstrated region tells.
+    fn why_empty(&self) -> String {
+        let mesh = self.result().source_mesh();
+        let areas = mesh.vertex_areas();
+        let inside: f64 = self.region.vertices().iter().map(|&v| areas[v as usize]).sum();
+        let share = inside / areas.iter().sum::<f64>();
+        let (n, of) = (self.region.vertices().len(), self.region.n_vertices());
+        let region = format!("the demonstrated region is {n} of {of} vertices, {:.2} % of the surface", 100.0 * share);
+        if share < SMALL_REGION {
+            format!("{region}: too little to be found again; mark more of the part (`region --near … --radius …`)")
+        } else {
+            format!("{region}, and no place of the target is enough like it")
+        }
+    }
+
     fn print(&self, stages: &Stages, common: &Common) {
         let Transfer { region, verdict, confidence, hypotheses, .. } = self.transfer;
         let (n, of) = (region.vertices().len(), region.n_vertices());
         console::data(format_args!("verdict     {verdict} (confidence {confidence:.2})"));
         console::data(format_args!("region      {n} of {of} vertices of the target"));
+        if region.is_empty() {
+            console::data(format_args!("why         {}", self.why_empty()));
+        }
         if hypotheses.len() > 1 {
             let shares: Vec<String> =
                 hypotheses.iter().map(|h| format!("{:.0} %", 100.0 * h.probability)).collect();
@@ -123,6 +141,9 @@ impl TransferOutput<'_> {
         }
     }
 }
+
+/// Regions of less than this share of the surface vanish on their way: smoothing spreads a vote over some hundredths.
+const SMALL_REGION: f64 = 0.005;
 
 /// Grasps and their picture.
 const GRASPS: [&str; 2] = ["grasps.json", "grasps.png"];

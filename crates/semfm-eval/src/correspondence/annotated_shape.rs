@@ -12,6 +12,37 @@ use crate::{Error, Result};
 /// Eigenpairs: the most that a method needs.
 pub(super) const K: usize = 200;
 
+/// A file of a set as it was read: a mesh with its vertices at the samples of a template.
+#[derive(Clone, Debug)]
+pub struct AnnotatedMesh {
+    /// The mesh: `V` and `F`.
+    pub mesh: Mesh,
+    /// Vertex at each sample: `gt`.
+    pub truth: Vec<u32>,
+    /// Vertex at the mirror image of each sample, where the set has it: `gt_sym`.
+    pub mirrored: Option<Vec<u32>>,
+}
+
+impl AnnotatedMesh {
+    /// Reads `NAME.npz`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] with the array at fault.
+    pub fn read(path: &Path) -> Result<Self> {
+        let archive = Archive::read(path)?;
+        let mesh = mesh(path, &archive)?;
+        let n = mesh.n_vertices();
+        let truth = ids(path, &archive, "gt", n)?
+            .ok_or_else(|| Error::format(path, "gt", "a vertex for each sample", "nothing"))?;
+        let mirrored = ids(path, &archive, "gt_sym", n)?;
+        if let Some(other) = mirrored.as_ref().filter(|other| other.len() != truth.len()) {
+            let expected = format!("{} ids, as in gt", truth.len());
+            return Err(Error::format(path, "gt_sym", expected, other.len().to_string()));
+        }
+        Ok(Self { mesh, truth, mirrored })
+    }
+}
+
 /// A shape with its vertices at the samples of a template.
 pub(super) struct AnnotatedShape {
     pub shape: Shape,
@@ -24,16 +55,7 @@ pub(super) struct AnnotatedShape {
 impl AnnotatedShape {
     /// Reads and prepares a shape; no vertex is simplified away.
     pub fn read(path: &Path, cache: &ShapeCache, task: &Task) -> Result<Self> {
-        let archive = Archive::read(path)?;
-        let mesh = mesh(path, &archive)?;
-        let n = mesh.n_vertices();
-        let truth = ids(path, &archive, "gt", n)?
-            .ok_or_else(|| Error::format(path, "gt", "a vertex for each sample", "nothing"))?;
-        let mirrored = ids(path, &archive, "gt_sym", n)?;
-        if let Some(other) = mirrored.as_ref().filter(|other| other.len() != truth.len()) {
-            let expected = format!("{} ids, as in gt", truth.len());
-            return Err(Error::format(path, "gt_sym", expected, other.len().to_string()));
-        }
+        let AnnotatedMesh { mesh, truth, mirrored } = AnnotatedMesh::read(path)?;
         let settings = ShapeSettings { k: K, working_vertices: 0, ..ShapeSettings::default() };
         Ok(Self { shape: cache.shape(mesh, &settings, task)?.shape, truth, mirrored })
     }

@@ -17,6 +17,8 @@ pub(super) struct GeodesicError<'a> {
     /// Distances (n_source × distinct true vertices).
     distances: Mat<f64>,
     column_of: BTreeMap<u32, usize>,
+    /// What a pair of vertices that no path joins counts as, at least: the greatest distance among those that are joined.
+    apart: f64,
     /// √A of the source.
     unit: f64,
 }
@@ -56,7 +58,10 @@ impl<'a> GeodesicError<'a> {
         let distances = HeatGeodesics::new(mesh, &HeatSettings::default())
             .and_then(|geodesics| geodesics.distances_from_each(&from))
             .map_err(|error| error.to_string())?;
-        Ok(Self { source, target, samples, distances, column_of, unit: mesh.area().sqrt() })
+        let columns = (0..distances.ncols()).flat_map(|j| distances.col(j).iter().copied());
+        let apart = columns.filter(|d| d.is_finite()).fold(0.0, f64::max);
+        let unit = mesh.area().sqrt();
+        Ok(Self { source, target, samples, distances, column_of, apart, unit })
     }
 
     /// Errors of a map T between the meshes as read.
@@ -74,11 +79,22 @@ impl<'a> GeodesicError<'a> {
 
     /// 100 / (|S| √A) · Σ_{s ∈ S} d(T(y_s), x_s): d the geodesic distance on the source, x_s the
     /// source's vertex at sample s (`truth`), y_s the target's, T the map target → source.
+    ///
+    /// On a source in several parts a sample may be sent to a part that no path joins to where it belongs. That counts
+    /// as the greatest distance between vertices that are joined, or as the straight line where that is longer: as
+    /// wrong as can be, yet finite, so that one such sample does not hide all others.
     fn mean(&self, map: &PointMap, truth: &[u32]) -> f64 {
         let mut total = 0.0;
         for &s in &self.samples {
             let sent = map.source_of[self.target.truth[s] as usize];
-            total += self.distances[(sent as usize, self.column_of[&truth[s]])];
+            let along = self.distances[(sent as usize, self.column_of[&truth[s]])];
+            total += if along.is_finite() {
+                along
+            } else {
+                let [from, to] =
+                    [sent, truth[s]].map(|v| self.source.shape.original().vertices()[v as usize]);
+                self.apart.max(from.distance(to))
+            };
         }
         100.0 * total / (self.samples.len() as f64 * self.unit)
     }

@@ -14,6 +14,7 @@ mod results;
 mod run;
 mod table;
 
+pub use annotated_shape::AnnotatedMesh;
 pub use dataset::{CorrespondenceDataset, CorrespondenceSet};
 pub use map_method::MapMethod;
 pub use results::{MAP_FORMAT, MapResults, MapRow, MapSummary};

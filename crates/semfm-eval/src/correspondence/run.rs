@@ -238,6 +238,33 @@ mod tests {
     }
 
     #[test]
+    fn shapes_in_parts_are_measured_and_their_page_is_made() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = folder.path().join("parts");
+        std::fs::create_dir_all(&set).unwrap();
+        let settings_of = ObjectSettings { n_vertices: 300, ..Default::default() };
+        let one = make_object(Category::Scissors, 3, &settings_of).unwrap().mesh;
+        let n = one.n_vertices() as u32;
+        // Twice beside itself, and a vertex that no triangle uses.
+        let shift = semfm::geom::math::DVec3::X * 2.0 * one.diagonal();
+        let moved = one.vertices().iter().map(|&p| p + shift);
+        let vertices = one.vertices().iter().copied().chain(moved).chain([-shift]).collect();
+        let other = one.faces().iter().map(|ids| ids.map(|v| v + n));
+        let faces = one.faces().iter().copied().chain(other).collect();
+        let mesh = Mesh::new(vertices, faces).unwrap();
+        write_shape(&set, &mesh, "a", false);
+        write_shape(&set, &mesh, "b", true);
+        std::fs::write(set.join(PAIRS), "a b\nb a\n").unwrap();
+        let dataset = CorrespondenceDataset::open(folder.path()).unwrap();
+        let results = run_maps(&dataset, &settings(), &Task::default()).unwrap();
+        for row in &results.rows {
+            assert!(row.error.is_some_and(f64::is_finite), "{}: {:?}", row.method, row.failure);
+        }
+        let out = folder.path().join("out");
+        assert_eq!(crate::report::write_maps(&results, &out).unwrap().len(), 3);
+    }
+
+    #[test]
     fn a_missing_array_is_a_failed_pair_and_a_missing_file_no_dataset() {
         let folder = tempfile::tempdir().unwrap();
         let set = folder.path().join("twins");

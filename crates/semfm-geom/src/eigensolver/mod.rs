@@ -49,10 +49,15 @@ const ORTHONORMALITY_TOLERANCE: f64 = 1e-10;
 /// How the eigenbasis is computed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EigenSettings {
-    /// Largest relative residual accepted.
+    /// Largest relative residual accepted, from [`EigenSettings::LEAST_TOLERANCE`] to 1.
     pub tolerance: f64,
     /// Seed of the starting block.
     pub seed: u64,
+}
+
+impl EigenSettings {
+    /// What double precision reaches on even triangles; the solver would search for less without end.
+    pub const LEAST_TOLERANCE: f64 = 1e-13;
 }
 
 impl Default for EigenSettings {
@@ -87,8 +92,8 @@ impl Default for EigenSettings {
 /// ```
 ///
 /// # Errors
-/// [`Error::TooManyEigenpairs`] for k above the vertex count, [`Error::OutOfRange`] for k = 0,
-/// [`Error::NotConverged`] where a verification fails, [`Error::NotPositiveDefinite`] where the
+/// [`Error::TooManyEigenpairs`] for k above the vertex count, [`Error::OutOfRange`] for k = 0 and for a tolerance out of
+/// its range, [`Error::NotConverged`] where a verification fails, [`Error::NotPositiveDefinite`] where the
 /// stiffness has an eigenvalue below −1/area, [`Error::Cancelled`].
 pub fn eigenbasis(
     laplacian: &Laplacian,
@@ -101,6 +106,11 @@ pub fn eigenbasis(
     if k == 0 {
         let (expected, found) = ("1 or more".to_owned(), "0".to_owned());
         return Err(Error::OutOfRange { what: "number of eigenpairs", expected, found });
+    }
+    let least = EigenSettings::LEAST_TOLERANCE;
+    if !(least..=1.0).contains(&settings.tolerance) {
+        let (expected, found) = (format!("{least:e} to 1"), settings.tolerance.to_string());
+        return Err(Error::OutOfRange { what: "tolerance of the eigenpairs", expected, found });
     }
     if k > n_vertices {
         return Err(Error::TooManyEigenpairs { asked: k, n_vertices });

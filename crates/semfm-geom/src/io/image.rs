@@ -34,6 +34,9 @@ pub(crate) struct ImageBudget {
     bytes: u64,
 }
 
+/// Bytes that a colour profile or a text beside the pixels may unpack to; profiles have some megabytes at most.
+const MOST_BESIDE: u64 = 16 << 20;
+
 /// Longest side of an image; the largest textures in use are 8192 wide.
 const MAX_SIDE: u32 = 16_384;
 
@@ -69,9 +72,13 @@ impl Texture {
         wrap: [Wrap; 2],
         budget: &mut ImageBudget,
     ) -> Result<Self, String> {
-        let reader = ImageReader::new(Cursor::new(bytes))
+        let mut reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|error| error.to_string())?;
+        // A colour profile unpacks while the decoder is made, before its limits can be set.
+        let mut beside = Limits::default();
+        beside.max_alloc = Some(budget.bytes.min(MOST_BESIDE));
+        reader.limits(beside);
         let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
         let (width, height) = decoder.dimensions();
         let n_bytes = u64::from(width) * u64::from(height) * 4;

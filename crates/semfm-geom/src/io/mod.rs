@@ -26,6 +26,7 @@ mod off;
 mod pcd;
 mod ply;
 mod polygon;
+mod polygon_with_holes;
 mod printable;
 mod staged_folder;
 mod stl;
@@ -157,10 +158,7 @@ fn points_of(input: Input<'_>) -> Result<PointCloud> {
     if cloud.points.is_empty() {
         return Err(input.error("whole file", "at least one point", "none"));
     }
-    if let Some(vertex) = cloud.points.iter().position(|p| !p.is_finite()) {
-        let p = cloud.points[vertex];
-        return Err(input.wrap(Error::NotFinite { vertex, x: p.x, y: p.y, z: p.z }));
-    }
+    Error::check_points(&cloud.points).map_err(|cause| input.wrap(cause))?;
     Ok(cloud)
 }
 

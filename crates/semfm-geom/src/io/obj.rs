@@ -40,10 +40,10 @@ fn read(input: Input<'_>) -> Result<MeshParts> {
     let vertex_colors = file.vertex_colors();
     // OBJ counts v from the bottom of the image, we from the top as glTF does.
     let uvs: Vec<_> = file.uvs.iter().map(|&[u, v]| [u, 1.0 - v]).collect();
-    let Triangles { n_faces, faces, corner_uvs } =
+    let Triangles { n_faces, faces, corner_uvs, notes } =
         file.polygons.into_triangles(&file.vertices, &uvs);
-    let appearance =
-        Appearance { vertex_colors, corner_uvs, notes: file.notes, ..Default::default() };
+    let notes = [file.notes, notes].concat();
+    let appearance = Appearance { vertex_colors, corner_uvs, notes, ..Default::default() };
     Ok(MeshParts { vertices: file.vertices, faces, n_faces, appearance })
 }
 

@@ -43,9 +43,10 @@ fn read(input: Input<'_>) -> Result<MeshParts> {
     let mut reader = Reader::open(input)?;
     let vertices = reader.vertices()?;
     let polygons = reader.polygons()?;
-    let Triangles { n_faces, faces, corner_uvs } = polygons.into_triangles(&vertices, &reader.uvs);
-    let appearance =
-        Appearance { vertex_colors: reader.vertex_colors(), corner_uvs, ..Default::default() };
+    let Triangles { n_faces, faces, corner_uvs, notes } =
+        polygons.into_triangles(&vertices, &reader.uvs);
+    let vertex_colors = reader.vertex_colors();
+    let appearance = Appearance { vertex_colors, corner_uvs, notes, ..Default::default() };
     Ok(MeshParts { vertices, faces, n_faces, appearance })
 }
 

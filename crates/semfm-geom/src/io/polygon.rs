@@ -1,15 +1,24 @@
 //! Polygons to triangles, without new vertices.
 
+use std::f64::consts::PI;
+
 use super::appearance::MISSING_UV;
+use super::polygon_with_holes::cut_constrained;
 use crate::math::{DVec2, DVec3};
 
-/// Above this many corners a polygon is fanned even if it is concave: ear clipping takes quadratic
-/// time, and at 256 a malicious file of nothing but such polygons costs as much as its parsing.
+/// Above this many corners a concave polygon is not cut at its ears, which takes quadratic time, but by a constrained
+/// Delaunay triangulation: at 256 a malicious file of nothing but such polygons costs as much as its parsing.
 const MAX_EAR_CORNERS: usize = 256;
 
 /// A corner that turns the wrong way by less than this share of the polygon's area counts as
 /// straight: coordinates with six digits leave corners on straight sides that off.
 const STRAIGHT: f64 = 1e-6;
+
+/// Triangles may miss the polygon's area by this share: the rounding of a thousand corners.
+const AREA_TOLERANCE: f64 = 1e-6;
+
+/// Notes on single faces; what is beyond is counted.
+const MAX_NOTES: usize = 4;
 
 /// The faces of a file before they are cut, one after the other.
 #[derive(Default)]
@@ -70,9 +79,10 @@ impl Polygons {
         let uv_ids = if self.uvs_by_vertex { &self.ids } else { &self.uv_ids };
         let mut faces = Vec::with_capacity(n_triangles);
         let mut corner_uvs = Vec::with_capacity(if uv_ids.is_empty() { 0 } else { n_triangles });
-        let mut cutter = EarCutter::default();
+        let mut cutter = PolygonCutter::default();
+        let mut fanned = Vec::new();
         let mut start = 0;
-        for &end in &self.ends {
+        for (face, &end) in self.ends.iter().enumerate() {
             let ids = &self.ids[start..end];
             let mut push = |corners: [u32; 3]| {
                 faces.push(corners.map(|i| ids[i as usize]));
@@ -83,16 +93,28 @@ impl Polygons {
                     }));
                 }
             };
-            match cutter.cut(ids, vertices) {
-                Some(triangles) => triangles.iter().copied().for_each(&mut push),
-                None => (1..ids.len() as u32 - 1).for_each(|i| push([0, i, i + 1])),
+            let cut = cutter.cut(ids, vertices);
+            if cut == Cut::CrossesItself {
+                fanned.push(cutter.fan_note(face));
+            }
+            match cut {
+                Cut::Triangles => cutter.triangles.iter().copied().for_each(&mut push),
+                Cut::Convex | Cut::CrossesItself => {
+                    (1..ids.len() as u32 - 1).for_each(|i| push([0, i, i + 1]));
+                }
             }
             start = end;
+        }
+        if fanned.len() > MAX_NOTES {
+            let more = fanned.len() - MAX_NOTES;
+            fanned.truncate(MAX_NOTES);
+            fanned.push(format!("{more} more faces cross themselves and are cut as fans"));
         }
         Triangles {
             n_faces: self.ends.len(),
             faces,
             corner_uvs: (!uv_ids.is_empty()).then_some(corner_uvs),
+            notes: fanned,
         }
     }
 }
@@ -105,35 +127,61 @@ pub(crate) struct Triangles {
     pub faces: Vec<[u32; 3]>,
     /// Texture coordinates of the corners (m).
     pub corner_uvs: Option<Vec<[[f32; 2]; 3]>>,
+    /// Faces that could not be cut right, in words.
+    pub notes: Vec<String>,
 }
 
-/// Cuts one concave polygon after the other, keeping the scratch space.
+/// What became of a polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cut {
+    /// The fan around its first corner is right.
+    Convex,
+    /// The cutter's triangles.
+    Triangles,
+    /// No triangles without overlap have its outline; most readers make a fan of it.
+    CrossesItself,
+}
+
+/// Cuts one polygon after the other, keeping the scratch space.
 #[derive(Default)]
-struct EarCutter {
+struct PolygonCutter {
     corners: Vec<DVec3>,
     flat: Vec<DVec2>,
     ring: Vec<u32>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl EarCutter {
-    /// The n − 2 triangles of a concave polygon, as numbers of its corners, with its winding: it is
-    /// cut at its ears (G. H. Meisters, *Polygons have ears*, 1975), since its fan would fold over.
+impl PolygonCutter {
+    /// The triangles of a polygon, as numbers of its corners, with its winding.
     ///
-    /// `None` asks for the fan around the first corner, which is what most readers make of any
-    /// polygon: where it is convex, and where no ear is left because it crosses itself or repeats
-    /// corners.
-    fn cut(&mut self, ids: &[u32], vertices: &[DVec3]) -> Option<&[[u32; 3]]> {
-        if ids.len() <= 3 || ids.len() > MAX_EAR_CORNERS {
-            return None;
+    /// A concave one is cut at its ears (G. H. Meisters, *Polygons have ears*, 1975), since its fan would fold over.
+    /// One that touches itself (a hole joined to the outline by a bridge that is walked twice), or that has many
+    /// corners, is cut by a constrained Delaunay triangulation of its corners.
+    fn cut(&mut self, ids: &[u32], vertices: &[DVec3]) -> Cut {
+        if ids.len() <= 3 {
+            return Cut::Convex;
         }
         self.corners.clear();
         self.corners.extend(ids.iter().map(|&id| vertices[id as usize]));
-        (self.flatten_if_concave() && self.clip_ears()).then_some(&self.triangles)
+        let Some(double_area) = self.flatten() else { return Cut::Convex };
+        if self.fan_is_right(double_area) {
+            return Cut::Convex;
+        }
+        if ids.len() <= MAX_EAR_CORNERS && self.clip_ears() {
+            return Cut::Triangles;
+        }
+        self.triangles.clear();
+        cut_constrained(&self.flat, &mut self.triangles);
+        let covered: f64 = self.triangles.iter().map(|&ids| self.turn_of(ids)).sum();
+        if (covered - double_area).abs() <= AREA_TOLERANCE * double_area {
+            Cut::Triangles
+        } else {
+            Cut::CrossesItself
+        }
     }
 
-    /// Projects the polygon along its Newell normal; false where it is convex or has no area.
-    fn flatten_if_concave(&mut self) -> bool {
+    /// Projects the polygon along its Newell normal and gives twice its area; `None` where it has none.
+    fn flatten(&mut self) -> Option<f64> {
         let corners = &self.corners;
         let origin = corners[0];
         // Newell: Σ pᵢ × pᵢ₊₁, which is twice the area along the normal.
@@ -141,14 +189,52 @@ impl EarCutter {
             .map(|i| (corners[i] - origin).cross(corners[(i + 1) % corners.len()] - origin))
             .sum();
         let double_area = normal.length();
-        let Some(normal) = normal.try_normalize() else { return false };
+        let normal = normal.try_normalize()?;
         let (x, y) = normal.any_orthonormal_pair();
         self.flat.clear();
         self.flat
             .extend(corners.iter().map(|&p| DVec2::new((p - origin).dot(x), (p - origin).dot(y))));
+        Some(double_area)
+    }
+
+    /// Whether the polygon lies to the left of all its sides and winds once, so that the triangles of its fan neither
+    /// turn over nor overlap.
+    fn fan_is_right(&self, double_area: f64) -> bool {
         let n = self.flat.len();
         let reflex = -STRAIGHT * double_area;
-        (0..n).any(|i| turn(self.flat[i], self.flat[(i + 1) % n], self.flat[(i + 2) % n]) < reflex)
+        let corner = |i: usize| self.flat[i % n];
+        if (0..n).any(|i| turn(corner(i), corner(i + 1), corner(i + 2)) < reflex) {
+            return false;
+        }
+        // Many small turns the wrong way add up, and an outline that winds twice turns the right way everywhere.
+        let (mut turned_over, mut angle) = (0.0, 0.0);
+        for i in 1..n - 1 {
+            let (from, to) = (self.flat[i] - self.flat[0], self.flat[i + 1] - self.flat[0]);
+            turned_over += (-from.perp_dot(to)).max(0.0);
+            angle += from.angle_to(to);
+        }
+        turned_over <= STRAIGHT * double_area && angle <= PI * (1.0 + STRAIGHT.sqrt())
+    }
+
+    /// Twice the signed area of a triangle of corners.
+    fn turn_of(&self, ids: [u32; 3]) -> f64 {
+        let [a, b, c] = ids.map(|i| self.flat[i as usize]);
+        turn(a, b, c)
+    }
+
+    /// What to say of face number `face`, of which a fan is made.
+    fn fan_note(&self, face: usize) -> String {
+        let corners = &self.corners;
+        let (mut fan, mut outline) = (0.0, DVec3::ZERO);
+        for i in 1..corners.len() - 1 {
+            let normal = (corners[i] - corners[0]).cross(corners[i + 1] - corners[0]);
+            fan += normal.length() / 2.0;
+            outline += normal / 2.0;
+        }
+        let (n, outline) = (corners.len(), outline.length());
+        format!(
+            "face {face} ({n} corners) crosses itself: as a fan it has area {fan:.6}, its outline encloses {outline:.6}"
+        )
     }
 
     /// Cuts ears off the flat polygon; false where it runs out of them early.
@@ -161,8 +247,9 @@ impl EarCutter {
             self.triangles.push(self.around(ear));
             self.ring.remove(ear);
         }
-        self.triangles.push([self.ring[0], self.ring[1], self.ring[2]]);
-        true
+        let last = [self.ring[0], self.ring[1], self.ring[2]];
+        self.triangles.push(last);
+        self.turn_of(last) >= 0.0
     }
 
     /// Corner `at` of the ring between its neighbours.
@@ -228,6 +315,112 @@ mod tests {
             assert_eq!(triangles.len(), 2);
             assert!((total - fan).abs() < 1e-12, "{total} {fan}");
         }
+    }
+
+    /// Area of the triangles, and the area that the corners' outline encloses.
+    fn areas(corners: &[DVec3]) -> (f64, f64) {
+        let total = cut(corners).iter().map(|&t| area(corners, t)).sum();
+        let n = corners.len();
+        let outline: DVec3 = (0..n).map(|i| corners[i].cross(corners[(i + 1) % n])).sum();
+        (total, outline.length() / 2.0)
+    }
+
+    /// `n` corners on a circle of that radius around the origin, from angle `from` to `to`.
+    fn arc(n: usize, radius: f64, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        (0..n).map(move |i| {
+            let angle = from + (to - from) * i as f64 / (n - 1) as f64;
+            (radius * angle.cos(), radius * angle.sin())
+        })
+    }
+
+    #[test]
+    fn concave_polygons_of_any_size_keep_their_area_and_all_corners() {
+        for n in [5, 40, 127, 128, 129, 500, 20_000] {
+            // Three quarters of a ring.
+            let outline: Vec<_> = arc(n, 2.0, 0.0, 4.7).chain(arc(n, 1.5, 4.7, 0.0)).collect();
+            let corners = polygon(&outline);
+            let (total, outline) = areas(&corners);
+            assert!((total / outline - 1.0).abs() < 1e-9, "{n}: {total} of {outline}");
+            let mut used = vec![false; corners.len()];
+            let triangles = cut(&corners);
+            triangles.iter().flatten().for_each(|&i| used[i as usize] = true);
+            assert!(triangles.len() == corners.len() - 2 && !used.contains(&false), "{n}");
+        }
+    }
+
+    #[test]
+    fn holes_that_a_bridge_joins_to_the_outline_stay_open() {
+        // A square with two holes; each bridge is walked there and back.
+        let corners = polygon(&[
+            (0.0, 0.0),
+            (8.0, 0.0),
+            (8.0, 4.0),
+            (6.0, 3.0),
+            (6.0, 1.0),
+            (5.0, 1.0),
+            (5.0, 3.0),
+            (6.0, 3.0),
+            (8.0, 4.0),
+            (0.0, 4.0),
+            (1.0, 3.0),
+            (2.0, 3.0),
+            (2.0, 1.0),
+            (1.0, 1.0),
+            (1.0, 3.0),
+            (0.0, 4.0),
+        ]);
+        for shift in 0..corners.len() {
+            let mut turned = corners.clone();
+            turned.rotate_left(shift);
+            let (total, outline) = areas(&turned);
+            assert!((total / outline - 1.0).abs() < 1e-12, "{shift}: {total} of {outline}");
+        }
+        // Rings whose hole touches the outline in one corner.
+        let touching = polygon(&[
+            (0.0, 0.0),
+            (4.0, 0.0),
+            (4.0, 4.0),
+            (0.0, 4.0),
+            (0.0, 0.0),
+            (1.0, 3.0),
+            (3.0, 1.0),
+        ]);
+        let (total, outline) = areas(&touching);
+        assert!((total / outline - 1.0).abs() < 1e-12, "{total} of {outline}");
+    }
+
+    #[test]
+    fn corners_at_one_place_keep_their_own_numbers() {
+        // A square whose hole touches it in the corner that is both 0 and 4: below the hole it is 0, beside it 4.
+        let corners = polygon(&[
+            (0.0, 0.0),
+            (4.0, 0.0),
+            (4.0, 4.0),
+            (0.0, 4.0),
+            (0.0, 0.0),
+            (1.0, 3.0),
+            (3.0, 1.0),
+        ]);
+        for triangle in cut(&corners) {
+            let sum: DVec3 = triangle.iter().map(|&i| corners[i as usize]).sum();
+            assert!(!triangle.contains(&0) || sum.x > sum.y, "{triangle:?}");
+            assert!(!triangle.contains(&4) || sum.x < sum.y, "{triangle:?}");
+        }
+    }
+
+    #[test]
+    fn a_face_that_crosses_itself_is_fanned_and_named() {
+        let corners =
+            polygon(&[(0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (2.0, -2.0), (1.0, 3.0), (0.0, 3.0)]);
+        let mut polygons = Polygons::default();
+        for face in [&[0, 1, 2][..], &[0, 1, 2, 3, 4, 5]] {
+            face.iter().for_each(|&id| polygons.push(id, NO_UV));
+            polygons.close();
+        }
+        let triangles = polygons.into_triangles(&corners, &[]);
+        assert_eq!(triangles.faces.len(), 5);
+        let [note] = &triangles.notes[..] else { panic!("{:?}", triangles.notes) };
+        assert!(note.starts_with("face 1 (6 corners) crosses itself"), "{note}");
     }
 
     #[test]

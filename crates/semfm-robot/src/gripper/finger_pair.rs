@@ -1,6 +1,8 @@
 //! Two fingers of a robot that close on each other: which joints move them, along which axis, where
 //! their pads are.
 
+use std::collections::BTreeMap;
+
 use parry3d_f64::math::Pose;
 use semfm_geom::math::{DVec3, bounds};
 
@@ -20,6 +22,13 @@ const MAX_DRIFT: f64 = 1e-3;
 const MIN_PAD: f64 = 1e-3;
 /// Two joints are alike where their ranges differ by less than this share.
 const SAME_RANGE: f64 = 1e-3;
+/// Links in all drives that are tried: each costs [`N_SAMPLES`] poses, so that this is a second's work. A humanoid with
+/// two hands of five fingers has 100 drives and 100 links.
+const MAX_POSES: usize = 1_000_000;
+/// Most joints with a range on one body, and most bodies with a surface that one drive moves: pairs of them are tried.
+const MAX_JOINTS_ON_BODY: usize = 256;
+/// See [`MAX_JOINTS_ON_BODY`].
+const MAX_BODIES: usize = 256;
 
 /// A joint that a drive moves from one end of its range to the other.
 #[derive(Clone, Copy, Debug)]
@@ -60,23 +69,57 @@ impl Drive {
         poses.into_iter().map(|pose| base_from_root * pose).collect()
     }
 
-    /// Whether a joint is one of the drive's or follows one.
-    fn moves(&self, robot: &Robot, mut joint: usize) -> bool {
-        while let Some(mimic) = robot.joints[joint].mimic {
-            joint = mimic.joint;
-        }
-        self.joints.iter().any(|driven| driven.joint == joint)
+    /// Whether a joint with that leader is one of the drive's or follows one.
+    fn moves(&self, leader: usize) -> bool {
+        self.joints.iter().any(|driven| driven.joint == leader)
     }
 
     /// For each link, the drive's joint nearest the root above it.
-    fn branches(&self, robot: &Robot) -> Vec<Option<usize>> {
-        let mut branches = vec![None; robot.links.len()];
+    fn branches(&self, tree: &Tree<'_>) -> Vec<Option<usize>> {
+        let mut branches = vec![None; tree.robot.links.len()];
         // Joints stand in order from the root outwards.
-        for (i, joint) in robot.joints.iter().enumerate() {
-            let own = (joint.kind.has_position() && self.moves(robot, i)).then_some(i);
+        for (i, joint) in tree.robot.joints.iter().enumerate() {
+            let own = (joint.kind.has_position() && self.moves(tree.leaders[i])).then_some(i);
             branches[joint.child] = branches[joint.parent].or(own);
         }
         branches
+    }
+}
+
+/// A robot with what is asked of it for every drive, computed once.
+struct Tree<'a> {
+    robot: &'a Robot,
+    shapes: &'a [LinkShape],
+    /// For each link, the top link of its rigid body.
+    bodies: Vec<usize>,
+    /// For each joint, the joint that it follows at last.
+    leaders: Vec<usize>,
+    /// For each body, by its top link, whether any of its links has a surface.
+    has_surface: Vec<bool>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(robot: &'a Robot, shapes: &'a [LinkShape]) -> Self {
+        let (bodies, leaders) = (robot.bodies(), robot.leaders());
+        let mut has_surface = vec![false; robot.links.len()];
+        for (shape, &body) in shapes.iter().zip(&bodies) {
+            has_surface[body] |= !shape.triangles.is_empty();
+        }
+        Self { robot, shapes, bodies, leaders, has_surface }
+    }
+
+    /// For each joint, whether it is above one of the links, or leads one that is.
+    fn above(&self, links: [usize; 2]) -> Vec<bool> {
+        let mut is_above = vec![false; self.robot.joints.len()];
+        let mut reaches = vec![false; self.robot.links.len()];
+        links.iter().for_each(|&link| reaches[link] = true);
+        for (i, joint) in self.robot.joints.iter().enumerate().rev() {
+            if reaches[joint.child] {
+                reaches[joint.parent] = true;
+                is_above[self.leaders[i]] = true;
+            }
+        }
+        is_above
     }
 }
 
@@ -110,16 +153,30 @@ pub(super) struct PadGap {
 }
 
 impl FingerPair {
-    /// All pairs of fingers in a robot with the shapes of its links, best pad first. `only` names the
-    /// links that bear the pads.
-    pub fn find(robot: &Robot, shapes: &[LinkShape], only: Option<[usize; 2]>) -> Vec<Self> {
-        let mut found: Vec<Self> = drives(robot)
-            .into_iter()
-            .filter_map(|drive| SampledDrive::new(robot, shapes, drive))
-            .flat_map(|drive| drive.pairs(only))
-            .collect();
-        found.sort_by(|a, b| b.pad_area().total_cmp(&a.pad_area()));
-        found
+    /// All pairs of fingers in a robot with the shapes of its links, best pad first; `None` where there are too many
+    /// candidates to try. `only` names the links that bear the pads.
+    pub fn find(
+        robot: &Robot,
+        shapes: &[LinkShape],
+        only: Option<[usize; 2]>,
+    ) -> Option<Vec<Self>> {
+        let tree = Tree::new(robot, shapes);
+        let mut found = Vec::new();
+        let mut n_poses = 0;
+        for drive in drives(&tree, only)? {
+            n_poses += robot.links.len();
+            if n_poses > MAX_POSES {
+                return None;
+            }
+            let Some(drive) = SampledDrive::new(&tree, drive) else { continue };
+            let bodies = drive.bodies(only);
+            if bodies.len() > MAX_BODIES {
+                return None;
+            }
+            found.extend(drive.pairs(&bodies));
+        }
+        found.sort_by(|a: &Self, b| b.pad_area().total_cmp(&a.pad_area()));
+        Some(found)
     }
 
     fn pad_area(&self) -> f64 {
@@ -137,41 +194,61 @@ impl FingerPair {
     }
 }
 
-/// Joints with a range that lead others or only themselves, then pairs of equal ones on one body:
-/// some descriptions leave the coupling of the fingers to the controller.
-fn drives(robot: &Robot) -> Vec<Drive> {
+/// Joints with a range that lead others, then pairs of equal ones on one body: some descriptions leave the coupling of
+/// the fingers to the controller. `None` where there are too many pairs.
+fn drives(tree: &Tree<'_>, only: Option<[usize; 2]>) -> Option<Vec<Drive>> {
+    let robot = tree.robot;
+    let is_above = only.map(|links| tree.above(links));
     let ranges: Vec<DrivenJoint> = robot
         .joints
         .iter()
         .enumerate()
-        .filter(|(_, joint)| joint.mimic.is_none() && joint.kind.has_position())
+        .filter(|(i, joint)| {
+            let wanted = is_above.as_ref().is_none_or(|above| above[*i]);
+            wanted && joint.mimic.is_none() && joint.kind.has_position()
+        })
         .filter_map(|(i, joint)| {
             let [low, high] = joint.limits.position?;
             let range = DrivenJoint { joint: i, from: low, to: high };
             (low.is_finite() && high.is_finite() && low < high).then_some(range)
         })
         .collect();
-    let mut drives: Vec<Drive> =
-        ranges.iter().map(|&range| Drive { joints: vec![range] }).collect();
-    for (n, &a) in ranges.iter().enumerate() {
-        for &b in &ranges[n + 1..] {
-            let (first, second) = (&robot.joints[a.joint], &robot.joints[b.joint]);
-            let alike = first.kind == second.kind
-                && robot.body_of(first.parent) == robot.body_of(second.parent)
-                && ((a.to - a.from) - (b.to - b.from)).abs() < SAME_RANGE * (a.to - a.from);
-            if alike {
-                drives.push(Drive { joints: vec![a, b] });
-                drives.push(Drive { joints: vec![a, b.reversed()] });
-            }
+    // A joint alone moves one finger: only those that others follow can drive two.
+    let mut is_followed = vec![false; robot.joints.len()];
+    for (i, &leader) in tree.leaders.iter().enumerate() {
+        is_followed[leader] |= leader != i;
+    }
+    let leading = ranges.iter().filter(|range| is_followed[range.joint]);
+    let mut drives: Vec<Drive> = leading.map(|&range| Drive { joints: vec![range] }).collect();
+    let mut on_body: BTreeMap<usize, Vec<DrivenJoint>> = BTreeMap::new();
+    for &range in &ranges {
+        on_body.entry(tree.bodies[robot.joints[range.joint].parent]).or_default().push(range);
+    }
+    let mut pairs = Vec::new();
+    for ranges in on_body.values() {
+        if ranges.len() > MAX_JOINTS_ON_BODY {
+            return None;
+        }
+        for (n, &a) in ranges.iter().enumerate() {
+            let alike = ranges[n + 1..].iter().filter(|b| {
+                let (first, second) = (&robot.joints[a.joint], &robot.joints[b.joint]);
+                first.kind == second.kind
+                    && ((a.to - a.from) - (b.to - b.from)).abs() < SAME_RANGE * (a.to - a.from)
+            });
+            pairs.extend(alike.map(|&b| [a, b]));
         }
     }
-    drives
+    pairs.sort_by_key(|pair| pair.map(|driven| driven.joint));
+    for [a, b] in pairs {
+        drives.push(Drive { joints: vec![a, b] });
+        drives.push(Drive { joints: vec![a, b.reversed()] });
+    }
+    Some(drives)
 }
 
 /// A drive whose fingers sit on one palm, with the poses of all links on its way.
 struct SampledDrive<'a> {
-    robot: &'a Robot,
-    shapes: &'a [LinkShape],
+    tree: &'a Tree<'a>,
     drive: Drive,
     palm: usize,
     branches: Vec<Option<usize>>,
@@ -181,36 +258,40 @@ struct SampledDrive<'a> {
 
 impl<'a> SampledDrive<'a> {
     /// `None` for a drive that moves fewer than two fingers, or fingers on several palms.
-    fn new(robot: &'a Robot, shapes: &'a [LinkShape], drive: Drive) -> Option<Self> {
-        let branches = drive.branches(robot);
+    fn new(tree: &'a Tree<'a>, drive: Drive) -> Option<Self> {
+        let robot = tree.robot;
+        let branches = drive.branches(tree);
         let mut tops: Vec<usize> = branches.iter().flatten().copied().collect();
         tops.sort_unstable();
         tops.dedup();
         let palm = robot.joints[*tops.first()?].parent;
         let one_palm =
-            tops.iter().all(|&top| robot.body_of(robot.joints[top].parent) == robot.body_of(palm));
+            tops.iter().all(|&top| tree.bodies[robot.joints[top].parent] == tree.bodies[palm]);
         if tops.len() < 2 || !one_palm {
             return None;
         }
         let samples = (0..N_SAMPLES)
             .map(|i| drive.poses(robot, palm, i as f64 / (N_SAMPLES - 1) as f64))
             .collect();
-        Some(Self { robot, shapes, drive, palm, branches, samples })
+        Some(Self { tree, drive, palm, branches, samples })
     }
 
-    /// The pairs of fingers that it moves.
-    fn pairs(&self, only: Option<[usize; 2]>) -> Vec<FingerPair> {
-        let robot = self.robot;
-        let only = only.map(|links| links.map(|link| robot.body_of(link)));
-        let bodies: Vec<usize> = (0..robot.links.len())
-            .filter(|&link| self.branches[link].is_some() && robot.body_of(link) == link)
-            .filter(|&link| self.keeps_direction(link))
-            .collect();
+    /// The bodies that it moves, that may bear pads, and that are asked for.
+    fn bodies(&self, only: Option<[usize; 2]>) -> Vec<usize> {
+        let only = only.map(|links| links.map(|link| self.tree.bodies[link]));
+        (0..self.branches.len())
+            .filter(|&link| self.branches[link].is_some() && self.tree.bodies[link] == link)
+            .filter(|&link| self.tree.has_surface[link] && self.keeps_direction(link))
+            .filter(|link| only.is_none_or(|pair| pair.contains(link)))
+            .collect()
+    }
+
+    /// The pairs of fingers among some bodies that it moves.
+    fn pairs(&self, bodies: &[usize]) -> Vec<FingerPair> {
         let mut found = Vec::new();
         for (n, &a) in bodies.iter().enumerate() {
             for &b in &bodies[n + 1..] {
-                let wanted = only.is_none_or(|pair| pair == [a, b] || pair == [b, a]);
-                if wanted && self.branches[a] != self.branches[b] {
+                if self.branches[a] != self.branches[b] {
                     found.extend(self.pair([a, b]));
                 }
             }
@@ -276,11 +357,11 @@ impl<'a> SampledDrive<'a> {
 
     /// The triangles of a body at share 0, in the palm's frame.
     fn surface(&self, body: usize) -> Vec<[DVec3; 3]> {
-        (0..self.robot.links.len())
-            .filter(|&link| self.robot.body_of(link) == body)
+        (0..self.tree.bodies.len())
+            .filter(|&link| self.tree.bodies[link] == body)
             .flat_map(|link| {
                 let pose = self.samples[0][link];
-                self.shapes[link].triangles.iter().map(move |t| t.map(|p| pose.transform_point(p)))
+                self.tree.shapes[link].triangles.iter().map(move |t| t.map(|p| pose.transform_point(p)))
             })
             .collect()
     }

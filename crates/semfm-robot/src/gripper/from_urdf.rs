@@ -9,7 +9,7 @@ use semfm_geom::math::{DMat3, DQuat, DVec3};
 use super::builtin::BuiltinGripper;
 use super::finger_pair::{FingerPair, PadGap};
 use super::link_shape::{ConvexPiece, LinkShape, inertia_box};
-use super::{DriveJoint, Gripper, GripperPart, Motion, Role};
+use super::{DriveJoint, Gripper, GripperPart, MAX_SPAN, Motion, Role};
 use crate::robot::Robot;
 use crate::urdf::{MeshPaths, RobotDescription};
 use crate::{Error, JointKind, Result};
@@ -152,7 +152,7 @@ impl Loader<'_> {
     /// Links on bodies with two or more moving joints on them, and all behind those joints.
     fn near_fingers(&self) -> Vec<bool> {
         let robot = self.robot;
-        let bodies: Vec<usize> = (0..robot.links.len()).map(|i| robot.body_of(i)).collect();
+        let bodies = robot.bodies();
         let mut n_joints = vec![0; robot.links.len()];
         for joint in robot.joints.iter().filter(|joint| joint.kind.has_position()) {
             n_joints[bodies[joint.parent]] += 1;
@@ -169,14 +169,18 @@ impl Loader<'_> {
             Some([a, b]) => Some([self.link(a)?, self.link(b)?]),
             None => None,
         };
-        let found = FingerPair::find(self.robot, shapes, only);
+        let Some(found) = FingerPair::find(self.robot, shapes, only) else {
+            let (links, joints) = (self.robot.links.len(), self.robot.joints.len());
+            let expected = "a robot in which each pair of joints can be tried, or the fingers' names";
+            return Err(self.no_gripper(expected, format!("{links} links and {joints} joints")));
+        };
         let Some(best) = found.first() else {
             let expected = "two fingers with flat pads that stay parallel and close on each other";
             let found = format!("no such pair{}", self.joints_without_range());
             return Err(self.no_gripper(expected, found));
         };
-        let palm = self.robot.body_of(best.palm);
-        if let Some(other) = found.iter().find(|pair| self.robot.body_of(pair.palm) != palm) {
+        let bodies = self.robot.bodies();
+        if let Some(other) = found.iter().find(|pair| bodies[pair.palm] != bodies[best.palm]) {
             let [a, b] = best.fingers.map(|link| self.name_of(link));
             let [c, d] = other.fingers.map(|link| self.name_of(link));
             let found = format!("`{a}` and `{b}`; `{c}` and `{d}`");
@@ -207,7 +211,30 @@ impl Loader<'_> {
         format!("; {names}: no range of motion (`<limit lower=… upper=…>`), which a drive needs")
     }
 
+    /// Refuses fingers farther apart than any hand opens, before anything is made for them.
+    fn check_span(&self, fingers: &FingerPair) -> Result<()> {
+        let widest = self.gap(fingers, 0.0).max(self.gap(fingers, 1.0));
+        if widest <= MAX_SPAN {
+            return Ok(());
+        }
+        let drive: Vec<String> = fingers
+            .drive
+            .joints
+            .iter()
+            .map(|driven| {
+                let name = &self.robot.joints[driven.joint].name;
+                format!("`{name}` from {} to {}", driven.from, driven.to)
+            })
+            .collect();
+        let expected = format!(
+            "fingers that open at most {MAX_SPAN} m (lengths are metres; are the limits, the \
+             origins or the meshes in millimetres?)"
+        );
+        Err(self.no_gripper(expected, format!("{widest:.3e} m with joint {}", drive.join(", "))))
+    }
+
     fn gripper(&self, fingers: &FingerPair, shapes: &[LinkShape]) -> Result<Gripper> {
+        self.check_span(fingers)?;
         let samples = self.drive_samples(fingers)?;
         let flange = self.flange(fingers)?;
         let palm_poses = fingers.drive.poses(self.robot, fingers.palm, 0.0);
@@ -220,7 +247,13 @@ impl Loader<'_> {
         };
         let flange = by_width(&samples, |sample| flange_from_palm * sample.palm_from_tcp);
         let pad = self.settings.pad.unwrap_or(fingers.pad);
-        let gripper = Gripper::new(&self.robot.name, opening, pad, flange, parts)?;
+        let gripper =
+            Gripper::new(&self.robot.name, opening, pad, flange, parts).map_err(|error| match error {
+                Error::OutOfRange { what, expected, found } => {
+                    self.no_gripper(format!("{what}: {expected}"), found)
+                }
+                other => other,
+            })?;
         let joints = fingers
             .drive
             .joints
@@ -344,7 +377,8 @@ impl Loader<'_> {
     fn flange(&self, fingers: &FingerPair) -> Result<usize> {
         if let Some(name) = &self.settings.flange {
             let link = self.link(name)?;
-            if self.robot.body_of(link) != self.robot.body_of(fingers.palm) {
+            let bodies = self.robot.bodies();
+            if bodies[link] != bodies[fingers.palm] {
                 let palm = self.name_of(fingers.palm);
                 let expected = format!("a flange that is fixed to the palm `{palm}`");
                 return Err(self.no_gripper(expected, format!("`{name}`")));

@@ -14,6 +14,9 @@ use crate::{Error, Result};
 
 /// Most triangles of a collision mesh; published grippers have some thousands.
 const MAX_TRIANGLES: usize = 300_000;
+/// Farthest corner of a mesh from its link's frame, metres: the earth has 1.3e7. Hulls of larger numbers lose their
+/// last bits; what is too large for a gripper, [`MAX_SPAN`](super::MAX_SPAN) refuses.
+const MAX_COORDINATE: f64 = 1e7;
 /// A hull with more than this times the mesh's volume fills a space that is free (the bay between
 /// finger and palm), and the mesh is cut into convex pieces. Hulls of the grippers that we know are
 /// within 1.001.
@@ -132,6 +135,19 @@ impl LinkShape {
             });
         }
         let points: Vec<DVec3> = mesh.vertices().iter().map(|&point| point * scale).collect();
+        let is_far = |p: &&DVec3| !p.is_finite() || p.abs().max_element() > MAX_COORDINATE;
+        if let Some(far) = points.iter().find(is_far) {
+            return Err(Error::Urdf {
+                path: file,
+                code: "size",
+                place: named,
+                expected: format!(
+                    "corners within {MAX_COORDINATE:e} m of the link (is a scale missing, as \
+                     scale=\"0.001 0.001 0.001\" for millimetres?)"
+                ),
+                found: format!("{:.3e} {:.3e} {:.3e}", far.x, far.y, far.z),
+            });
+        }
         let pieces = convex_pieces(&points, &mesh);
         self.pieces
             .extend(pieces.into_iter().map(|shape| ConvexPiece { link_from_piece: place, shape }));

@@ -26,6 +26,10 @@ pub use self::motion::Motion;
 pub use self::part::{GripperPart, PosedPart, Role};
 use crate::{Error, Result};
 
+/// Farthest that a gripper may open or any of its parts may reach from the TCP, metres. Hands that open half a metre
+/// are rare; numbers beyond this are millimetres taken for metres, or accidents.
+pub const MAX_SPAN: f64 = 5.0;
+
 /// A parallel-jaw gripper. Its frame (TCP): origin between the finger pads, +z along the approach,
 /// y along the closing direction, metres.
 #[derive(Clone, Debug)]
@@ -56,8 +60,8 @@ impl Gripper {
     /// by width.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] where the opening is empty, negative or not finite, a pad has no area,
-    /// or there is no part.
+    /// [`Error::OutOfRange`] where the opening is empty, negative or beyond [`MAX_SPAN`], a pad has no area, there is
+    /// no part, or one reaches farther than [`MAX_SPAN`] from the TCP.
     pub fn new(
         name: impl Into<String>,
         opening: RangeInclusive<f64>,
@@ -76,6 +80,18 @@ impl Gripper {
         }
         if parts.is_empty() {
             return Err(out_of_range("parts", "at least one", "none".into()));
+        }
+        if open > MAX_SPAN {
+            let expected = format!("at most {MAX_SPAN} m (is it in millimetres?)");
+            return Err(out_of_range("opening", &expected, format!("{open:.3e} m")));
+        }
+        for part in &parts {
+            let reach = part.reach(closed).max(part.reach(open));
+            if reach > MAX_SPAN {
+                let expected = format!("at most {MAX_SPAN} m from the TCP (is it in millimetres?)");
+                let found = format!("link `{}` reaches {reach:.3e} m", part.link);
+                return Err(out_of_range("parts", &expected, found));
+            }
         }
         let flange_from_tcp = flange.at(closed);
         let (name, joints, notes) = (name.into(), Vec::new(), Vec::new());
@@ -238,10 +254,16 @@ mod tests {
     #[test]
     fn nonsense_is_no_gripper() {
         let part = GripperPart::new("p", Role::Palm, SharedShape::ball(0.1), Pose::IDENTITY);
+        let away = Pose::from_translation(Vector::new(0.0, 1e6, 0.0));
+        let far = GripperPart::new("f", Role::Left, SharedShape::ball(0.1), away);
+        let huge = GripperPart::new("h", Role::Left, SharedShape::ball(1e9), Pose::IDENTITY);
         for (opening, pad, parts, sound) in [
             (0.0..=0.1, [0.01, 0.01], vec![part.clone()], true),
             (0.1..=0.1, [0.01, 0.01], vec![part.clone()], false),
             (0.0..=f64::NAN, [0.01, 0.01], vec![part.clone()], false),
+            (0.0..=1e12, [0.01, 0.01], vec![part.clone()], false),
+            (0.0..=0.1, [0.01, 0.01], vec![far], false),
+            (0.0..=0.1, [0.01, 0.01], vec![huge], false),
             (0.0..=0.1, [0.0, 0.01], vec![part], false),
             (0.0..=0.1, [0.01, 0.01], vec![], false),
         ] {

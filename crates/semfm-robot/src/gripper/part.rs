@@ -49,6 +49,17 @@ impl GripperPart {
         Self { link: link.into(), role, shape, motion: motion.into() }
     }
 
+    /// How far it reaches from the TCP along an axis of its frame when the pads are `width` apart, metres.
+    pub(super) fn reach(&self, width: f64) -> f64 {
+        let bounds = self.shape.compute_aabb(&self.motion.at(width));
+        let corners = [bounds.mins, bounds.maxs];
+        // The largest of several numbers passes over what is none.
+        if !corners.iter().all(|corner| corner.is_finite()) {
+            return f64::INFINITY;
+        }
+        corners.map(|corner| corner.abs().max_element()).into_iter().fold(0.0, f64::max)
+    }
+
     /// A part of a finger that slides apart along y: `closed` is its pose in the TCP frame at width
     /// 0, and it moves by half of the width towards its own side. A part of the palm stays.
     pub fn sliding(

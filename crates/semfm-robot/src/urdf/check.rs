@@ -111,8 +111,11 @@ pub(crate) fn after(
         check_mass(&link.inertial, place, notes)?;
         check_scales(link, place)?;
     }
-    for (joint, place) in robot.joints.iter().zip(&joints) {
-        check_motion(joint, place, notes)?;
+    let elements_of_joints = elements.root().into_iter().flat_map(|root| {
+        elements.children(root).filter(|child| child.name == "joint")
+    });
+    for ((joint, place), element) in robot.joints.iter().zip(&joints).zip(elements_of_joints) {
+        check_motion(joint, place, elements.child(element, "limit"), notes)?;
     }
     check_names(robot, &joints)?;
     check_mimics(robot, &joints)?;
@@ -162,7 +165,12 @@ fn check_scales(link: &urdf_rs::Link, place: &str) -> Result<()> {
     Ok(())
 }
 
-fn check_motion(joint: &urdf_rs::Joint, place: &str, notes: &mut Vec<String>) -> Result<()> {
+fn check_motion(
+    joint: &urdf_rs::Joint,
+    place: &str,
+    limit: Option<&Element>,
+    notes: &mut Vec<String>,
+) -> Result<()> {
     use urdf_rs::JointType::{Continuous, Planar, Prismatic, Revolute};
     let turns = matches!(joint.joint_type, Revolute | Continuous | Prismatic | Planar);
     let axis = joint.axis.xyz.0;
@@ -177,7 +185,14 @@ fn check_motion(joint: &urdf_rs::Joint, place: &str, notes: &mut Vec<String>) ->
             let expected = format!("an upper limit of at least {lower}");
             return Err(Fault::new("limit", place, expected, upper));
         }
-        if lower == upper {
+        let is_told =
+            limit.is_some_and(|limit| ["lower", "upper"].iter().any(|end| limit.attribute(end).is_some()));
+        if !is_told {
+            let kind = if joint.joint_type == Revolute { "revolute" } else { "prismatic" };
+            notes.push(format!(
+                "{place}: a {kind} joint without limits (`lower` and `upper` of `limit`) does not move"
+            ));
+        } else if lower == upper {
             notes.push(format!("{place}: no range of motion"));
         }
     }
@@ -199,18 +214,28 @@ fn check_names(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
 fn check_mimics(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
     let index: HashMap<&str, usize> =
         robot.joints.iter().enumerate().map(|(i, joint)| (joint.name.as_str(), i)).collect();
-    for (i, place) in places.iter().enumerate() {
-        let (mut at, mut steps) = (i, 0);
+    // The end of the chain of each joint that was followed, so that no chain is walked twice.
+    let mut ends = vec![false; places.len()];
+    let mut walk_of = vec![usize::MAX; places.len()];
+    for (walk, place) in places.iter().enumerate() {
+        let mut at = walk;
+        let mut chain = Vec::new();
         while let Some(mimic) = &robot.joints[at].mimic {
+            if ends[at] {
+                break;
+            }
+            if walk_of[at] == walk {
+                return Err(Fault::new("cycle", place, "a mimic that ends", "a cycle"));
+            }
+            walk_of[at] = walk;
+            chain.push(at);
             let Some(&next) = index.get(mimic.joint.as_str()) else {
                 let found = quoted(&mimic.joint);
                 return Err(Fault::new("reference", place, "a mimic of a joint there is", found));
             };
-            (at, steps) = (next, steps + 1);
-            if steps > places.len() {
-                return Err(Fault::new("cycle", place, "a mimic that ends", "a cycle"));
-            }
+            at = next;
         }
+        chain.into_iter().for_each(|joint| ends[joint] = true);
     }
     Ok(())
 }
@@ -250,20 +275,31 @@ fn check_tree(robot: &urdf_rs::Robot, places: &[String]) -> Result<Findings> {
     Ok(findings)
 }
 
-/// Takes away links without an incoming joint until none is left or a cycle is.
+/// Takes away joints from links that no joint leads to until none is left or a cycle is (Kahn 1962, "Topological sorting
+/// of large networks").
 fn check_cycles(robot: &urdf_rs::Robot, places: &[String]) -> Result<()> {
-    let mut left: Vec<usize> = (0..robot.joints.len()).collect();
-    loop {
-        let children: HashSet<&str> =
-            left.iter().map(|&j| robot.joints[j].child.link.as_str()).collect();
-        let n_before = left.len();
-        left.retain(|&j| children.contains(robot.joints[j].parent.link.as_str()));
-        if left.len() == n_before {
-            break;
+    let mut joints_on: HashMap<&str, Vec<usize>> = HashMap::new();
+    let mut n_parents: HashMap<&str, usize> = HashMap::new();
+    for (i, joint) in robot.joints.iter().enumerate() {
+        joints_on.entry(&joint.parent.link).or_default().push(i);
+        *n_parents.entry(&joint.child.link).or_default() += 1;
+    }
+    let mut left = vec![true; robot.joints.len()];
+    let mut free: Vec<&str> =
+        joints_on.keys().copied().filter(|link| !n_parents.contains_key(link)).collect();
+    while let Some(link) = free.pop() {
+        for &joint in joints_on.get(link).into_iter().flatten() {
+            left[joint] = false;
+            let child = robot.joints[joint].child.link.as_str();
+            let parents = n_parents.entry(child).or_default();
+            *parents -= 1;
+            if *parents == 0 {
+                free.push(child);
+            }
         }
     }
-    match left.first() {
-        Some(&joint) => {
+    match left.iter().position(|&left| left) {
+        Some(joint) => {
             Err(Fault::new("cycle", places[joint].clone(), "joints without a cycle", "a cycle"))
         }
         None => Ok(()),
@@ -277,14 +313,17 @@ fn check_roots(
     roots: &[&urdf_rs::Link],
     findings: &mut Findings,
 ) -> Result<()> {
+    let bears: HashSet<&str> =
+        robot.joints.iter().map(|joint| joint.parent.link.as_str()).collect();
+    let is_bare = |link: &urdf_rs::Link| is_bodiless(link) && !bears.contains(link.name.as_str());
     match roots {
         [_] => Ok(()),
         [] => {
             findings.tree.push("no root: no link that no joint leads to".into());
             Ok(())
         }
-        _ if roots.iter().filter(|link| !is_bare(link, robot)).count() == 1 => {
-            for link in roots.iter().filter(|link| is_bare(link, robot)) {
+        _ if roots.iter().filter(|link| !is_bare(link)).count() == 1 => {
+            for link in roots.iter().filter(|link| is_bare(link)) {
                 let name = short(&link.name);
                 findings.tree.push(format!("link `{name}` is bare and connected to nothing"));
             }
@@ -298,10 +337,7 @@ fn check_roots(
     }
 }
 
-/// A frame without a body, and without links on it.
-fn is_bare(link: &urdf_rs::Link, robot: &urdf_rs::Robot) -> bool {
-    link.visual.is_empty()
-        && link.collision.is_empty()
-        && link.inertial.mass.value == 0.0
-        && robot.joints.iter().all(|joint| joint.parent.link != link.name)
+/// A frame without a body.
+fn is_bodiless(link: &urdf_rs::Link) -> bool {
+    link.visual.is_empty() && link.collision.is_empty() && link.inertial.mass.value == 0.0
 }

@@ -1,5 +1,6 @@
 //! A URDF file as it was found: sound in itself, perhaps not yet a tree.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use semfm_geom::io::{foreign_kind, read_at_most};
@@ -107,12 +108,12 @@ impl RobotDescription {
     pub fn meshes(&self, paths: &MeshPaths) -> Result<Vec<MeshUse>> {
         let mut uses: Vec<MeshUse> = Vec::new();
         for (link, place) in self.robot.links.iter().zip(&self.findings.link_places) {
-            let first = uses.len();
+            let mut known = HashSet::new();
             let visuals = link.visual.iter().map(|visual| &visual.geometry);
             let solids = link.collision.iter().map(|collision| &collision.geometry);
             for geometry in visuals.chain(solids) {
                 let urdf_rs::Geometry::Mesh { filename, .. } = geometry else { continue };
-                if uses[first..].iter().any(|known| known.filename == *filename) {
+                if !known.insert(filename) {
                     continue;
                 }
                 let place = format!("{place}: mesh");
@@ -171,8 +172,9 @@ fn clean_copy(elements: &XmlElements) -> std::result::Result<String, Fault> {
         out.push_str(&format!(" version=\"{version}\""));
     }
     out.push('>');
-    for child in elements.children(root) {
-        if child.name == "link" || child.name == "joint" {
+    // First all of one kind: where links and joints take turns, the parser goes through all that follows for each.
+    for kind in ["link", "joint"] {
+        for child in elements.children(root).filter(|child| child.name == kind) {
             schema::write(elements, child, &mut out)?;
         }
     }

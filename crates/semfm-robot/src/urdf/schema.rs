@@ -6,6 +6,10 @@
 use super::fault::{Fault, quoted};
 use super::xml::{Element, XmlElements};
 
+/// Largest number of a length, an angle, a mass or a factor. Nothing in a robot comes near it, and products of several
+/// stay finite.
+const MAX_NUMBER: f64 = 1e12;
+
 /// What an attribute's text must be.
 #[derive(Clone, Copy)]
 enum Value {
@@ -242,6 +246,9 @@ fn check_value(element: &Element, name: &str, value: Value, text: &str) -> Resul
     let infinite = matches!(value, Value::Limit);
     if numbers.iter().any(|x| x.is_nan() || !(infinite || x.is_finite())) {
         return Err(Fault::new("non-finite", place, "finite", quoted(text)));
+    }
+    if !infinite && numbers.iter().any(|x| x.abs() > MAX_NUMBER) {
+        return Err(Fault::new(code, place, format!("at most {MAX_NUMBER:e}"), quoted(text)));
     }
     if matches!(value, Value::Size(_)) && numbers.iter().any(|&x| x < 0.0) {
         return Err(Fault::new("geometry", place, "not negative", quoted(text)));

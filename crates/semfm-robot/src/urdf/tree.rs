@@ -27,11 +27,12 @@ pub(crate) fn build(robot: &urdf_rs::Robot) -> Result<Robot, Fault> {
         let parent = link_by_name(&by_name, &joint.parent.link)?;
         ends.push(Ends { parent, child: link_by_name(&by_name, &joint.child.link)? });
     }
-    let root = (0..robot.links.len()).find(|&i| ends.iter().all(|ends| ends.child != i));
-    let Some(root) = root else {
+    let mut is_child = vec![false; robot.links.len()];
+    ends.iter().for_each(|ends| is_child[ends.child] = true);
+    let Some(root) = is_child.iter().position(|is_child| !is_child) else {
         return Err(Fault::new("tree", "robot", "a root", "none"));
     };
-    let order = outwards(root, &ends);
+    let order = outwards(root, robot.links.len(), &ends);
     if order.len() != ends.len() {
         return Err(Fault::new("tree", "robot", "joints that hang together", "some that do not"));
     }
@@ -55,14 +56,17 @@ fn link_by_name(by_name: &HashMap<&str, usize>, name: &str) -> Result<usize, Fau
 }
 
 /// Joints so that each comes after the one that leads to its parent.
-fn outwards(root: usize, ends: &[Ends]) -> Vec<usize> {
+fn outwards(root: usize, n_links: usize, ends: &[Ends]) -> Vec<usize> {
+    let mut joints_on = vec![Vec::new(); n_links];
+    for (joint, ends) in ends.iter().enumerate() {
+        joints_on[ends.parent].push(joint);
+    }
     let (mut order, mut front) = (Vec::new(), VecDeque::from([root]));
     while let Some(link) = front.pop_front() {
-        for (joint, &Ends { parent, child }) in ends.iter().enumerate() {
-            if parent == link {
-                order.push(joint);
-                front.push_back(child);
-            }
+        // Each link is left once: a second parent would bring its joints in again.
+        for joint in std::mem::take(&mut joints_on[link]) {
+            order.push(joint);
+            front.push_back(ends[joint].child);
         }
     }
     order

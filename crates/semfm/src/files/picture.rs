@@ -3,25 +3,44 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageError, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use semfm_geom::io::{FormatError, foreign_kind, read_file};
 
 use crate::Result;
 
+/// Bytes that a colour profile or a text beside the pixels may unpack to, and those that the pixels may.
+const MOST_BESIDE: u64 = 16 << 20;
+const MOST_PIXEL_BYTES: u64 = 1 << 30;
+
 /// Reads a picture.
 ///
 /// # Errors
-/// [`semfm_geom::Error::Io`]; [`Error::Format`](crate::Error::Format) where it is none.
+/// [`semfm_geom::Error::Io`]; [`Error::Format`](crate::Error::Format) where it is none, or where it unpacks to more
+/// than a gigabyte.
 pub(super) fn read_picture(path: &Path) -> Result<DynamicImage> {
     let bytes = read_file(path)?;
-    let picture = ImageReader::new(Cursor::new(&bytes))
-        .with_guessed_format()
-        .map_err(ImageError::IoError)
-        .and_then(ImageReader::decode);
-    picture.map_err(|error| {
+    decode(&bytes).map_err(|error| {
         let is_ours = matches!(error, ImageError::Decoding(_) | ImageError::Limits(_));
         let kind = foreign_kind(&bytes).filter(|_| !is_ours);
         let found = kind.map_or_else(|| error.to_string(), Into::into);
         FormatError::new(path, "picture", "a PNG or JPEG", found).into()
     })
+}
+
+fn decode(bytes: &[u8]) -> std::result::Result<DynamicImage, ImageError> {
+    let mut reader =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(ImageError::IoError)?;
+    // A colour profile unpacks while the decoder is made, pixels when they are asked for.
+    reader.limits(at_most(MOST_BESIDE));
+    let mut decoder = reader.into_decoder()?;
+    let mut limits = at_most(MOST_PIXEL_BYTES);
+    limits.reserve(decoder.total_bytes())?;
+    decoder.set_limits(limits)?;
+    DynamicImage::from_decoder(decoder)
+}
+
+fn at_most(bytes: u64) -> Limits {
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(bytes);
+    limits
 }

@@ -8,7 +8,7 @@ use crate::table::number;
 
 const SIZE: (u32, u32) = (620, 380);
 
-/// The errors of each method's pairs; `high` ends the axis.
+/// The errors of each method's pairs; `high`, which is finite and above 0, ends the axis.
 pub(in crate::report) fn draw(methods: &[Vec<f64>], high: f64) -> Result<String, DrawError> {
     svg(SIZE, |area| {
         let mut chart = ChartBuilder::on(area)

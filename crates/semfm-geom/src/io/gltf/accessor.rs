@@ -4,6 +4,13 @@ use super::buffers::Buffers;
 use super::json::{Accessor, Root, Whole};
 use crate::Result;
 use crate::io::input::Input;
+use crate::math::DMat4;
+
+/// Vertices and triangles that a file of no size may make out of repeated instances; a file may
+/// have more in proportion to its bytes. With 24 bytes a vertex and 36 a triangle this stays below 200 MB and 40 times
+/// the file.
+const FREE_VERTICES: usize = 2_000_000;
+const FREE_TRIANGLES: usize = 4_000_000;
 
 /// Reads accessors of one file.
 pub(crate) struct Accessors<'a> {
@@ -84,6 +91,16 @@ impl<'a> Strided<'a> {
 }
 
 impl<'a> Accessors<'a> {
+    /// Most vertices that instances may make out of the file.
+    pub fn max_vertices(&self) -> usize {
+        FREE_VERTICES + self.buffers.n_loaded() / 4
+    }
+
+    /// Most triangles that instances may make out of the file.
+    pub fn max_triangles(&self) -> usize {
+        FREE_TRIANGLES + self.buffers.n_loaded() / 2
+    }
+
     /// The JSON of an accessor.
     pub fn get(&self, accessor: usize) -> Result<&'a Accessor> {
         self.root.accessors.get(accessor).ok_or_else(|| {
@@ -106,6 +123,17 @@ impl<'a> Accessors<'a> {
                 component.decode(&bytes[c * component.size()..], json.normalized)
             })
         })
+    }
+
+    /// 4 × 4 matrices of 32-bit numbers.
+    pub fn matrices(&self, accessor: usize) -> Result<Vec<DMat4>> {
+        let json = self.get(accessor)?;
+        let component = self.component(accessor, json, "MAT4", &[Component::F32])?;
+        let zero = [0.0; 16];
+        let matrices = self.elements(accessor, json, 16 * component.size(), zero, |bytes: &[u8]| {
+            std::array::from_fn(|c| component.decode(&bytes[c * component.size()..], false))
+        })?;
+        Ok(matrices.iter().map(DMat4::from_cols_array).collect())
     }
 
     /// Vertex indices.
@@ -148,6 +176,10 @@ impl<'a> Accessors<'a> {
         let place = format!("accessor {accessor}");
         let count = json.count.0;
         let mut elements = match json.buffer_view {
+            None if count > self.max_vertices() => {
+                let expected = format!("at most {} elements without bytes", self.max_vertices());
+                return Err(self.input.error(place, expected, count.to_string()));
+            }
             None => vec![zero; count],
             Some(view) => {
                 let strided = self.strided(&place, view, json.byte_offset, count, size)?;

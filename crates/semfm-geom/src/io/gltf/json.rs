@@ -37,6 +37,10 @@ pub(crate) struct Root {
     #[serde(default)]
     pub meshes: Vec<Mesh>,
     #[serde(default)]
+    pub skins: Vec<Skin>,
+    #[serde(default)]
+    pub animations: Vec<IgnoredAny>,
+    #[serde(default)]
     pub accessors: Vec<Accessor>,
     #[serde(default)]
     pub buffer_views: Vec<BufferView>,
@@ -81,12 +85,48 @@ pub(crate) struct Node {
     /// x, y, z, w.
     pub rotation: Option<[f64; 4]>,
     pub scale: Option<[f64; 3]>,
+    /// Of the mesh's morph targets, in place of the mesh's own.
+    pub weights: Option<Vec<f64>>,
+    #[serde(default)]
+    pub extensions: NodeExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct NodeExtensions {
+    #[serde(rename = "KHR_node_visibility")]
+    pub visibility: Option<NodeVisibility>,
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instancing: Option<MeshGpuInstancing>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(crate) struct NodeVisibility {
+    /// True unless it says otherwise.
+    pub visible: Option<bool>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(crate) struct MeshGpuInstancing {
+    /// TRANSLATION, ROTATION and SCALE of each instance.
+    #[serde(default)]
+    pub attributes: HashMap<String, Whole>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Skin {
+    #[serde(default)]
+    pub joints: Vec<Whole>,
+    pub inverse_bind_matrices: Option<Whole>,
 }
 
 #[derive(Debug, Deserialize)]
 pub(crate) struct Mesh {
     #[serde(default)]
     pub primitives: Vec<Primitive>,
+    /// Of the primitives' morph targets; zeros where they are absent.
+    #[serde(default)]
+    pub weights: Vec<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -96,6 +136,9 @@ pub(crate) struct Primitive {
     pub indices: Option<Whole>,
     pub material: Option<Whole>,
     pub mode: Option<Whole>,
+    /// Morph targets: displacements by attribute.
+    #[serde(default)]
+    pub targets: Vec<HashMap<String, Whole>>,
     #[serde(default)]
     pub extensions: HashMap<String, IgnoredAny>,
 }

@@ -1,9 +1,10 @@
 //! glTF 2.0 and GLB: the default scene as one mesh.
 //!
-//! Nodes are visited depth first from the scene's roots, each mesh is copied once per node that
-//! shows it, and transforms are applied; a mirroring transform turns the triangles around so that
-//! they still face outwards. Points and lines are skipped. Morph targets stay at rest; a skinned
-//! mesh keeps the pose it was modelled in, since its node's transform does not count
+//! The surface is the one that viewers show before any animation is played. Nodes are visited depth first from the
+//! scene's roots, each mesh is copied once per node that shows it (or per instance of EXT_mesh_gpu_instancing), and
+//! transforms are applied; a mirroring transform turns the triangles around so that they still face outwards. Hidden
+//! nodes (KHR_node_visibility), points and lines are left out. Morph targets count with the weights of the node or the
+//! mesh. The vertices of a skinned mesh stand where the joints carry them; its node's transform does not count
 //! (glTF 2.0, section 3.7.3.3).
 
 mod accessor;
@@ -11,6 +12,7 @@ mod buffers;
 mod json;
 mod material;
 mod scene;
+mod skin;
 mod write;
 
 use self::accessor::Accessors;
@@ -22,13 +24,17 @@ use super::input::{Input, quote};
 use crate::Result;
 
 /// Extensions that change nothing we read, or that we follow.
-const KNOWN_EXTENSIONS: [&str; 5] = [
+const KNOWN_EXTENSIONS: [&str; 6] = [
+    "EXT_mesh_gpu_instancing",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
     "KHR_lights_punctual",
     "KHR_node_visibility",
     "KHR_animation_pointer",
 ];
+
+/// What a compressed file is refused for.
+const UNCOMPRESSED: &str = "uncompressed geometry (export without compression)";
 
 /// The row of glTF as JSON in the table of formats.
 pub(super) const GLTF: FormatRow = FormatRow {
@@ -156,10 +162,10 @@ fn is_known_extension(name: &str) -> bool {
 }
 
 fn check_extensions(input: Input<'_>, root: &Root) -> Result<()> {
-    match root.extensions_required.iter().find(|name| !is_known_extension(name)) {
-        Some(name) => {
-            Err(input.error("extensionsRequired", "extensions we follow", quote(name.as_bytes())))
-        }
-        None => Ok(()),
-    }
+    let Some(name) = root.extensions_required.iter().find(|name| !is_known_extension(name)) else {
+        return Ok(());
+    };
+    let is_compression = name.contains("meshopt") || name.contains("draco");
+    let expected = if is_compression { UNCOMPRESSED } else { "extensions we follow" };
+    Err(input.error("extensionsRequired", expected, quote(name.as_bytes())))
 }

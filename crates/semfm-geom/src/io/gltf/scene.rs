@@ -2,20 +2,29 @@
 
 use std::collections::HashMap;
 
+use super::UNCOMPRESSED;
 use super::accessor::{Accessors, Component};
-use super::json::{Node, Primitive, Whole};
+use super::json::{MeshGpuInstancing, Node, Primitive, Whole};
 use super::material::Surface;
+use super::skin::{PosedSkin, scene_from_nodes};
 use crate::io::appearance::{Appearance, MISSING_UV, rgba_from_floats};
 use crate::io::format_row::MeshParts;
 use crate::io::image::ImageBudget;
 use crate::math::{DAffine3, DMat4, DQuat, DVec3};
 use crate::{Error, Result};
 
-/// Vertices and triangles that a file of no size may make out of repeated instances; a file may
-/// have more in proportion to its bytes. With 24 bytes a vertex and 36 a triangle this stays within
-/// the reader's promise of 64 MB and 40 times the file.
-const FREE_VERTICES: usize = 400_000;
-const FREE_TRIANGLES: usize = 800_000;
+/// Displacements of morph targets that are added, for each vertex that a file may have: every target may have as many as
+/// its mesh has vertices, and all may share their bytes.
+const TARGETS_PER_VERTEX: usize = 32;
+
+/// Where a mesh is shown.
+#[derive(Clone, Copy)]
+enum Placement<'a> {
+    /// All of it moved alike: `scene_from_mesh`.
+    Rigid(DAffine3),
+    /// Each vertex with its joints; what has none, with its node.
+    Skinned(&'a PosedSkin, DAffine3),
+}
 
 pub(crate) struct SceneReader<'a> {
     accessors: &'a Accessors<'a>,
@@ -23,6 +32,11 @@ pub(crate) struct SceneReader<'a> {
     budget: Option<ImageBudget>,
     surfaces: HashMap<Option<usize>, (u32, Surface)>,
     material_of: Vec<u32>,
+    /// Displacements of morph targets read so far.
+    n_displacements: usize,
+    /// Nodes that are hidden, primitives that are points or lines.
+    n_hidden: usize,
+    n_without_surface: usize,
 }
 
 impl<'a> SceneReader<'a> {
@@ -33,7 +47,16 @@ impl<'a> SceneReader<'a> {
             n_faces: 0,
             appearance: Appearance::default(),
         };
-        Self { accessors, parts, budget: None, surfaces: HashMap::new(), material_of: Vec::new() }
+        Self {
+            accessors,
+            parts,
+            budget: None,
+            surfaces: HashMap::new(),
+            material_of: Vec::new(),
+            n_displacements: 0,
+            n_hidden: 0,
+            n_without_surface: 0,
+        }
     }
 
     /// Reads all triangles of the default scene. Without any scene the file is a library: the nodes
@@ -54,7 +77,7 @@ impl<'a> SceneReader<'a> {
             }
             None => {
                 for mesh in 0..root.meshes.len() {
-                    self.add_mesh(mesh, DAffine3::IDENTITY)?;
+                    self.add_mesh(mesh, None, Placement::Rigid(DAffine3::IDENTITY))?;
                 }
             }
         }
@@ -65,10 +88,16 @@ impl<'a> SceneReader<'a> {
     /// or a ring without end, both of which glTF forbids.
     fn traverse(&mut self, roots: &[Whole]) -> Result<()> {
         let root = self.accessors.root;
+        let poses = if root.nodes.iter().any(|node| node.skin.is_some()) {
+            scene_from_nodes(&root.nodes, &parentless(&root.nodes), |id, n| self.transform(id, n))?
+        } else {
+            Vec::new()
+        };
+        let mut skins: HashMap<usize, PosedSkin> = HashMap::new();
         let mut met = vec![false; root.nodes.len()];
-        let mut stack: Vec<(usize, DAffine3)> =
-            roots.iter().rev().map(|node| (node.0, DAffine3::IDENTITY)).collect();
-        while let Some((id, scene_from_parent)) = stack.pop() {
+        let mut stack: Vec<(usize, DAffine3, bool)> =
+            roots.iter().rev().map(|node| (node.0, DAffine3::IDENTITY, true)).collect();
+        while let Some((id, scene_from_parent, parent_is_visible)) = stack.pop() {
             let Some(node) = root.nodes.get(id) else {
                 let found = format!("{} of them", root.nodes.len());
                 return Err(self.error_at_node(id, "a node that exists", found));
@@ -77,13 +106,76 @@ impl<'a> SceneReader<'a> {
                 return Err(self.error_at_node(id, "one parent", "the node is met twice".into()));
             }
             let scene_from_node = scene_from_parent * self.transform(id, node)?;
+            // A node is shown where it and all above it are visible (KHR_node_visibility).
+            let told = node.extensions.visibility.as_ref().and_then(|told| told.visible);
+            let is_visible = parent_is_visible && told.unwrap_or(true);
             if let Some(mesh) = node.mesh {
-                let still = node.skin.is_some();
-                self.add_mesh(mesh.0, if still { DAffine3::IDENTITY } else { scene_from_node })?;
+                let weights = node.weights.as_deref();
+                if !is_visible {
+                    self.n_hidden += 1;
+                } else if let Some(Whole(skin)) = node.skin {
+                    if !skins.contains_key(&skin) {
+                        skins.insert(skin, PosedSkin::new(self.accessors, skin, &poses)?);
+                    }
+                    let placement = Placement::Skinned(&skins[&skin], scene_from_node);
+                    self.add_mesh(mesh.0, weights, placement)?;
+                } else if let Some(instancing) = &node.extensions.instancing {
+                    for node_from_instance in self.instances(id, instancing, mesh.0)? {
+                        let placement = Placement::Rigid(scene_from_node * node_from_instance);
+                        self.add_mesh(mesh.0, weights, placement)?;
+                    }
+                } else {
+                    self.add_mesh(mesh.0, weights, Placement::Rigid(scene_from_node))?;
+                }
             }
-            stack.extend(node.children.iter().rev().map(|child| (child.0, scene_from_node)));
+            let children = node.children.iter().rev();
+            stack.extend(children.map(|child| (child.0, scene_from_node, is_visible)));
         }
         Ok(())
+    }
+
+    /// The poses of a mesh that one node shows many times (EXT_mesh_gpu_instancing).
+    fn instances(
+        &self,
+        id: usize,
+        instancing: &MeshGpuInstancing,
+        mesh: usize,
+    ) -> Result<Vec<DAffine3>> {
+        let mut count = None;
+        for &Whole(accessor) in instancing.attributes.values() {
+            let n = self.accessors.get(accessor)?.count.0;
+            if *count.get_or_insert(n) != n {
+                let expected = "as many translations as rotations and scales";
+                return Err(self.error_at_node(id, expected, "other counts".into()));
+            }
+        }
+        let count = count.unwrap_or(0);
+        // Before anything is reserved for them: each shows a primitive at least.
+        let n_primitives =
+            self.accessors.root.meshes.get(mesh).map_or(0, |mesh| mesh.primitives.len()).max(1);
+        if count.saturating_mul(n_primitives) > self.accessors.max_vertices() {
+            let expected = format!("at most {} instances", self.accessors.max_vertices());
+            return Err(self.error_at_node(id, &expected, count.to_string()));
+        }
+        let attribute = |name: &str| instancing.attributes.get(name).map(|accessor| accessor.0);
+        let vectors = |name: &str, default: f64| match attribute(name) {
+            Some(accessor) => self.accessors.vectors::<3>(accessor, &[Component::F32]),
+            None => Ok(vec![[default; 3]; count]),
+        };
+        let (translations, scales) = (vectors("TRANSLATION", 0.0)?, vectors("SCALE", 1.0)?);
+        let rotations = match attribute("ROTATION") {
+            Some(accessor) => {
+                let allowed = [Component::F32, Component::I8, Component::I16];
+                self.accessors.vectors::<4>(accessor, &allowed)?
+            }
+            None => vec![[0.0, 0.0, 0.0, 1.0]; count],
+        };
+        let parts = translations.into_iter().zip(rotations).zip(scales);
+        parts
+            .map(|((translation, rotation), scale)| {
+                self.placed(id, translation, rotation, scale)
+            })
+            .collect()
     }
 
     /// `parent_from_node`: the matrix, or translation × rotation × scale.
@@ -104,14 +196,31 @@ impl<'a> SceneReader<'a> {
             }
             return Ok(DAffine3::from_mat4(matrix));
         }
-        let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+        let rotation = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        self.placed(
+            id,
+            node.translation.unwrap_or_default(),
+            rotation,
+            node.scale.unwrap_or([1.0; 3]),
+        )
+    }
+
+    /// Translation × rotation × scale.
+    fn placed(
+        &self,
+        id: usize,
+        translation: [f64; 3],
+        rotation: [f64; 4],
+        scale: [f64; 3],
+    ) -> Result<DAffine3> {
+        let rotation = DQuat::from_array(rotation);
         if rotation.length_squared() == 0.0 {
             return Err(self.error_at_node(id, "a unit quaternion", rotation.to_string()));
         }
         Ok(DAffine3::from_scale_rotation_translation(
-            DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
+            DVec3::from_array(scale),
             rotation.normalize(),
-            DVec3::from_array(node.translation.unwrap_or_default()),
+            DVec3::from_array(translation),
         ))
     }
 
@@ -119,7 +228,13 @@ impl<'a> SceneReader<'a> {
         self.accessors.input.error(format!("node {id}"), expected, found)
     }
 
-    fn add_mesh(&mut self, mesh: usize, scene_from_mesh: DAffine3) -> Result<()> {
+    /// Shows a mesh. `weights` of its morph targets are those of the node that shows it, where that has any.
+    fn add_mesh(
+        &mut self,
+        mesh: usize,
+        weights: Option<&[f64]>,
+        placement: Placement<'_>,
+    ) -> Result<()> {
         let meshes = &self.accessors.root.meshes;
         let Some(json) = meshes.get(mesh) else {
             let found = format!("{} of them", meshes.len());
@@ -131,7 +246,7 @@ impl<'a> SceneReader<'a> {
         };
         for (i, primitive) in json.primitives.iter().enumerate() {
             let place = format!("mesh {mesh}, primitive {i}");
-            self.add_primitive(&place, primitive, scene_from_mesh)?;
+            self.add_primitive(&place, primitive, weights.unwrap_or(&json.weights), placement)?;
         }
         Ok(())
     }
@@ -141,11 +256,13 @@ impl<'a> SceneReader<'a> {
         &mut self,
         place: &str,
         primitive: &Primitive,
-        scene_from_mesh: DAffine3,
+        weights: &[f64],
+        placement: Placement<'_>,
     ) -> Result<()> {
         let mode = primitive.mode.map_or(4, |mode| mode.0);
         let Some(&Whole(position)) = primitive.attributes.get("POSITION") else { return Ok(()) };
         if mode < 4 {
+            self.n_without_surface += 1;
             return Ok(());
         }
         let input = self.accessors.input;
@@ -153,7 +270,8 @@ impl<'a> SceneReader<'a> {
         if json.buffer_view.is_none()
             && primitive.extensions.contains_key("KHR_draco_mesh_compression")
         {
-            return Err(input.error(place, "plain positions", "KHR_draco_mesh_compression"));
+            let found = "KHR_draco_mesh_compression";
+            return Err(input.error(place, UNCOMPRESSED, found));
         }
         let n_vertices = json.count.0;
         let n_corners = match primitive.indices {
@@ -168,7 +286,13 @@ impl<'a> SceneReader<'a> {
         } else {
             &[Component::F32]
         };
-        let positions = self.accessors.vectors::<3>(position, allowed)?;
+        let mut positions: Vec<DVec3> = self
+            .accessors
+            .vectors::<3>(position, allowed)?
+            .into_iter()
+            .map(DVec3::from_array)
+            .collect();
+        self.morph(place, primitive, weights, &mut positions)?;
         let corners = match primitive.indices {
             Some(indices) => self.accessors.indices(indices.0)?,
             None => (0..n_vertices as u32).collect(),
@@ -179,12 +303,9 @@ impl<'a> SceneReader<'a> {
         let Some(mut triangles) = triangles(mode, &corners) else {
             return Err(input.error(place, "a mode from 0 to 6", mode.to_string()));
         };
-        if scene_from_mesh.matrix3.determinant() < 0.0 {
-            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        }
+        self.put_in_scene(place, primitive, placement, &mut positions, &mut triangles)?;
         let offset = self.parts.vertices.len();
-        let positions = positions.into_iter().map(DVec3::from_array);
-        self.parts.vertices.extend(positions.map(|p| scene_from_mesh.transform_point3(p)));
+        self.parts.vertices.extend(positions);
         self.add_colors(place, primitive, offset, n_vertices);
         self.add_material(place, primitive, n_vertices, &triangles);
         let shifted = triangles.into_iter().map(|triangle| triangle.map(|id| id + offset as u32));
@@ -192,15 +313,86 @@ impl<'a> SceneReader<'a> {
         Ok(())
     }
 
+    /// Moves positions from the mesh's frame into the scene; where that mirrors, triangles are turned around so that
+    /// they still face outwards.
+    fn put_in_scene(
+        &self,
+        place: &str,
+        primitive: &Primitive,
+        placement: Placement<'_>,
+        positions: &mut [DVec3],
+        triangles: &mut [[u32; 3]],
+    ) -> Result<()> {
+        let scene_from_mesh = match placement {
+            Placement::Rigid(scene_from_mesh) => scene_from_mesh,
+            Placement::Skinned(skin, scene_from_node) => {
+                let poses = skin.of_vertices(self.accessors, place, primitive, positions.len())?;
+                if let Some(poses) = poses {
+                    for triangle in triangles {
+                        let signs = triangle.map(|id| poses[id as usize].matrix3.determinant());
+                        if signs.iter().sum::<f64>() < 0.0 {
+                            triangle.swap(1, 2);
+                        }
+                    }
+                    for (position, pose) in positions.iter_mut().zip(poses) {
+                        *position = pose.transform_point3(*position);
+                    }
+                    return Ok(());
+                }
+                scene_from_node
+            }
+        };
+        if scene_from_mesh.matrix3.determinant() < 0.0 {
+            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        positions.iter_mut().for_each(|p| *p = scene_from_mesh.transform_point3(*p));
+        Ok(())
+    }
+
+    /// Adds the displacements of the morph targets that have a weight (glTF 2.0, section 3.7.2.2).
+    fn morph(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        weights: &[f64],
+        positions: &mut [DVec3],
+    ) -> Result<()> {
+        let targets = primitive.targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
+        for (target, &weight) in targets {
+            let Some(&Whole(accessor)) = target.get("POSITION") else { continue };
+            let input = self.accessors.input;
+            let count = self.accessors.get(accessor)?.count.0;
+            if count != positions.len() {
+                let expected = format!("morph targets of {} displacements", positions.len());
+                return Err(input.error(place, expected, count.to_string()));
+            }
+            self.n_displacements = self.n_displacements.saturating_add(count);
+            let most = TARGETS_PER_VERTEX.saturating_mul(self.accessors.max_vertices());
+            if self.n_displacements > most {
+                let expected = format!("at most {most} displacements of morph targets");
+                return Err(input.error(place, expected, "more"));
+            }
+            let allowed =
+                [Component::F32, Component::I8, Component::U8, Component::I16, Component::U16];
+            let displacements = self.accessors.vectors::<3>(accessor, &allowed)?;
+            for (position, displacement) in positions.iter_mut().zip(displacements) {
+                *position += weight * DVec3::from_array(displacement);
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses what instances multiply beyond measure, before anything is reserved for it.
     fn check_budget(&self, place: &str, n_vertices: usize, n_corners: usize) -> Result<()> {
-        let n_bytes = self.accessors.buffers.n_loaded();
-        let max_vertices = FREE_VERTICES + n_bytes / 4;
-        let max_triangles = FREE_TRIANGLES + n_bytes / 2;
+        let max_vertices = self.accessors.max_vertices();
+        let max_triangles = self.accessors.max_triangles();
         if self.parts.vertices.len().saturating_add(n_vertices) > max_vertices
             || self.parts.faces.len().saturating_add(n_corners) > 3 * max_triangles
         {
-            let expected = format!("at most {max_vertices} vertices from a file of this size");
+            let expected = format!(
+                "at most {max_vertices} vertices and {max_triangles} triangles from a file of this size (show fewer \
+                 instances)"
+            );
             let found = format!("{n_vertices} vertices and {n_corners} corners more");
             return Err(self.accessors.input.error(place, expected, found));
         }
@@ -287,6 +479,15 @@ impl<'a> SceneReader<'a> {
 
     fn finish(mut self) -> MeshParts {
         let appearance = &mut self.parts.appearance;
+        for (count, what) in [
+            (self.n_hidden, "nodes are hidden (KHR_node_visibility) and left out"),
+            (self.n_without_surface, "primitives are points or lines and left out"),
+            (self.accessors.root.animations.len(), "animations are not played: nodes stand as placed"),
+        ] {
+            if count > 0 {
+                appearance.notes.push(format!("{count} {what}"));
+            }
+        }
         if self.surfaces.keys().any(Option::is_some) {
             let mut surfaces: Vec<_> = self.surfaces.into_values().collect();
             surfaces.sort_by_key(|&(number, _)| number);

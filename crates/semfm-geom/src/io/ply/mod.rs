@@ -37,9 +37,10 @@ pub(super) const FORMAT: FormatRow = FormatRow {
 /// Reads a PLY file as a mesh.
 fn read(input: Input<'_>) -> Result<MeshParts> {
     let file = PlyFile::read(input)?;
-    let Triangles { n_faces, faces, corner_uvs } =
+    let Triangles { n_faces, faces, corner_uvs, notes } =
         file.polygons.into_triangles(&file.vertices, &file.uvs);
-    let appearance = Appearance { vertex_colors: file.colors, corner_uvs, ..Default::default() };
+    let appearance =
+        Appearance { vertex_colors: file.colors, corner_uvs, notes, ..Default::default() };
     Ok(MeshParts { vertices: file.vertices, faces, n_faces, appearance })
 }
 
