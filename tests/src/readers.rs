@@ -134,7 +134,8 @@ fn robot(path: &Path) -> bool {
     let Ok(gripper) = Gripper::from_urdf(&urdf, &GripperSettings::default()) else { return false };
     let Ok(gripper) = GripperGeometry::new(&gripper) else { return false };
     static OBJECT: OnceLock<GraspObject> = OnceLock::new();
-    let object = OBJECT.get_or_init(|| GraspObject::from_mesh(seed_mesh(), 0.05).expect("a container"));
+    let object =
+        OBJECT.get_or_init(|| GraspObject::from_mesh(seed_mesh(), 0.05).expect("a container"));
     let weights = vec![1.0; object.n_weights()];
     let settings = GraspSettings { n_samples: 4, neighbour_rounds: 0, ..Default::default() };
     let task = Task::default();

@@ -10,9 +10,7 @@ use semfm::grasp::GraspSettings;
 use semfm::robot::Gripper;
 use semfm::views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata, write_views};
 use semfm::views::{EmbeddedView, PatchEmbeddings, PatchGrid, View};
-use semfm::{
-    FeatureSource, GraspRequest, Mesh, PipelineSettings, Region, Task, prepare, transfer,
-};
+use semfm::{FeatureSource, GraspRequest, Mesh, PipelineSettings, Region, Task, prepare, transfer};
 
 use crate::readers::{ROBOT_MESH, seed_mesh};
 use crate::shell::shared;
@@ -45,7 +43,10 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
         "embeddings" => [Dtype::F16, Dtype::F32].map(|d| embeddings(folder.path(), d)).into(),
         "json" => jsons(folder.path()),
         "urdf" => robots(folder.path()),
-        "npy" => vec![npy("<f4", seed_mesh().n_vertices(), 2, 4), npy("<f8", seed_mesh().n_vertices(), 1, 8)],
+        "npy" => vec![
+            npy("<f4", seed_mesh().n_vertices(), 2, 4),
+            npy("<f8", seed_mesh().n_vertices(), 1, 8),
+        ],
         "npz" => vec![npz()],
         "png" => pngs(),
         other => panic!("no reader `{other}`"),
@@ -275,7 +276,8 @@ fn robots(folder: &Path) -> Vec<Vec<u8>> {
 </robot>"#;
     // A cube of edge 1 from the origin.
     let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let cube = Mesh::new((0..8).map(corner).collect(), faces).expect("a cube");
     let path = folder.join("finger.stl");
@@ -305,13 +307,27 @@ fn npy(dtype: &str, rows: usize, columns: usize, width: usize) -> Vec<u8> {
 
 /// An archive of stored arrays without checksums that fit: the damage is in the directory.
 fn npz() -> Vec<u8> {
-    let arrays = [("V.npy", npy("<f8", 4, 3, 8)), ("F.npy", npy("<i4", 2, 3, 4)), ("gt.npy", npy("<i8", 2, 1, 8))];
+    let arrays = [
+        ("V.npy", npy("<f8", 4, 3, 8)),
+        ("F.npy", npy("<i4", 2, 3, 4)),
+        ("gt.npy", npy("<i8", 2, 1, 8)),
+    ];
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     for (name, array) in &arrays {
         let at = bytes.len() as u32;
-        let sizes = [crc32(array), array.len() as u32, array.len() as u32].map(u32::to_le_bytes).concat();
+        let sizes =
+            [crc32(array), array.len() as u32, array.len() as u32].map(u32::to_le_bytes).concat();
         let lengths = [name.len() as u16, 0].map(u16::to_le_bytes).concat();
-        bytes.extend([b"PK\x03\x04\x14\0\0\0\0\0\0\0\0\0".as_slice(), &sizes, &lengths, name.as_bytes(), array].concat());
+        bytes.extend(
+            [
+                b"PK\x03\x04\x14\0\0\0\0\0\0\0\0\0".as_slice(),
+                &sizes,
+                &lengths,
+                name.as_bytes(),
+                array,
+            ]
+            .concat(),
+        );
         directory.extend(
             [
                 b"PK\x01\x02\x14\0\x14\0\0\0\0\0\0\0\0\0".as_slice(),
@@ -335,7 +351,9 @@ fn npz() -> Vec<u8> {
 /// The checksum of ZIP, a bit at a time.
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+        })
     })
 }
 
@@ -346,6 +364,7 @@ fn pngs() -> Vec<Vec<u8>> {
         bytes.into_inner()
     };
     let depth = image::ImageBuffer::from_fn(16, 12, |x, y| image::Luma([(500 + x * y) as u16]));
-    let mask = image::RgbaImage::from_fn(16, 12, |x, _| image::Rgba([255, 255, 255, (x * 16) as u8]));
+    let mask =
+        image::RgbaImage::from_fn(16, 12, |x, _| image::Rgba([255, 255, 255, (x * 16) as u8]));
     vec![encoded(depth.into()), encoded(mask.into())]
 }

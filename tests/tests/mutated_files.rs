@@ -79,7 +79,13 @@ fn start_child(reader: &Reader, folder: &Path, from: u64) -> Child {
     Command::new("sh")
         .args(["-c", r#"ulimit -v "$0"; exec "$@""#, &kilobytes.to_string()])
         .arg(std::env::current_exe().unwrap())
-        .args(["--exact", "damaged_files_are_read_or_refused", "--nocapture", "--test-threads", "1"])
+        .args([
+            "--exact",
+            "damaged_files_are_read_or_refused",
+            "--nocapture",
+            "--test-threads",
+            "1",
+        ])
         .env(CHILD, format!("{}={}", reader.name, folder.display()))
         .env("SEMFM_MUTATED_FROM", from.to_string())
         .env("RAYON_NUM_THREADS", "1")

@@ -67,7 +67,11 @@ fn a_region_crosses_seams_in_every_format() {
         assert!(missing + more <= expected.len() / 50, "{name}: {missing} missing, {more} more");
         let info = run(&["info", "--json", path.to_str().unwrap()]);
         let info: serde_json::Value = serde_json::from_str(&info.out).unwrap();
-        assert_eq!((&info["components"], &info["boundary_edges"]), (&1.into(), &0.into()), "{name}");
+        assert_eq!(
+            (&info["components"], &info["boundary_edges"]),
+            (&1.into(), &0.into()),
+            "{name}"
+        );
     }
 }
 
@@ -100,10 +104,9 @@ fn a_pile_of_one_triangle_costs_no_time() {
     let [mesh, region] = [&mesh, &region].map(|path| path.to_str().unwrap().to_owned());
     let p = whole.corners(7)[0];
     let near = format!("--near={},{},{}", p.x, p.y, p.z);
-    for arguments in [
-        vec!["info", &mesh],
-        vec!["region", &mesh, "-o", &region, &near, "--radius", "0.3"],
-    ] {
+    for arguments in
+        [vec!["info", &mesh], vec!["region", &mesh, "-o", &region, &near, "--radius", "0.3"]]
+    {
         let start = Instant::now();
         let answer = run(&arguments);
         assert!(matches!(answer.code, Some(0 | 1)), "{arguments:?}: {answer:?}");
@@ -140,9 +143,24 @@ fn a_hand_of_kilometres_is_refused_at_once() {
         let [mesh, region, hand, out] = ["a.obj", "r.json", "h.urdf", "g.json"].map(at);
         let [mesh, region, hand, out] =
             [&mesh, &region, &hand, &out].map(|path| path.to_str().unwrap());
-        let answer = run(&["grasp", mesh, "--region", region, "--gripper", hand, "--scale", "0.1", "-o", out]);
+        let answer = run(&[
+            "grasp",
+            mesh,
+            "--region",
+            region,
+            "--gripper",
+            hand,
+            "--scale",
+            "0.1",
+            "-o",
+            out,
+        ]);
         assert_eq!(answer.code, Some(2), "{answer:?}");
-        assert!(answer.err.contains("millimetres?") && answer.err.contains("h.urdf"), "{}", answer.err);
+        assert!(
+            answer.err.contains("millimetres?") && answer.err.contains("h.urdf"),
+            "{}",
+            answer.err
+        );
         assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
     }
 }

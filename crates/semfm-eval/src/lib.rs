@@ -36,8 +36,8 @@ pub mod workers;
 pub use bootstrap::{BootstrapSettings, PairDraws, PairKey};
 pub use calibration::{Calibration, RIGHT, ReliabilityBin, VerdictScore};
 pub use correspondence::{
-    AnnotatedMesh, CorrespondenceDataset, CorrespondenceSet, MAP_FORMAT, MapMethod, MapResults, MapRow,
-    MapSettings, MapSummary, run_maps,
+    AnnotatedMesh, CorrespondenceDataset, CorrespondenceSet, MAP_FORMAT, MapMethod, MapResults,
+    MapRow, MapSettings, MapSummary, run_maps,
 };
 pub use dataset::Dataset;
 pub use embeddings::EmbeddingSource;

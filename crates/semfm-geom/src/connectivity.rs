@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Mesh, Welded};
 use crate::disjoint_sets::DisjointSets;
 use crate::math::DVec3;
+use crate::{Mesh, Welded};
 
 /// What is regular and what is not about the connectivity of a mesh.
 ///

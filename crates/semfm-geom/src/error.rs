@@ -208,7 +208,9 @@ impl Error {
     /// has no place.
     pub fn place(&self) -> Option<String> {
         match self {
-            Self::NotFinite { vertex, .. } | Self::TooFar { vertex, .. } => Some(format!("vertex {vertex}")),
+            Self::NotFinite { vertex, .. } | Self::TooFar { vertex, .. } => {
+                Some(format!("vertex {vertex}"))
+            }
             Self::VertexOutOfRange { face, .. } => Some(format!("triangle {face}")),
             Self::NotPositiveDefinite { row, .. } => Some(format!("row {row}")),
             Self::Format(error) => Some(error.place.clone()),

@@ -269,10 +269,7 @@ mod tests {
             Err(Error::NotFinite { vertex: 1, .. })
         ));
         points[1].y = -1e300;
-        assert!(matches!(
-            Mesh::new(points, vec![[0, 1, 2]]),
-            Err(Error::TooFar { vertex: 1, .. })
-        ));
+        assert!(matches!(Mesh::new(points, vec![[0, 1, 2]]), Err(Error::TooFar { vertex: 1, .. })));
     }
 
     #[test]

@@ -65,7 +65,10 @@ fn a_skinned_mesh_stands_where_its_joints_carry_it() {
     // Weights are divided by their sum; the second joint carries p to (p − 10 x + 100 z) / 100.
     close(&file.mesh, &[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [-0.05, 0.01, 0.5]]);
     let without = json.replace(r#", "JOINTS_0": 1, "WEIGHTS_0": 2"#, "");
-    close(&glb(&without, &chunk).unwrap().mesh, &[[5.0, 0.0, 0.0], [5.01, 0.0, 0.0], [5.0, 0.01, 0.0]]);
+    close(
+        &glb(&without, &chunk).unwrap().mesh,
+        &[[5.0, 0.0, 0.0], [5.01, 0.0, 0.0], [5.0, 0.01, 0.0]],
+    );
     for (from, to, place) in [
         ("\"skin\": 0", "\"skin\": 4", "skin 4"),
         ("[2, 3]", "[2, 9]", "skin 0"),
@@ -133,7 +136,9 @@ fn instances_of_a_node_are_copies() {
     // Two translations; as rotations from the fourth number on: (0, 0, 1, 0), half a turn about z, twice.
     chunk.extend(floats(&[9.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
     let json = |attributes: &str| {
-        let instancing = format!(r#""extensions": {{"EXT_mesh_gpu_instancing": {{"attributes": {{{attributes}}}}}}}"#);
+        let instancing = format!(
+            r#""extensions": {{"EXT_mesh_gpu_instancing": {{"attributes": {{{attributes}}}}}}}"#
+        );
         nodes(
             &format!(r#"{{"mesh": 0, "scale": [2, 2, 2], {instancing}}}"#),
             r#", "extensionsRequired": ["EXT_mesh_gpu_instancing"]"#,
@@ -168,9 +173,13 @@ fn many_instances_are_read_and_endless_ones_refused() {
 
 #[test]
 fn compressed_files_say_what_to_do() {
-    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression"] {
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression"]
+    {
         let json = nodes(r#"{"mesh": 0}"#, &format!(r#", "extensionsRequired": ["{name}"]"#));
         let refused = glb(&json, &floats(&TRIANGLE)).unwrap_err().to_string();
-        assert!(refused.contains("export without compression") && refused.contains(name), "{refused}");
+        assert!(
+            refused.contains("export without compression") && refused.contains(name),
+            "{refused}"
+        );
     }
 }

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use semfm_geom::{Mesh, without_repeated_faces};
 use semfm_geom::math::DVec3;
+use semfm_geom::{Mesh, without_repeated_faces};
 
 use crate::obstacle::Obstacle;
 use crate::settings::direction;

@@ -415,7 +415,10 @@ fn a_joint_without_limits_is_named() {
         assert!(error.contains("no range of motion") && error.contains("`ja`, `jb`"), "{error}");
         let description = RobotDescription::parse(text.as_bytes(), "r.urdf").unwrap();
         let notes = description.notes();
-        assert!(notes.iter().any(|n| n.contains("`ja`: a prismatic joint without limits")), "{notes:?}");
+        assert!(
+            notes.iter().any(|n| n.contains("`ja`: a prismatic joint without limits")),
+            "{notes:?}"
+        );
     }
 }
 

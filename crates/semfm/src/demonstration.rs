@@ -73,8 +73,10 @@ fn far_contact(mesh: &Mesh, surface: &SurfaceIndex, contact: DVec3, distance: f6
     } else {
         "is it in the mesh's frame and units?"
     };
-    let expected =
-        format!("a point within {:.4} of the surface of a mesh {size:.4} across", FARTHEST_CONTACT * size);
+    let expected = format!(
+        "a point within {:.4} of the surface of a mesh {size:.4} across",
+        FARTHEST_CONTACT * size
+    );
     Error::invalid("contact", expected, format!("{contact}, {distance:.4} away; {question}"))
 }
 

@@ -108,9 +108,14 @@ impl TransferOutput<'_> {
         let inside: f64 = self.region.vertices().iter().map(|&v| areas[v as usize]).sum();
         let share = inside / areas.iter().sum::<f64>();
         let (n, of) = (self.region.vertices().len(), self.region.n_vertices());
-        let region = format!("the demonstrated region is {n} of {of} vertices, {:.2} % of the surface", 100.0 * share);
+        let region = format!(
+            "the demonstrated region is {n} of {of} vertices, {:.2} % of the surface",
+            100.0 * share
+        );
         if share < SMALL_REGION {
-            format!("{region}: too little to be found again; mark more of the part (`region --near … --radius …`)")
+            format!(
+                "{region}: too little to be found again; mark more of the part (`region --near … --radius …`)"
+            )
         } else {
             format!("{region}, and no place of the target is enough like it")
         }

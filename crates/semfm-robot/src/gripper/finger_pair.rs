@@ -361,7 +361,10 @@ impl<'a> SampledDrive<'a> {
             .filter(|&link| self.tree.bodies[link] == body)
             .flat_map(|link| {
                 let pose = self.samples[0][link];
-                self.tree.shapes[link].triangles.iter().map(move |t| t.map(|p| pose.transform_point(p)))
+                self.tree.shapes[link]
+                    .triangles
+                    .iter()
+                    .map(move |t| t.map(|p| pose.transform_point(p)))
             })
             .collect()
     }

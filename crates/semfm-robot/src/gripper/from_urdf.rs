@@ -171,7 +171,8 @@ impl Loader<'_> {
         };
         let Some(found) = FingerPair::find(self.robot, shapes, only) else {
             let (links, joints) = (self.robot.links.len(), self.robot.joints.len());
-            let expected = "a robot in which each pair of joints can be tried, or the fingers' names";
+            let expected =
+                "a robot in which each pair of joints can be tried, or the fingers' names";
             return Err(self.no_gripper(expected, format!("{links} links and {joints} joints")));
         };
         let Some(best) = found.first() else {
@@ -247,13 +248,14 @@ impl Loader<'_> {
         };
         let flange = by_width(&samples, |sample| flange_from_palm * sample.palm_from_tcp);
         let pad = self.settings.pad.unwrap_or(fingers.pad);
-        let gripper =
-            Gripper::new(&self.robot.name, opening, pad, flange, parts).map_err(|error| match error {
+        let gripper = Gripper::new(&self.robot.name, opening, pad, flange, parts).map_err(
+            |error| match error {
                 Error::OutOfRange { what, expected, found } => {
                     self.no_gripper(format!("{what}: {expected}"), found)
                 }
                 other => other,
-            })?;
+            },
+        )?;
         let joints = fingers
             .drive
             .joints

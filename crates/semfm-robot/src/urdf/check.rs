@@ -111,9 +111,10 @@ pub(crate) fn after(
         check_mass(&link.inertial, place, notes)?;
         check_scales(link, place)?;
     }
-    let elements_of_joints = elements.root().into_iter().flat_map(|root| {
-        elements.children(root).filter(|child| child.name == "joint")
-    });
+    let elements_of_joints = elements
+        .root()
+        .into_iter()
+        .flat_map(|root| elements.children(root).filter(|child| child.name == "joint"));
     for ((joint, place), element) in robot.joints.iter().zip(&joints).zip(elements_of_joints) {
         check_motion(joint, place, elements.child(element, "limit"), notes)?;
     }
@@ -185,8 +186,9 @@ fn check_motion(
             let expected = format!("an upper limit of at least {lower}");
             return Err(Fault::new("limit", place, expected, upper));
         }
-        let is_told =
-            limit.is_some_and(|limit| ["lower", "upper"].iter().any(|end| limit.attribute(end).is_some()));
+        let is_told = limit.is_some_and(|limit| {
+            ["lower", "upper"].iter().any(|end| limit.attribute(end).is_some())
+        });
         if !is_told {
             let kind = if joint.joint_type == Revolute { "revolute" } else { "prismatic" };
             notes.push(format!(

@@ -130,9 +130,10 @@ impl<'a> Accessors<'a> {
         let json = self.get(accessor)?;
         let component = self.component(accessor, json, "MAT4", &[Component::F32])?;
         let zero = [0.0; 16];
-        let matrices = self.elements(accessor, json, 16 * component.size(), zero, |bytes: &[u8]| {
-            std::array::from_fn(|c| component.decode(&bytes[c * component.size()..], false))
-        })?;
+        let matrices =
+            self.elements(accessor, json, 16 * component.size(), zero, |bytes: &[u8]| {
+                std::array::from_fn(|c| component.decode(&bytes[c * component.size()..], false))
+            })?;
         Ok(matrices.iter().map(DMat4::from_cols_array).collect())
     }
 

@@ -172,9 +172,7 @@ impl<'a> SceneReader<'a> {
         };
         let parts = translations.into_iter().zip(rotations).zip(scales);
         parts
-            .map(|((translation, rotation), scale)| {
-                self.placed(id, translation, rotation, scale)
-            })
+            .map(|((translation, rotation), scale)| self.placed(id, translation, rotation, scale))
             .collect()
     }
 
@@ -482,7 +480,10 @@ impl<'a> SceneReader<'a> {
         for (count, what) in [
             (self.n_hidden, "nodes are hidden (KHR_node_visibility) and left out"),
             (self.n_without_surface, "primitives are points or lines and left out"),
-            (self.accessors.root.animations.len(), "animations are not played: nodes stand as placed"),
+            (
+                self.accessors.root.animations.len(),
+                "animations are not played: nodes stand as placed",
+            ),
         ] {
             if count > 0 {
                 appearance.notes.push(format!("{count} {what}"));

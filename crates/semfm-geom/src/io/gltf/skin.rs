@@ -21,7 +21,11 @@ impl PosedSkin {
         let (input, skins) = (accessors.input, &accessors.root.skins);
         let place = format!("skin {skin}");
         let Some(json) = skins.get(skin) else {
-            return Err(input.error(place, "a skin that exists", format!("{} of them", skins.len())));
+            return Err(input.error(
+                place,
+                "a skin that exists",
+                format!("{} of them", skins.len()),
+            ));
         };
         let n_joints = json.joints.len();
         let binds = match json.inverse_bind_matrices {
@@ -56,7 +60,8 @@ impl PosedSkin {
         let mut n_sets = 0;
         loop {
             let name = |what: &str| format!("{what}_{n_sets}");
-            let [joints, weights] = ["JOINTS", "WEIGHTS"].map(|w| primitive.attributes.get(&name(w)));
+            let [joints, weights] =
+                ["JOINTS", "WEIGHTS"].map(|w| primitive.attributes.get(&name(w)));
             let (Some(&Whole(joints)), Some(&Whole(weights))) = (joints, weights) else { break };
             for accessor in [joints, weights] {
                 let count = accessors.get(accessor)?.count.0;
