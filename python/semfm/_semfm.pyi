@@ -746,6 +746,15 @@ class Grasps:
     def object_from_tcp(self) -> NDArray[numpy.float64]:
         """(g, 4, 4) float64 array: the gripper's TCP frames in the object's frame, metres."""
         ...
+    def picture(self) -> bytes:
+        """A picture of the best grasps on the object, which notebooks show by themselves.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
     @property
     def region(self) -> Region:
         """Region: where the pads close."""

@@ -260,7 +260,7 @@ def test_a_function_on_the_other_vertices_is_told_what_to_do():
 
 
 def test_notebooks_show_pictures(result, grasps, pair):
-    for thing in (pair[0].mesh, result):
+    for thing in (pair[0].mesh, result, grasps):
         assert thing._repr_png_()[:4] == b"\x89PNG"
     assert result.picture() == result._repr_png_()
     text = pair[0].region._repr_html_()

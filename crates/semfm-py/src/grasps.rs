@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
 use semfm::geom::math::{DMat4, DVec3};
 use semfm::grasp::{self, ApproachCone, GraspSettings, Pose};
 use semfm::{GraspRequest, GraspResult, Obstacle, Table};
+use semfm_show::write_grasp_picture;
 
 use crate::arrays_in::{self, Axis};
 use crate::grasp_pickle::{PickledGrasp, PickledGrasps};
@@ -18,7 +19,7 @@ use crate::interruptible::run;
 use crate::mesh::from_any;
 use crate::region::{Region, region_of};
 use crate::shared::Shared;
-use crate::{arrays_out, errors, json};
+use crate::{arrays_out, errors, json, pictures};
 
 /// One parallel-jaw grasp, in the frame of the object scaled to metres.
 #[pyclass(frozen, module = "semfm")]
@@ -262,6 +263,24 @@ impl Grasps {
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let value = self.with_answer(py, |answer| Ok(GraspsFile::new(answer).to_json()))?;
         json::to_python(py, &value)
+    }
+
+    /// A picture of the best grasps on the object, which notebooks show by themselves.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    ///     PNG.
+    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let file = self.with_answer(py, |answer| Ok(GraspsFile::new(answer)))?;
+        let (mesh, region) = (self.mesh.clone(), self.region.clone());
+        pictures::png(py, move |path, task| {
+            Ok(write_grasp_picture(path, &mesh, region.weights(), &file, task)?)
+        })
+    }
+
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyBytes>> {
+        pictures::shown(self.picture(py))
     }
 
     /// Writes the grasps, whole or not at all.
