@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use super::temporary::{TemporaryFolder, folder_of};
-use super::{FormatError, refuse_input, replace_atomically};
+use super::{FormatError, TEMPORARY_PREFIX, refuse_input, replace_atomically};
 use crate::{Error, Result};
 
 /// The files of an answer on their way into a folder: they are written into a temporary folder, and
@@ -73,6 +73,7 @@ impl StagedFolder {
         for entry in fs::read_dir(self.path()).map_err(Error::io(&self.folder))?.flatten() {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
+        names.retain(|name| !name.starts_with(TEMPORARY_PREFIX));
         let rank = |name: &String| last.iter().position(|l| l == name).map_or(0, |place| place + 1);
         names.sort_by(|a, b| rank(a).cmp(&rank(b)).then_with(|| a.cmp(b)));
         let places: Vec<PathBuf> = names.iter().map(|name| self.folder.join(name)).collect();
