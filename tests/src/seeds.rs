@@ -53,7 +53,8 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
     }
 }
 
-fn from_corpus(reader: &str) -> Vec<Vec<u8>> {
+/// Small files of the shared corpus, where it is at hand.
+pub fn from_corpus(reader: &str) -> Vec<Vec<u8>> {
     let (kind, extension) = match reader {
         "views" | "embeddings" => ("mcap", "mcap"),
         "urdf" => ("urdf", "urdf"),

@@ -13,10 +13,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 use semfm_tests::mutation::mutated;
 use semfm_tests::readers::{MOST_BYTES, MOST_SECONDS, READERS, Reader};
-use semfm_tests::seeds::{own_seeds, seeds};
+use semfm_tests::seeds::{from_corpus, own_seeds};
 
 /// Inputs of each reader where no time is asked for: some seconds each.
-const N_INPUTS: u64 = 4000;
+const N_INPUTS: u64 = 2000;
 
 /// What the process maps before it reads a byte.
 const OWN_BYTES: u64 = 256 << 20;
@@ -50,6 +50,8 @@ fn watch(reader: &Reader, folder: &Path) -> Vec<String> {
     let mut from: u64 = number("SEMFM_MUTATED_FROM").unwrap_or(0);
     let first = from;
     std::fs::create_dir_all(folder).unwrap();
+    // Made here: a transfer is made for those of JSON files, and matrix products reserve more than a reader may.
+    write_seeds(reader, folder);
     let start = Instant::now();
     loop {
         let mut child = start_child(reader, folder, from);
@@ -72,6 +74,23 @@ fn watch(reader: &Reader, folder: &Path) -> Vec<String> {
         eprintln!("{}: {n} inputs, {} faults, {seconds:.1} s", reader.name, faults.len());
         return faults;
     }
+}
+
+/// Writes the seeds of a reader: those made in code, then those of the shared corpus.
+fn write_seeds(reader: &Reader, folder: &Path) {
+    for (kind, seeds) in [("own", own_seeds(reader.name)), ("corpus", from_corpus(reader.name))] {
+        std::fs::create_dir_all(folder.join(kind)).unwrap();
+        for (number, seed) in seeds.iter().enumerate() {
+            std::fs::write(folder.join(kind).join(format!("{number:04}")), seed).unwrap();
+        }
+    }
+}
+
+fn read_seeds(folder: &Path) -> Vec<Vec<u8>> {
+    let files = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<PathBuf> = files.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.iter().map(|path| std::fs::read(path).unwrap()).collect()
 }
 
 fn start_child(reader: &Reader, folder: &Path, from: u64) -> Child {
@@ -136,10 +155,10 @@ fn is_over(start: Instant, n_tried: u64) -> bool {
 
 /// The child: inputs one after the other, panics caught and kept.
 fn try_reader(reader: &Reader, folder: &Path) {
-    let seeds = seeds(reader.name);
+    let own = read_seeds(&folder.join("own"));
+    let seeds = [own.clone(), read_seeds(&folder.join("corpus"))].concat();
     let from = number("SEMFM_MUTATED_FROM").unwrap_or(0);
     let path = input(reader, folder);
-    let own = own_seeds(reader.name);
     let known = own.iter().filter(|seed| {
         std::fs::write(&path, seed).unwrap();
         (reader.read)(&path)
