@@ -89,7 +89,6 @@ fn a_visible_handle_is_accepted_where_it_is() {
             let (found, off) = seen(&object, &object, &pose, 0.001, seed as u64);
             n += 1;
             accepted += usize::from(found.verdict == Verdict::Accept);
-            println!("{heading} {down}: off {off:.4} {} {:?}", found.verdict, found.reasons);
             assert!(off < OFF, "{heading} {down}: off by {off}, {found:?}");
             if found.verdict == Verdict::Accept {
                 assert!(found.rotation_std < 0.03 && found.undetermined.is_empty(), "{found:?}");
