@@ -44,7 +44,7 @@ struct Steps<'a> {
 }
 
 impl Steps<'_> {
-    /// Unit, integration and doc tests. All targets are built first, so that the roads through the
+    /// Unit, integration and doc tests. All targets are built first, so that the tests through the
     /// binary, the examples below and Python find the programs of this very checkout.
     fn rust(&self) -> Result<Tally> {
         cargo(self.workspace, &["build", "--workspace", "--all-targets"]).succeed()?;
