@@ -229,15 +229,15 @@ mod tests {
         let ball = zoo::icosphere(1);
         let with = |f: &dyn Fn(DVec3) -> DVec3| {
             let points = ball.vertices().iter().map(|&p| f(p)).collect();
-            let mesh = Mesh::new(points, ball.faces().to_vec()).unwrap();
+            let mesh = Mesh::new(points, ball.faces().to_vec())?;
             AlignModel::new(&mesh, 0, &Task::default())
         };
-        for factor in [1e-50, 1e-9, 1e9, 1e50] {
+        for factor in [1e-50, 1e-9, 1e9, 1e29] {
             assert!(with(&|p| factor * p).is_ok(), "{factor}");
         }
         for factor in [1e-100, 1e100, 1e300] {
             let error = with(&|p| factor * p).unwrap_err().to_string();
-            assert!(error.contains("coordinates"), "{error}");
+            assert!(error.contains("coordinate"), "{error}");
         }
         assert!(with(&|p| p + DVec3::splat(1e12)).is_err());
     }

@@ -205,9 +205,12 @@ fn bad_requests_are_refused_and_a_cancelled_task_stops() {
     assert!(ask(30, &task).is_ok(), "the flag of another task is not ours");
     stop.cancel();
     assert!(matches!(ask(30, &stop), Err(Error::Cancelled)));
-    let strict = EigenSettings { tolerance: 1e-30, ..settings };
-    assert!(matches!(
-        eigenbasis(&laplacian, 30, &strict, &Task::default()),
-        Err(Error::NotConverged { .. })
-    ));
+    let with = |tolerance| {
+        let settings = EigenSettings { tolerance, ..settings };
+        eigenbasis(&laplacian, 30, &settings, &Task::default())
+    };
+    assert!(matches!(with(EigenSettings::LEAST_TOLERANCE), Err(Error::NotConverged { .. })));
+    for impossible in [1e-30, -1.0, f64::NAN, 2.0] {
+        assert!(matches!(with(impossible), Err(Error::OutOfRange { .. })), "{impossible}");
+    }
 }
