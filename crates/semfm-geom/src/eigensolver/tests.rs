@@ -209,7 +209,7 @@ fn bad_requests_are_refused_and_a_cancelled_task_stops() {
         let settings = EigenSettings { tolerance, ..settings };
         eigenbasis(&laplacian, 30, &settings, &Task::default())
     };
-    assert!(matches!(with(EigenSettings::LEAST_TOLERANCE), Err(Error::NotConverged { .. })));
+    assert!(with(EigenSettings::LEAST_TOLERANCE).is_ok(), "the least that may be asked is reached");
     for impossible in [1e-30, -1.0, f64::NAN, 2.0] {
         assert!(matches!(with(impossible), Err(Error::OutOfRange { .. })), "{impossible}");
     }
