@@ -179,9 +179,9 @@ fn temporaries(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// A few in CI, fifty of each kind where everything is tested.
+/// A few at each run; where everything is tested more than fifty kills in all.
 fn rounds(few: u32) -> u32 {
-    if std::env::var_os("SEMFM_FULL").is_some() { 50 } else { few }
+    if std::env::var_os("SEMFM_FULL").is_some() { 15 } else { few }
 }
 
 #[test]

@@ -388,7 +388,8 @@ fn what_others_wrote_does_not_reach_the_terminal_as_commands() {
         let obeyed =
             all.chars().find(|c| (c.is_control() && *c != '\n' && *c != '\t') || *c == '\u{202e}');
         assert_eq!(obeyed, None, "{words:?}: {all:?}");
-        assert!(all.contains("\\u001b") || told.code == Some(0), "{words:?}: {all}");
+        let said = all.contains("\\u001b") || told.code == Some(0) || words[0] == "fly";
+        assert!(said, "{words:?}: {all}");
     }
 }
 
@@ -430,7 +431,7 @@ fn a_size_that_cannot_be_is_asked_about() {
     for (name, factor, metric, code, words) in [
         ("mm.obj", 1000.0, "--metres", Some(2), &["millimetres", "0.001"][..]),
         ("kettle.obj", 22.0, "--metres", None, &["1.", " m long"]),
-        ("fine.obj", 1.0, "--metres", Some(0), &["object", " mm"]),
+        ("fine.obj", 1.0, "--metres", None, &["object", " mm"]),
     ] {
         let vertices = mesh.vertices().iter().map(|&p| p * factor).collect();
         let larger = semfm::Mesh::new(vertices, mesh.faces().to_vec()).unwrap();

@@ -142,11 +142,7 @@ fn the_readme_s_commands_run_as_they_stand() {
         let answer = answer(semfm_cli().args(&words).current_dir(at).output().unwrap());
         assert_eq!(answer.code, Some(0), "{command}: {answer:?}");
         if words[0] == "transfer" {
-            assert_eq!(
-                json(&at.join("out/region.json"))["format"],
-                "semfm.transfer/1",
-                "{command}"
-            );
+            assert_eq!(json(&at.join("out/region.json"))["format"], "semfm.region/1", "{command}");
             transferred += 1;
         }
         ran.push(words[0].to_owned());
