@@ -1,6 +1,7 @@
 //! Traversal of the scene, which gathers its triangles.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::UNCOMPRESSED;
 use super::accessor::{Accessors, Component};
@@ -114,8 +115,8 @@ impl<'a> SceneReader<'a> {
                 if !is_visible {
                     self.n_hidden += 1;
                 } else if let Some(Whole(skin)) = node.skin {
-                    if !skins.contains_key(&skin) {
-                        skins.insert(skin, PosedSkin::new(self.accessors, skin, &poses)?);
+                    if let Entry::Vacant(unknown) = skins.entry(skin) {
+                        unknown.insert(PosedSkin::new(self.accessors, skin, &poses)?);
                     }
                     let placement = Placement::Skinned(&skins[&skin], scene_from_node);
                     self.add_mesh(mesh.0, weights, placement)?;
