@@ -169,7 +169,7 @@ fn cases(meshes: &[String]) -> Result<Vec<Case>, Box<dyn std::error::Error>> {
     cases.push(Case { name: "lumpy mug, true model".into(), object, model });
     for path in meshes {
         let mesh = read_mesh(path)?.mesh;
-        let labelled = standing_out(&mesh.vertices().to_vec());
+        let labelled = standing_out(mesh.vertices());
         let name = path.split('/').rev().nth(1).unwrap_or(path).to_owned();
         let copy = Labelled { mesh: mesh.clone(), labelled: labelled.clone() };
         cases.push(Case { name, object: Labelled { mesh, labelled }, model: copy });

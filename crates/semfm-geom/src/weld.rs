@@ -142,7 +142,7 @@ mod tests {
         }
         let mesh = zoo::icosphere(1);
         let n = mesh.n_faces();
-        let faces = mesh.faces().iter().map(|&ids| ids);
+        let faces = mesh.faces().iter().copied();
         let turned = mesh.faces().iter().map(|&[a, b, c]| [c, b, a]);
         let both = Mesh::new(mesh.vertices().to_vec(), faces.chain(turned).collect()).unwrap();
         let repeated = repeated_faces(&zoo::as_soup(&both)).unwrap();

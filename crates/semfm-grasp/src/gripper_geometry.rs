@@ -154,7 +154,9 @@ impl GripperGeometry {
         let reach = GripperExtents::of(&pieces, &motion(most), most, pad);
         let lengths = [most, pad[0], pad[1], reach.tip.abs(), reach.palm.abs(), reach.outer];
         let lengths = [&lengths[..], &[reach.finger_width, reach.finger_thickness]].concat();
-        if let Some(length) = lengths.iter().find(|length| !(**length <= 2.0 * MAX_SPAN)) {
+        if let Some(length) =
+            lengths.iter().find(|length| length.is_nan() || **length > 2.0 * MAX_SPAN)
+        {
             let expected = format!("lengths of at most {} m", 2.0 * MAX_SPAN);
             return Err(out_of_range("gripper", &expected, &format!("{length:.3e}")));
         }
