@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +70,16 @@ class Deadly(Demonstration):
             if not mark.exists():
                 mark.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
+        return super().transfer(row)
+
+
+@dataclass(frozen=True)
+class Hanging(Demonstration):
+    """Never comes back from rows whose name begins with `hangs`, and does not hear that it should."""
+
+    def transfer(self, row):
+        while row.name.startswith("hangs"):
+            time.sleep(60)
         return super().transfer(row)
 
 

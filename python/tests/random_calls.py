@@ -299,7 +299,7 @@ def ordinary_objects() -> list[Any]:
     twice = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]] * 5)
     two = np.vstack([ball.vertices, ball.vertices + 5])
     apart = semfm.Mesh(two, np.vstack([ball.faces, ball.faces + ball.n_vertices]))
-    huge = semfm.Mesh(ball.vertices * 1e150, ball.faces)
+    huge = semfm.Mesh(ball.vertices * 1e29, ball.faces)
     tiny = semfm.Mesh(ball.vertices * 1e-150, ball.faces)
     alone = semfm.Mesh(np.vstack([triangle.vertices, [[9, 9, 9]]]), triangle.faces)
     return [

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from batch_library import Deadly, library, settings
+from batch_library import Deadly, Hanging, library, settings
 
 import semfm
 import semfm.batch
@@ -203,8 +203,8 @@ def test_a_killed_worker_costs_no_row_but_one_that_always_kills(small):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals and named pipes")
 def test_a_hanging_object_is_given_up(small, monkeypatch):
     monkeypatch.setattr(pool, "GRACE_S", 0.2)
-    os.mkfifo(small.folder / "endless.npy")
-    small.rows.insert(0, {"name": "hangs", "mesh": "object-000.ply", "features": "endless.npy"})
+    monkeypatch.setattr("semfm.batch.library.Demonstration", Hanging)
+    small.rows.insert(0, {**small.rows[0], "name": "hangs"})
     small.write()
     summary = transferred(small, timeout_s=1.5)
     assert summary.errors == {"timeout": 1} and summary.n_done == 6
@@ -267,7 +267,8 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_worker(small):
     many = library(small.folder, 40)
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import batch_library, semfm.batch; from pathlib import Path\n"
+        "import batch_library, semfm.batch.library; from pathlib import Path\n"
+        "semfm.batch.library.Demonstration = batch_library.Hanging\n"
         "made = batch_library.library(Path('.'), 1)\n"
         "semfm.batch.transfer(made.source, made.region, sys.argv[2], 'answers', k=12,\n"
         "    settings=batch_library.settings(), workers=2,\n"
@@ -275,11 +276,9 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_worker(small):
     )
     rows = small.folder / "rows.jsonl"
     rows.write_text("".join(json.dumps(row) + "\n" for row in many.rows))
-    os.mkfifo(small.folder / "endless.npy")
     with rows.open("a") as file:
         for i in range(2):
-            row = {"name": f"hangs-{i}", "mesh": "object-000.ply", "features": "endless.npy"}
-            file.write(json.dumps(row) + "\n")
+            file.write(json.dumps({**many.rows[0], "name": f"hangs-{i}"}) + "\n")
     run = subprocess.Popen(
         [sys.executable, "-c", code, str(TESTS), str(rows)],
         cwd=small.folder,
@@ -287,7 +286,7 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_worker(small):
         stderr=subprocess.PIPE,
         text=True,
     )
-    # Both workers end in the pipes that nobody feeds.
+    # Both workers end in rows that never do.
     while run.stdout.readline().strip() != "40":
         assert run.poll() is None, run.stderr.read()
     children = Path(f"/proc/{run.pid}/task/{run.pid}/children")

@@ -82,7 +82,7 @@ class Shell:
         )
 
     def eval(self, model: str, output: str) -> None:
-        words = ["data", "--methods", "nearest", "-k", "12", "-o", output]
+        words = ["data", "--methods", "nearest", "-o", output]
         self.run("eval", *words, "--encoder", model, "--quiet")
 
     def calls(self) -> int:

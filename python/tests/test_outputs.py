@@ -24,7 +24,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system wit
 
 @pytest.fixture
 def mesh_file(tmp_path) -> Path:
-    semfm.icosphere(2).write(tmp_path / "ball.ply")
+    semfm.zoo.icosphere(2).write(tmp_path / "ball.ply")
     # Written by another program, as far as this process knows.
     (tmp_path / "theirs.ply").write_bytes((tmp_path / "ball.ply").read_bytes())
     return tmp_path / "theirs.ply"
@@ -71,7 +71,7 @@ def test_a_transfer_does_not_replace_its_inputs_and_comes_whole(tmp_path):
 def test_pipes_and_devices_are_refused_by_every_reader(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    ball = semfm.icosphere(1)
+    ball = semfm.zoo.icosphere(1)
     readers = [
         semfm.Mesh.read,
         semfm.read_mesh,
@@ -97,7 +97,7 @@ def test_pipes_and_devices_are_refused_by_every_reader(tmp_path):
 
 
 def test_stand_ins_are_named_and_a_byte_order_mark_is_none(tmp_path):
-    ball = semfm.icosphere(1)
+    ball = semfm.zoo.icosphere(1)
     for name, read in [
         ("a.ply", semfm.Mesh.read),
         ("a.json", lambda path: semfm.Region.read(path, ball)),
@@ -119,7 +119,7 @@ def test_messages_hold_nothing_that_a_terminal_obeys(tmp_path):
     path = tmp_path / "r.json"
     path.write_text(json.dumps({"mesh": {"hash": "\x1b]0;owned\x07"}, "vertices": [1]}))
     with pytest.raises(semfm.FormatError) as caught:
-        semfm.Region.read(path, semfm.icosphere(1))
+        semfm.Region.read(path, semfm.zoo.icosphere(1))
     assert "\\u001b" in str(caught.value) and "\x1b" not in str(caught.value)
 
 
@@ -180,6 +180,8 @@ def test_an_encoder_json_that_is_no_json_is_one_clear_error(tmp_path, text):
 
 def _command(module, *words, **options):
     words = [sys.executable, "-m", module, *map(str, words)]
+    # argparse says nothing of an unbuffered stdout that cannot be written.
+    options["env"] = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.run(words, text=True, stderr=subprocess.PIPE, check=False, **options)
 
 

@@ -69,7 +69,7 @@ def test_what_does_not_fit_is_refused(sphere, cap, result):
         parts_of(result.source.cloud, cap)
     with pytest.raises(semfm.InvalidInput, match="region: expected shape"):
         parts_of(sphere, [1.0])
-    with pytest.raises(TypeError, match="found str"):
+    with pytest.raises(semfm.FileError, match="mug.obj"):
         parts_of("mug.obj")
 
 

@@ -37,9 +37,10 @@ DOCS = dict(documented())
 def test_everything_public_is_documented_and_exported():
     assert [name for name, doc in DOCS.items() if not doc.strip()] == []
     exported = {name for name in DOCS if "." not in name}
-    inner = {"run_cli", "write_file", "icosphere", "torus"}
+    files = {"run_cli", "write_file", "read_file", "check_output", "printable"}
+    inner = files | {"icosphere", "torus"}
     assert exported - inner == {name for name in semfm.__all__ if name in exported}
-    assert set(semfm.zoo.__all__) == inner - {"run_cli", "write_file"}
+    assert set(semfm.zoo.__all__) == inner - files
     assert all(hasattr(semfm, name) for name in semfm.__all__)
 
 

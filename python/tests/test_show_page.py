@@ -124,7 +124,7 @@ def test_layers_switch_with_their_legends(browser, demo):  # noqa: F811
     assert told["names"][:4] == ["region", "colour transfer", "features", "anchors"]
     legends = dict(zip(told["names"], told["legends"]))
     assert "weight" in legends["region"] and "matched" in legends["colour transfer"]
-    assert "anchor 1: cosine 0." in legends["anchors"]
+    assert "anchor 1: cosine " in legends["anchors"]
     assert len(set(told["pictures"])) == len(told["names"]), "two layers look the same"
     assert told["pressed"].count("true") == 1 and told["pressed"][-1] == "true"
 

@@ -131,7 +131,7 @@ pub struct GrownRegion {
 /// With the `camera` of the demonstration, everything that it saw and that is not in the region lies
 /// outside of the part. Without one, the camera is looked for; a region that no camera can see for the most
 /// part is known all around already, and stays as it is. How, and what it cannot do:
-/// [`complete_patch`](semfm_geom::complete_patch) and [`CameraSearch`]; what it is worth: `bench/README.md`.
+/// [`complete_patch`] and [`CameraSearch`]; what it is worth: `bench/README.md`.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a region that is empty or of another mesh, [`semfm_geom::Error::NoArea`].
