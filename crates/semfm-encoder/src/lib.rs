@@ -1,7 +1,7 @@
 //! Encoders: rendered views in, one vector per image patch out.
 //!
 //! An [`Encoder`] says what it wants to be shown ([`WantedViews`]), gets the pictures
-//! ([`RenderedObject`]) and gives back [`EncodedViews`]. One is built in ([`builtin_encoder`]): a small
+//! ([`RenderedObject`](rendered_views::RenderedObject)) and gives back [`EncodedViews`]. One is built in ([`builtin_encoder`]): a small
 //! convolutional network of our own whose weights are part of the program, with a forward pass in some
 //! three hundred lines ([`NetEncoder`]); it needs no Python, no download and no further file, and its
 //! pictures never leave memory. Encoders outside answer through the program `semfm-embed`
