@@ -82,19 +82,7 @@ fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 /// A mirrored triangle with a sparse corner, a texture and a child that shows it again as a strip.
-const GLTF: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-"nodes": [{"mesh": 0, "scale": [-1, 1, 1], "children": [1]}, {"mesh": 1, "rotation": [0, 0, 1, 0], "translation": [3, 0, 0]}],
-"meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 2, "COLOR_0": 3}, "indices": 1, "material": 0}]},
- {"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]}],
-"materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 0.5, 0.5, 1]}}],
-"textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071}], "images": [{"uri": "data:image/png;base64,AAAA"}],
-"buffers": [{"uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=", "byteLength": 44}],
-"bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
-"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
-  "sparse": {"count": 1, "indices": {"bufferView": 1, "byteOffset": 4, "componentType": 5123}, "values": {"bufferView": 0, "byteOffset": 12}}},
- {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
- {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC2"},
- {"bufferView": 0, "componentType": 5121, "normalized": true, "count": 3, "type": "VEC4"}]}"#;
+const GLTF: &str = include_str!("fixtures/mirrored_triangle.gltf");
 
 #[test]
 fn the_sound_files_are_sound() {
