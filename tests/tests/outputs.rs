@@ -198,94 +198,44 @@ fn devices_and_pipes_are_no_inputs_for_any_reader() {
     let (mesh, target, grip) = (text(&sample.source), text(&sample.target), text(&sample.region));
     let npy = text(&sample.source_features);
     let out = text(&at("never"));
-    let o = out.as_str();
     for special in &specials {
         let special = text(special);
-        let s = special.as_str();
-        let view = format!("{s}#0");
-        let cases: Vec<Vec<&str>> = vec![
-            vec!["info", s],
-            vec!["region", s, "--vertices", "1", "-o", o],
-            vec!["region", &mesh, "--mask", s, "--view", "x.mcap#0", "-o", o],
-            vec!["region", &mesh, "--mask", &grip, "--view", &view, "-o", o],
-            vec!["views", s, "-o", o],
-            vec!["align", s, "--cloud", &mesh, "-o", o],
-            vec!["align", &mesh, "--cloud", s, "-o", o],
-            vec!["align", &mesh, "--depth", s, "--intrinsics", &grip, "-o", o],
-            vec!["align", &mesh, "--cloud", &target, "--init", s, "-o", o],
-            vec!["grasp", &mesh, "--region", s, "--gripper", "franka", "--metres", "-o", o],
-            vec!["grasp", &mesh, "--region", &grip, "--gripper", s, "--metres", "-o", o],
-            vec!["grasp", &mesh, "--region", &grip, "--gripper", "franka", "--aligned", s, "-o", o],
-            vec![
-                "grasp",
-                &mesh,
-                "--region",
-                &grip,
-                "--gripper",
-                "franka",
-                "--metres",
-                "--scene",
-                s,
-                "-o",
-                o,
-            ],
-            vec![
-                "transfer",
-                s,
-                &target,
-                "--region",
-                &grip,
-                "--source-features",
-                &npy,
-                "--target-features",
-                &npy,
-                "-o",
-                o,
-            ],
-            vec![
-                "transfer",
-                &mesh,
-                &target,
-                "--region",
-                s,
-                "--source-features",
-                &npy,
-                "--target-features",
-                &npy,
-                "-o",
-                o,
-            ],
-            vec![
-                "transfer",
-                &mesh,
-                &target,
-                "--region",
-                &grip,
-                "--source-features",
-                s,
-                "--target-features",
-                s,
-                "-o",
-                o,
-            ],
-            vec![
-                "transfer",
-                &mesh,
-                &target,
-                "--region",
-                &grip,
-                "--source-embeddings",
-                s,
-                "--target-embeddings",
-                s,
-                "-o",
-                o,
-            ],
-            vec!["show", &mesh, s, "-o", o],
-            vec!["eval", "--synthetic", "--compare", s, "-o", o],
-            vec!["eval", "--synthetic", "--seeds", "0", "--objects", "2", "--vlm", s, "-o", o],
+        let view = format!("{special}#0");
+        let commands = [
+            format!("info {special}"),
+            format!("region {special} --vertices 1 -o {out}"),
+            format!("region {mesh} --mask {special} --view x.mcap#0 -o {out}"),
+            format!("region {mesh} --mask {grip} --view {view} -o {out}"),
+            format!("views {special} -o {out}"),
+            format!("align {special} --cloud {mesh} -o {out}"),
+            format!("align {mesh} --cloud {special} -o {out}"),
+            format!("align {mesh} --depth {special} --intrinsics {grip} -o {out}"),
+            format!("align {mesh} --cloud {target} --init {special} -o {out}"),
+            format!("grasp {mesh} --region {special} --gripper franka --metres -o {out}"),
+            format!("grasp {mesh} --region {grip} --gripper {special} --metres -o {out}"),
+            format!("grasp {mesh} --region {grip} --gripper franka --aligned {special} -o {out}"),
+            format!(
+                "grasp {mesh} --region {grip} --gripper franka --metres --scene {special} -o {out}"
+            ),
+            format!(
+                "transfer {special} {target} --region {grip} --source-features {npy} --target-features {npy} -o {out}"
+            ),
+            format!(
+                "transfer {mesh} {target} --region {special} --source-features {npy} --target-features {npy} -o {out}"
+            ),
+            format!(
+                "transfer {mesh} {target} --region {grip} --source-features {special} --target-features {special} -o {out}"
+            ),
+            format!(
+                "transfer {mesh} {target} --region {grip} --source-embeddings {special} --target-embeddings {special} -o {out}"
+            ),
+            format!("show {mesh} {special} -o {out}"),
+            format!("eval --synthetic --compare {special} -o {out}"),
+            format!("eval --synthetic --seeds 0 --objects 2 --vlm {special} -o {out}"),
         ];
-        for words in cases {
+        for command in commands {
+            // No path of a temporary folder has a space in it.
+            let words: Vec<&str> = command.split(' ').collect();
             let start = std::time::Instant::now();
             let answer = run(&words);
             assert_eq!(answer.code, Some(2), "{words:?}: {answer:?}");

@@ -13,26 +13,26 @@ use semfm::Task;
 use semfm::geom::io::printable;
 
 /// Whether a file goes to stdout: what would be printed there goes to stderr then.
-static STDOUT_IS_LENT: AtomicBool = AtomicBool::new(false);
+static STDOUT_IS_RESERVED: AtomicBool = AtomicBool::new(false);
 
 /// Why stdout could not be written, if it could not.
 static FAILURE: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Begins a command: a process may run several, one after another.
 pub fn begin() {
-    STDOUT_IS_LENT.store(false, Ordering::Relaxed);
+    STDOUT_IS_RESERVED.store(false, Ordering::Relaxed);
     *FAILURE.lock().unwrap_or_else(PoisonError::into_inner) = None;
 }
 
 /// Gives stdout to a file: [`data`] goes to stderr from now on.
-pub fn lend_stdout() {
-    STDOUT_IS_LENT.store(true, Ordering::Relaxed);
+pub fn reserve_stdout() {
+    STDOUT_IS_RESERVED.store(true, Ordering::Relaxed);
 }
 
 /// Prints a line of data. That it could not be written is told by [`end`].
 pub fn data(line: impl Display) {
     let line = line.to_string();
-    if STDOUT_IS_LENT.load(Ordering::Relaxed) {
+    if STDOUT_IS_RESERVED.load(Ordering::Relaxed) {
         return message(line);
     }
     note(writeln!(std::io::stdout(), "{}", printable(&line)));
@@ -64,7 +64,7 @@ pub fn usage(error: &clap::Error, words: &[std::ffi::OsString]) {
 }
 
 /// Sends a file to stdout as it is.
-pub fn pour(file: &mut impl Read) {
+pub fn copy_to_stdout(file: &mut impl Read) {
     note(std::io::copy(file, &mut std::io::stdout()).map(|_| ()));
 }
 

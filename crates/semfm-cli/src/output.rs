@@ -27,7 +27,7 @@ impl OutputFile {
                     "-o -: the file goes to stdout, where --json wants its answer: give a file name"
                 );
             }
-            console::lend_stdout();
+            console::reserve_stdout();
             let scratch = tempfile::tempdir().context("a temporary folder")?;
             return Ok(Self { path: scratch.path().join("output"), scratch: Some(scratch) });
         }
@@ -49,7 +49,7 @@ impl OutputFile {
     pub fn finish(self, common: &Common) -> Result<()> {
         if self.scratch.is_some() {
             let mut file = File::open(&self.path).context("the file for stdout")?;
-            console::pour(&mut file);
+            console::copy_to_stdout(&mut file);
         } else if !common.json {
             console::data(self.path.display());
         }
