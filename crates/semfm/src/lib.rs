@@ -53,6 +53,7 @@ pub use semfm_robot as robot;
 pub use semfm_views as views;
 
 pub mod demonstration;
+mod encoded_objects;
 mod error;
 pub mod files;
 mod grasp_request;

@@ -5,17 +5,17 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use half::f16;
 use semfm_encoder::Encoder;
-use semfm_encoder::rendered_views::{Coloring, Drawable, RenderedObject, ViewSettings};
+use semfm_encoder::rendered_views::{Coloring, Drawable, ViewSettings};
 use semfm_geom::io::{read_json, write_json};
 use semfm_geom::{Mesh, MeshHash, ShapeCache, Task};
+use semfm_views::EmbeddedView;
 use semfm_views::mcap::{Dtype, EmbeddingsFile};
-use semfm_views::{EmbeddedView, Renderer};
 use serde::{Deserialize, Serialize};
 
+use crate::encoded_objects::EncodedObjects;
 use crate::files::read_embeddings;
 use crate::{FeatureSource, PipelineSettings, Prepared, Result, prepare};
 
@@ -196,17 +196,9 @@ impl ObjectEncoder {
         coloring: Coloring,
         task: &Task,
     ) -> Result<Vec<EncodedObject>> {
-        let settings = self.encoder.wants().settings(coloring);
-        let (mut rendered, mut views_ms) = (Vec::new(), Vec::new());
-        for &object in objects {
-            let start = Instant::now();
-            // By the CPU on every machine: what is kept must not depend on the driver that was there.
-            rendered.push(RenderedObject::new(object, &settings, &Renderer::cpu(), task)?);
-            views_ms.push(milliseconds_since(start));
-        }
-        let start = Instant::now();
-        let encoded = self.encoder.encode(&rendered, self.rolls, task)?;
-        let embed_ms = milliseconds_since(start) / objects.len() as f64;
+        let encoder = &*self.encoder;
+        let EncodedObjects { rendered, encoded, views_ms, embed_ms } =
+            EncodedObjects::new(encoder, objects, coloring, self.rolls, task)?;
         let hash = match &self.folder {
             Some(_) => self.encoder.hash_of_last_run()?,
             None => None,
@@ -272,8 +264,4 @@ fn keep(folder: &Path, path: &Path, embeddings: &EmbeddingsFile, times: &Encodin
 fn exact_dtype(views: &[EmbeddedView]) -> Dtype {
     let mut numbers = views.iter().flat_map(|view| view.patches.data());
     if numbers.all(|&x| f16::from_f32(x).to_f32() == x) { Dtype::F16 } else { Dtype::F32 }
-}
-
-fn milliseconds_since(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

@@ -14,7 +14,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Instant;
 
-use semfm_encoder::rendered_views::{Coloring, RenderedObject};
+use semfm_encoder::rendered_views::Coloring;
 use semfm_encoder::{EncodedViews, Encoder, EncoderIdentity};
 use semfm_fmap::{Lifting, Method, PreparedObject, TransferSettings};
 use semfm_geom::math::DVec3;
@@ -22,9 +22,10 @@ use semfm_geom::sampling::farthest_points;
 use semfm_geom::{Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
 #[cfg(feature = "mcap")]
 use semfm_views::mcap::EmbeddingsFile;
-use semfm_views::{EmbeddedView, LiftReport, LiftSettings, Renderer, lift};
+use semfm_views::{EmbeddedView, LiftReport, LiftSettings, lift};
 use serde::{Deserialize, Serialize};
 
+use crate::encoded_objects::{EncodedObjects, milliseconds_since};
 use crate::{Error, Result};
 
 /// The settings of all steps, each with the default that we measured to be best.
@@ -219,20 +220,10 @@ fn encode(
     stages_ms: &mut Vec<(&'static str, f64)>,
     task: &Task,
 ) -> Result<EncodedViews> {
-    let wants = encoder.wants();
-    let start = Instant::now();
-    let settings = wants.settings(Coloring::Grey);
-    let rendered = RenderedObject::new(mesh, &settings, &Renderer::cpu(), task)?;
-    stages_ms.push(("views", milliseconds_since(start)));
-
-    let start = Instant::now();
-    let mut encoded = encoder.encode(&[rendered], wants.rolls, task)?;
-    stages_ms.push(("embed", milliseconds_since(start)));
-    let found = encoded.len();
-    encoded.pop().filter(|_| found == 1).ok_or_else(|| {
-        let expected = "embeddings of the one object that it was shown";
-        Error::invalid("encoder", expected, format!("those of {found}"))
-    })
+    let rolls = encoder.wants().rolls;
+    let mut made = EncodedObjects::new(encoder, &[mesh.into()], Coloring::Grey, rolls, task)?;
+    stages_ms.extend([("views", made.views_ms[0]), ("embed", made.embed_ms)]);
+    Ok(made.encoded.remove(0))
 }
 
 /// The semantic cloud of a mesh, and how well views covered the surface.
@@ -304,8 +295,4 @@ fn cloud_of_vertices(mesh: &Mesh, features: &[f32], n_points: usize) -> Result<S
     let points = chosen.iter().map(|&v| mesh.vertices()[v]).collect();
     let rows = chosen.iter().flat_map(|&v| &features[v * dim..(v + 1) * dim]).copied().collect();
     Ok(SemanticCloud::new(points, rows, dim, vec![1; chosen.len()])?)
-}
-
-fn milliseconds_since(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }
