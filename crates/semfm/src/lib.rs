@@ -49,6 +49,7 @@ pub use semfm_encoder as encoder;
 pub use semfm_fmap as fmap;
 pub use semfm_geom as geom;
 pub use semfm_grasp as grasp;
+pub use semfm_motion as motion;
 pub use semfm_robot as robot;
 pub use semfm_views as views;
 
