@@ -33,6 +33,16 @@ pub enum Error {
         /// What stands there.
         found: String,
     },
+    /// A sound description that has not the arm that was asked for, or joint values that are not for it.
+    #[error("{what}: expected {expected}, found {found}")]
+    Arm {
+        /// What is wrong: an argument, a link or a joint by name.
+        what: String,
+        /// What should be.
+        expected: String,
+        /// What is.
+        found: String,
+    },
     /// A description that is sound, but in which no parallel-jaw gripper was found.
     #[error("{}: no gripper found: expected {expected}, found {found}", path.display())]
     NoGripper {
@@ -73,6 +83,7 @@ impl Error {
         match self {
             Self::OutOfRange { .. } => "out-of-range",
             Self::Urdf { code, .. } => code,
+            Self::Arm { .. } => "arm",
             Self::NoGripper { .. } => "no-gripper",
             Self::UnknownGripper { .. } => "unknown-gripper",
             Self::Io { .. } => "io",
@@ -85,6 +96,7 @@ impl Error {
         match self {
             Self::OutOfRange { what, .. } => Some((*what).into()),
             Self::Urdf { place, .. } => Some(place.clone()),
+            Self::Arm { what, .. } => Some(what.clone()),
             Self::Geom(cause) => cause.place(),
             _ => None,
         }

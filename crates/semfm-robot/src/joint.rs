@@ -71,7 +71,7 @@ pub struct Mimic {
 /// URDF's `safety_controller`: where a joint's controller begins to slow it down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SafetyController {
-    /// Lowest and highest position, radians or metres.
+    /// Lowest and highest position, radians or metres; infinite where the file tells none.
     pub soft_limits: [f64; 2],
     /// Velocity limit for each radian or metre from a soft limit, 1/s.
     pub k_position: f64,

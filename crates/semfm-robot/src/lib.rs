@@ -18,6 +18,8 @@
 mod error;
 mod gripper;
 mod joint;
+mod joint_limits_file;
+mod kinematics;
 mod link;
 mod robot;
 mod urdf;
@@ -28,6 +30,8 @@ pub use gripper::{
     JointPosition, MAX_SPAN, Motion, PosedPart, Role,
 };
 pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
+pub use joint_limits_file::{JointLimitsFile, ToldLimits};
+pub use kinematics::{Arm, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
 pub use link::{Geometry, Inertial, Link, LinkGeometry};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use parry3d_f64::math::Pose;
@@ -42,6 +46,7 @@ mod tests {
 
     #[test]
     fn public_types_can_be_shared_between_threads() {
+        assert_send_sync::<Arm>();
         assert_send_sync::<BuiltinGripper>();
         assert_send_sync::<Error>();
         assert_send_sync::<Gripper>();

@@ -144,8 +144,8 @@ const RULES: &[Rule] = &[
     Rule {
         name: "safety_controller",
         attributes: &[
-            optional("soft_lower_limit", Value::Finite(1)),
-            optional("soft_upper_limit", Value::Finite(1)),
+            defaulted("soft_lower_limit", Value::Finite(1), "-inf"),
+            defaulted("soft_upper_limit", Value::Finite(1), "inf"),
             optional("k_position", Value::Finite(1)),
             defaulted("k_velocity", Value::Finite(1), "0"),
         ],

@@ -1,0 +1,9 @@
+//! Kinematics of an arm: a chain of joints from a base link to a tip link.
+
+mod arm;
+mod arm_joint;
+mod chain;
+mod ends;
+
+pub use arm::{Arm, ArmSettings};
+pub use arm_joint::{ArmJoint, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
