@@ -21,6 +21,7 @@ mod joint;
 mod joint_limits_file;
 mod kinematics;
 mod link;
+mod link_shape;
 mod robot;
 mod urdf;
 
@@ -33,6 +34,7 @@ pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
 pub use joint_limits_file::{JointLimitsFile, ToldLimits};
 pub use kinematics::{Arm, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
 pub use link::{Geometry, Inertial, Link, LinkGeometry};
+pub use link_shape::{ConvexPiece, ConvexPieces, LinkShape};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use parry3d_f64::math::Pose;
 pub use robot::Robot;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use parry3d_f64::math::Pose;
 use semfm_geom::math::{DVec3, bounds};
 
-use super::link_shape::LinkShape;
+use crate::link_shape::LinkShape;
 use super::pads;
 use crate::robot::Robot;
 

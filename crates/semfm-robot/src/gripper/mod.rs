@@ -9,7 +9,6 @@ mod builtin;
 mod drive_joint;
 mod finger_pair;
 mod from_urdf;
-mod link_shape;
 mod motion;
 mod pads;
 mod part;

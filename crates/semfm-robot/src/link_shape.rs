@@ -1,10 +1,11 @@
-//! The shape of a link: what collides, as convex pieces, and the triangles that pads are sought in.
+//! The shape of a link: what collides, as convex pieces, and the triangles of its surface.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, SharedShape};
 use parry3d_f64::transformation::try_convex_hull;
 use parry3d_f64::transformation::vhacd::{VHACD, VHACDParameters};
-use semfm_geom::Mesh;
 use semfm_geom::io::{MeshFormat, read_mesh};
 use semfm_geom::math::{DQuat, DVec3, bounds};
 
@@ -15,7 +16,7 @@ use crate::{Error, Result};
 /// Most triangles of a collision mesh; published grippers have some thousands.
 const MAX_TRIANGLES: usize = 300_000;
 /// Farthest corner of a mesh from its link's frame, metres: the earth has 1.3e7. Hulls of larger numbers lose their
-/// last bits; what is too large for a gripper, [`MAX_SPAN`](super::MAX_SPAN) refuses.
+/// last bits; what is too large for a gripper, [`MAX_SPAN`](crate::MAX_SPAN) refuses.
 const MAX_COORDINATE: f64 = 1e7;
 /// A hull with more than this times the mesh's volume fills a space that is free (the bay between
 /// finger and palm), and the mesh is cut into convex pieces. Hulls of the grippers that we know are
@@ -30,14 +31,16 @@ const N_SEGMENTS: u32 = 32;
 
 /// A convex shape at its place in a link.
 #[derive(Clone, Debug)]
-pub(super) struct ConvexPiece {
+pub struct ConvexPiece {
+    /// Its place.
     pub link_from_piece: Pose,
+    /// A cuboid, a ball, a capsule or cylinder along y, or a convex polyhedron.
     pub shape: SharedShape,
 }
 
 /// The shape of a link in its own frame.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LinkShape {
+pub struct LinkShape {
     /// What collides.
     pub pieces: Vec<ConvexPiece>,
     /// All surfaces.
@@ -46,11 +49,17 @@ pub(super) struct LinkShape {
     pub missing: Vec<String>,
     /// Whether visuals stand in for collisions.
     pub from_visuals: bool,
+    /// Meshes that could not be cut into convex pieces, and what stands for them.
+    pub notes: Vec<String>,
 }
 
 impl LinkShape {
     /// Reads the collisions of a link; where it has none, or one of their meshes cannot be
     /// read, its visuals.
+    ///
+    /// # Errors
+    /// [`Error::Urdf`] for the name of a mesh that leads out of the allowed folders and for a mesh that is too large;
+    /// [`Error::Geom`] for a mesh that breaks its format.
     pub fn new(link: &Link, paths: &MeshPaths) -> Result<Self> {
         let collisions = Self::of(&link.collisions, link, paths)?;
         if collisions.missing.is_empty() && !link.collisions.is_empty() || link.visuals.is_empty() {
@@ -148,9 +157,10 @@ impl LinkShape {
                 found: format!("{:.3e} {:.3e} {:.3e}", far.x, far.y, far.z),
             });
         }
-        let pieces = convex_pieces(&points, &mesh);
-        self.pieces
-            .extend(pieces.into_iter().map(|shape| ConvexPiece { link_from_piece: place, shape }));
+        let cut = ConvexPieces::new(&points, mesh.faces());
+        self.notes.extend(cut.note.map(|note| format!("link `{}`: {filename}: {note}", link.name)));
+        let pieces = cut.shapes.into_iter();
+        self.pieces.extend(pieces.map(|shape| ConvexPiece { link_from_piece: place, shape }));
         self.add_surface(place, &points, mesh.faces());
         Ok(())
     }
@@ -166,16 +176,46 @@ impl LinkShape {
     }
 }
 
-/// The hull of a mesh, or several where one hull would fill what is free.
-fn convex_pieces(points: &[DVec3], mesh: &Mesh) -> Vec<SharedShape> {
-    let hull = convex_hull(points);
-    let Some(hull) = hull else { return vec![bounding_box(points)] };
-    if volume(&hull.points, &hull.faces) <= MAX_HULL_RATIO * volume(points, mesh.faces()) {
-        return vec![hull.into_shape().unwrap_or_else(|| bounding_box(points))];
+/// A mesh as convex shapes that together cover it.
+#[derive(Clone, Debug)]
+pub struct ConvexPieces {
+    /// Convex polyhedra in the frame of the mesh.
+    pub shapes: Vec<SharedShape>,
+    /// Why it is one piece although it should be several; `None` where all went well.
+    pub note: Option<String>,
+}
+
+impl ConvexPieces {
+    /// The hull of a mesh, or several hulls where one would fill what is free. parry's hull and its V-HACD may panic
+    /// on degenerate input: then a hull, or else a box, stands for the mesh, and a note says so. (The panic's message
+    /// still goes to the panic hook of the process.)
+    pub fn new(points: &[DVec3], faces: &[[u32; 3]]) -> Self {
+        let whole = |shape| Self { shapes: vec![shape], note: None };
+        let Some(hull) = convex_hull(points) else { return whole(bounding_box(points)) };
+        let is_full = volume(&hull.points, &hull.faces) <= MAX_HULL_RATIO * volume(points, faces);
+        let hull = hull.into_shape().unwrap_or_else(|| bounding_box(points));
+        if is_full {
+            return whole(hull);
+        }
+        match guarded(|| decomposed(points, faces)) {
+            Some(shapes) if !shapes.is_empty() => Self { shapes, note: None },
+            _ => {
+                let note = "it could not be cut into convex pieces; its convex hull stands for it";
+                Self { shapes: vec![hull], note: Some(note.into()) }
+            }
+        }
     }
+}
+
+/// What `work` returns, `None` where it panics.
+fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    catch_unwind(AssertUnwindSafe(work)).ok()
+}
+
+fn decomposed(points: &[DVec3], faces: &[[u32; 3]]) -> Vec<SharedShape> {
     let parameters = VHACDParameters { max_convex_hulls: MAX_PIECES, ..Default::default() };
-    let decomposition = VHACD::decompose(&parameters, points, mesh.faces(), true);
-    let pieces = decomposition.compute_primitive_intersections(points, mesh.faces());
+    let decomposition = VHACD::decompose(&parameters, points, faces, true);
+    let pieces = decomposition.compute_primitive_intersections(points, faces);
     pieces
         .iter()
         .filter(|piece| !piece.is_empty())
@@ -202,7 +242,7 @@ struct Hull {
 impl Hull {
     /// `None` where it is degenerate after all.
     fn into_shape(self) -> Option<SharedShape> {
-        SharedShape::convex_mesh(self.points, &self.faces)
+        guarded(|| SharedShape::convex_mesh(self.points, &self.faces)).flatten()
     }
 }
 
@@ -212,7 +252,7 @@ fn convex_hull(points: &[DVec3]) -> Option<Hull> {
     if (high - low).min_element() < MIN_HALF {
         return None;
     }
-    let (points, faces) = try_convex_hull(points).ok()?;
+    let (points, faces) = guarded(|| try_convex_hull(points).ok()).flatten()?;
     Some(Hull { points, faces })
 }
 
@@ -229,7 +269,7 @@ fn bounding_box(points: &[DVec3]) -> SharedShape {
 /// The box of equal mass m and moments I. Its edge along x, and the others alike, is
 ///
 /// > a² = 6 (I_yy + I_zz − I_xx) / m
-pub(super) fn inertia_box(inertial: &Inertial) -> Option<ConvexPiece> {
+pub(crate) fn inertia_box(inertial: &Inertial) -> Option<ConvexPiece> {
     let [x, y, z] = inertial.moments;
     let squares = DVec3::new(y + z - x, x + z - y, x + y - z) * 6.0 / inertial.mass;
     if !(inertial.mass > 0.0 && squares.min_element() > 0.0 && squares.is_finite()) {
@@ -243,6 +283,7 @@ pub(super) fn inertia_box(inertial: &Inertial) -> Option<ConvexPiece> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use semfm_geom::Mesh;
 
     /// A U of three boxes as one mesh: a block with a bay 0.6 wide and 0.8 deep.
     fn bay() -> Mesh {
@@ -273,7 +314,7 @@ mod tests {
     #[test]
     fn a_bay_stays_free() {
         let mesh = bay();
-        let parts = convex_pieces(mesh.vertices(), &mesh);
+        let parts = ConvexPieces::new(mesh.vertices(), mesh.faces()).shapes;
         assert!(parts.len() > 1 && parts.len() <= MAX_PIECES as usize, "{}", parts.len());
         let probe = Cuboid::new(DVec3::new(0.25, 0.3, 0.1));
         let middle = Pose::translation(0.0, 0.6, 0.15);
@@ -288,7 +329,7 @@ mod tests {
     fn a_flat_mesh_becomes_a_thin_box() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)];
         let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [2, 1, 3]]).unwrap();
-        let parts = convex_pieces(mesh.vertices(), &mesh);
+        let parts = ConvexPieces::new(mesh.vertices(), mesh.faces()).shapes;
         assert_eq!(parts.len(), 1);
         let bounds = parts[0].compute_aabb(&Pose::IDENTITY);
         assert!((bounds.extents() - DVec3::new(1.0, 1.0, 2.0 * MIN_HALF)).length() < 1e-12);
