@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
+use semfm_geom::ConfidenceWeights;
+
 use crate::Result;
-use crate::encoder::WantedViews;
+use crate::encoder::{Encoder, EncoderIdentity, WantedViews};
 use crate::net_encoder::NetEncoder;
 
 /// An encoder whose weights are in the program.
@@ -18,6 +20,9 @@ pub struct BuiltinEncoder {
     weights: &'static [u8],
     /// What it is shown, where that is not what [`NetEncoder::parse`] says.
     shown: fn(&mut WantedViews),
+    /// How evidence in answers found by its features becomes a probability: what
+    /// `bench/confidence.py` fits for these weights.
+    confidence: ConfidenceWeights,
     /// Made when first asked for.
     encoder: OnceLock<Arc<NetEncoder>>,
 }
@@ -29,6 +34,12 @@ pub static BUILTIN_ENCODERS: [BuiltinEncoder; 1] = [BuiltinEncoder {
     weights: include_bytes!("../weights/builtin.net"),
     // It was trained to say the same of a turned picture: one rotation is as good as four.
     shown: |wants| wants.rolls = 1,
+    confidence: ConfidenceWeights {
+        constant: 0.06,
+        ambiguity: -1.56,
+        margin: 5.22,
+        round_trip: 4.44,
+    },
     encoder: OnceLock::new(),
 }];
 
@@ -59,4 +70,12 @@ impl BuiltinEncoder {
 /// As [`BuiltinEncoder::encoder`].
 pub fn builtin_encoder() -> Result<Arc<NetEncoder>> {
     BUILTIN_ENCODERS[0].encoder()
+}
+
+/// The weights that make a probability of the evidence in answers found by an encoder's features: those
+/// fitted for a built-in encoder, by name and version, else the general ones.
+pub fn confidence_weights(encoder: &EncoderIdentity) -> ConfidenceWeights {
+    let builtin = BuiltinEncoder::named(&encoder.name);
+    let fitted = builtin.filter(|row| row.encoder().is_ok_and(|net| net.identity() == *encoder));
+    fitted.map_or_else(ConfidenceWeights::default, |row| row.confidence)
 }

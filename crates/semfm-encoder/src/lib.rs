@@ -4,8 +4,9 @@
 //! ([`RenderedObject`](rendered_views::RenderedObject)) and gives back [`EncodedViews`]. One is built in ([`builtin_encoder`]): a small
 //! convolutional network of our own whose weights are part of the program, with a forward pass in some
 //! three hundred lines ([`NetEncoder`]); it needs no Python, no download and no further file, and its
-//! pictures never leave memory. Encoders outside answer through the program `semfm-embed`
-//! ([`CommandEncoder`], feature `mcap`). [`open_encoder`] finds any of them by name.
+//! pictures never leave memory. Pretrained networks of others run in this process, too: what an
+//! `ENCODER.json` describes (feature `onnx`) and SigLIP's vision tower (feature `siglip`). All others
+//! answer through the program `semfm-embed` ([`CommandEncoder`], feature `mcap`). [`open_encoder`] finds any of them by name.
 
 mod builtin;
 mod channel;
@@ -14,6 +15,7 @@ mod command;
 #[cfg(feature = "mcap")]
 mod command_inputs;
 mod convolution;
+mod coverage;
 mod encoder;
 mod error;
 mod layer;
@@ -21,10 +23,12 @@ mod net_encoder;
 mod net_file;
 mod network;
 mod open;
+#[cfg(any(feature = "onnx", feature = "siglip"))]
+mod pretrained;
 pub mod rendered_views;
 mod turned;
 
-pub use builtin::{BUILTIN_ENCODERS, BuiltinEncoder, builtin_encoder};
+pub use builtin::{BUILTIN_ENCODERS, BuiltinEncoder, builtin_encoder, confidence_weights};
 pub use channel::Channel;
 #[cfg(feature = "mcap")]
 pub use command::{CommandEncoder, PROGRAM_VARIABLE};
@@ -33,4 +37,6 @@ pub use error::{Error, Result};
 pub use layer::{ConvLayer, Layer};
 pub use net_encoder::NetEncoder;
 pub use net_file::{Background, NetHeader, write_net};
+#[cfg(any(feature = "onnx", feature = "siglip"))]
+pub use pretrained::PretrainedEncoder;
 pub use open::{OpenSettings, encoder_names, open_encoder};

@@ -126,7 +126,9 @@ impl TimedObject {
         let made = shape.report().stages_ms;
         stages_ms.insert("shape", made.working_mesh + made.laplacian + made.eigenbasis);
         let start = Instant::now();
-        let object = PreparedObject::new(Arc::clone(shape), cloud.cloud, task)?;
+        let weights = cloud.encoder.as_ref().map(EncoderRecord::confidence_weights);
+        let object = PreparedObject::new(Arc::clone(shape), cloud.cloud, task)?
+            .with_confidence_weights(weights.unwrap_or_default());
         stages_ms.insert("prepare", milliseconds_since(start));
         let mut clusters_ms = Vec::new();
         for settings in clusters {

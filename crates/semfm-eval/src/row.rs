@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use semfm::Verdict;
-use semfm::fmap::AnchorReport;
+use semfm::fmap::{AnchorReport, Evidence};
 use semfm::fmap::metrics::{area_iou, iou};
 use semfm::{Region, Transfer};
 use serde::{Deserialize, Serialize};
@@ -35,6 +35,9 @@ pub struct Row {
     pub confidence: Option<f64>,
     /// What it advised.
     pub verdict: Option<Verdict>,
+    /// The numbers behind the confidence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<Evidence>,
     /// Vertices of the region found.
     pub n_found: usize,
     /// Vertices of the true region.
@@ -181,6 +184,7 @@ impl Row {
     pub(crate) fn take(&mut self, found: &Transfer, truth: &Region, areas: &[f64]) -> Result<()> {
         self.score(&found.region, truth, areas)?;
         self.confidence = Some(found.confidence);
+        self.evidence = Some(found.report.evidence);
         self.verdict = Some(found.verdict);
         let alternatives = found
             .hypotheses

@@ -18,7 +18,7 @@
 //! (AUC .42–.57); they are reported, and nothing is decided by them.
 
 use faer::{Mat, RowRef};
-use semfm_geom::Verdict;
+use semfm_geom::{ConfidenceWeights, Verdict};
 use serde::{Deserialize, Serialize};
 
 use crate::Region;
@@ -94,17 +94,10 @@ impl Evidence {
         }
     }
 
-    /// The probability that IoU ≥ .5, for an answer of `fused`:
-    ///
-    /// p = σ(.06 − 1.56 ambiguity + 5.22 margin + 4.44 round_trip)
-    ///
-    /// A logistic regression (Platt 1999, with a ridge of 1e-3 on standardised inputs) over 209
-    /// ordered pairs of labelled real objects and 144 of procedural ones (medium and hard). Fitted
-    /// on the pairs onto one half of the objects and read on those onto the other, and the other
-    /// way round: AUC .93 and .95 on real pairs, expected calibration error .04. On procedural
-    /// objects that no fit has seen: AUC .97 (medium) and .92 (hard), calibration error .05 and .07.
-    pub fn probability(&self) -> f64 {
-        logistic(0.06 - 1.56 * self.ambiguity + 5.22 * self.margin + 4.44 * self.round_trip)
+    /// The probability that IoU ≥ .5, for an answer of `fused`: a logistic function of the three numbers
+    /// whose coefficients belong to the features.
+    pub fn probability(&self, weights: &ConfidenceWeights) -> f64 {
+        weights.probability(self.ambiguity, self.margin, self.round_trip)
     }
 }
 
@@ -179,17 +172,18 @@ mod tests {
 
     #[test]
     fn better_evidence_is_more_probable_and_none_is_refused() {
+        let weights = ConfidenceWeights::default();
         let sure = Evidence { ambiguity: 0.05, margin: 0.4, round_trip: 0.9 };
-        assert_eq!(verdict(sure.probability()), Verdict::Accept);
+        assert_eq!(verdict(sure.probability(&weights)), Verdict::Accept);
         for worse in [
             Evidence { ambiguity: 1.0, ..sure },
             Evidence { margin: 0.0, ..sure },
             Evidence { round_trip: 0.3, ..sure },
         ] {
-            assert!(worse.probability() < sure.probability());
+            assert!(worse.probability(&weights) < sure.probability(&weights));
         }
         let lost = Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0 };
-        assert_eq!(verdict(lost.probability()), Verdict::Refuse);
+        assert_eq!(verdict(lost.probability(&weights)), Verdict::Refuse);
         assert!(probability_by_agreement(0.9) > 0.9 && probability_by_agreement(0.2) < 0.5);
     }
 

@@ -159,7 +159,7 @@ impl Matching {
         let confidence = match (self.settings.method.info().confidence, agreement) {
             _ if region.is_empty() => 0.0,
             (ConfidenceRule::Agreement, Some(agreement)) => probability_by_agreement(agreement),
-            _ => evidence.probability(),
+            _ => self.probability(&evidence),
         };
         let most = if self.source().has_features() { 1.0 } else { MOST_WITHOUT_FEATURES };
         let confidence = confidence.min(most);
@@ -258,6 +258,13 @@ impl Matching {
             target_masses: target.masses(),
         };
         Evidence::of(&answer, &self.pair.joint)
+    }
+
+    /// The probability that an answer with this evidence is right, by the weights of both objects' features: where
+    /// they differ, the more cautious ones.
+    fn probability(&self, evidence: &Evidence) -> f64 {
+        let of = |object: &PreparedObject| evidence.probability(object.confidence_weights());
+        of(self.source()).min(of(self.target()))
     }
 
     /// The votes under the other rule, where both maps are at hand (`semfm`).

@@ -7,7 +7,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use semfm_geom::descriptors::{WksSettings, wks};
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{PointIndex, SemanticCloud, Shape, Task};
+use semfm_geom::{ConfidenceWeights, PointIndex, SemanticCloud, Shape, Task};
 
 use crate::clusters::{ClusterSettings, Clusters, spectral_clusters};
 use crate::features::CentredFeatures;
@@ -55,6 +55,7 @@ const LEAST_MASS: f64 = 1e-3;
 pub struct PreparedObject {
     derived: Arc<Derived>,
     clusters: ClusterSource,
+    confidence_weights: ConfidenceWeights,
 }
 
 /// What follows from shape and cloud alone.
@@ -143,7 +144,11 @@ impl PreparedObject {
             graph: OnceLock::new(),
             point_of_original_vertex: OnceLock::new(),
         };
-        Ok(Self { derived: Arc::new(derived), clusters: ClusterSource::Spectral(Arc::default()) })
+        Ok(Self {
+            derived: Arc::new(derived),
+            clusters: ClusterSource::Spectral(Arc::default()),
+            confidence_weights: ConfidenceWeights::default(),
+        })
     }
 
     /// The same object with clusters from elsewhere (true part labels, another method's): they are
@@ -153,8 +158,17 @@ impl PreparedObject {
     /// [`Error::Length`] where there is not one label per cloud point.
     pub fn with_clusters(&self, clusters: Arc<Clusters>) -> Result<Self> {
         Error::length("cluster labels", self.cloud().n_points(), clusters.labels().len())?;
-        let derived = Arc::clone(&self.derived);
-        Ok(Self { derived, clusters: ClusterSource::Given(clusters) })
+        Ok(Self { clusters: ClusterSource::Given(clusters), ..self.clone() })
+    }
+
+    /// The same object whose features have their own weights for confidence.
+    pub fn with_confidence_weights(self, confidence_weights: ConfidenceWeights) -> Self {
+        Self { confidence_weights, ..self }
+    }
+
+    /// How the evidence in an answer found by this object's features becomes a probability.
+    pub fn confidence_weights(&self) -> &ConfidenceWeights {
+        &self.confidence_weights
     }
 
     /// Mesh, working mesh and eigenbasis.

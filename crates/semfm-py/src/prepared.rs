@@ -7,7 +7,7 @@ use semfm::encoder::rendered_views::Coloring;
 use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, open_encoder};
 use semfm::geom::{SemanticCloud as Cloud, ShapeCache};
 use semfm::object_encoder::ObjectEncoder;
-use semfm::{FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
+use semfm::{EncoderRecord, FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
@@ -131,7 +131,9 @@ pub fn _restore_prepared(
     stages_ms: Vec<(String, f64)>,
     encoder: &Bound<'_, PyAny>,
 ) -> PyResult<PreparedObject> {
-    let encoder = serde_json::from_value(json::from_python(encoder, "encoder")?).ok().flatten();
+    let encoder: Option<EncoderRecord> =
+        serde_json::from_value(json::from_python(encoder, "encoder")?).ok().flatten();
+    let weights = encoder.as_ref().map(EncoderRecord::confidence_weights).unwrap_or_default();
     let stages_ms = stages_ms
         .iter()
         .map(|(name, ms)| match &**name {
@@ -146,7 +148,8 @@ pub fn _restore_prepared(
     let cloud = cloud.map(|cloud| Arc::clone(&cloud.get().inner));
     let object = run(py, None, move |task| {
         Ok(match cloud {
-            Some(cloud) => fmap::PreparedObject::new(shape, cloud, task)?,
+            Some(cloud) => fmap::PreparedObject::new(shape, cloud, task)?
+                .with_confidence_weights(weights),
             None => fmap::PreparedObject::without_features(shape, task)?,
         })
     })?;

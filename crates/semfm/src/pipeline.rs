@@ -15,11 +15,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use semfm_encoder::rendered_views::Coloring;
-use semfm_encoder::{EncodedViews, Encoder, EncoderIdentity};
+use semfm_encoder::{EncodedViews, Encoder, EncoderIdentity, confidence_weights};
 use semfm_fmap::{Lifting, Method, PreparedObject, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
+use semfm_geom::{ConfidenceWeights, Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
 #[cfg(feature = "mcap")]
 use semfm_views::mcap::EmbeddingsFile;
 use semfm_views::{EmbeddedView, LiftReport, LiftSettings, lift};
@@ -122,6 +122,12 @@ impl EncoderRecord {
         Self { name, version, rolls: encoded.rolls, n_views, simulated: false }
     }
 
+    /// How evidence in answers found by its features becomes a probability.
+    pub fn confidence_weights(&self) -> ConfidenceWeights {
+        let Self { name, version, .. } = self.clone();
+        confidence_weights(&EncoderIdentity { name, version })
+    }
+
     /// Of an embeddings file.
     #[cfg(feature = "mcap")]
     pub fn of_file(file: &EmbeddingsFile) -> Self {
@@ -203,7 +209,9 @@ pub fn prepare(
     let (from_cache, shape) = (shape.hit, Arc::new(shape.shape));
     let (object, lifted, encoder) = match lifted {
         Some(LiftedCloud { cloud, report, encoder }) => {
-            (PreparedObject::new(shape, cloud, task)?, report, encoder)
+            let object = PreparedObject::new(shape, cloud, task)?;
+            let weights = encoder.as_ref().map(EncoderRecord::confidence_weights);
+            (object.with_confidence_weights(weights.unwrap_or_default()), report, encoder)
         }
         None => (PreparedObject::without_features(shape, task)?, None, None),
     };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, SemanticCloud, Shape, ShapeSettings};
+use semfm_geom::{ConfidenceWeights, Mesh, SemanticCloud, Shape, ShapeSettings};
 
 use super::*;
 use crate::Verdict;
@@ -216,7 +216,7 @@ fn a_second_opinion_is_computed_where_it_is_needed_or_asked_for() {
         if info.has_map {
             continue;
         }
-        assert_eq!(alone.confidence, alone.report.evidence.probability());
+        assert_eq!(alone.confidence, alone.report.evidence.probability(&ConfidenceWeights::default()));
         let asked = TransferSettings { second_opinion: true, ..settings };
         let both = transfer(&source, &target, &region, &asked, &task).unwrap();
         assert_eq!(both.region, alone.region, "{method}: the answer is the same");

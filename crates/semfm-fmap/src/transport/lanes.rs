@@ -6,6 +6,9 @@
 const LANES: usize = 32;
 /// Below this a kernel sum has lost its digits and the scaling moves to the log domain.
 pub(super) const UNDERFLOW: f32 = 1e-30;
+/// Where the exponential is cut to zero, at 2e-25: what is left out is below the rounding of sums that hold a 1. Cut at
+/// −87 the products with small scalings are subnormal, and an iteration takes four times as long.
+const CUT: f32 = -57.0;
 
 /// One pass over some rows of the kernel: u from K v, and this block's share of Kᵀ u. `None` where
 /// a sum underflows.
@@ -93,10 +96,10 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
     lanes[0] + rest
 }
 
-/// eˣ for x ≤ 0 to 2e-7 relative, 0 below −87: written so that it runs in lanes (libm's does not).
+/// eˣ for x ≤ 0 to 2e-7 relative, 0 from [`CUT`] on: written so that it runs in lanes (libm's does not).
 #[inline(always)]
 fn exp_of_negative(x: f32) -> f32 {
-    let x = if x < -87.0 { -87.0 } else { x };
+    let x = if x < CUT { CUT } else { x };
     let scaled = x * std::f32::consts::LOG2_E;
     // Adding 1.5 · 2²³ rounds to the nearest integer and leaves it in the low bits.
     let shifted = scaled + 12_582_912.0;
@@ -107,7 +110,7 @@ fn exp_of_negative(x: f32) -> f32 {
             + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
     let power =
         f32::from_bits((shifted.to_bits().wrapping_sub(0x4B40_0000).wrapping_add(127)) << 23);
-    if x <= -87.0 { 0.0 } else { series * power }
+    if x <= CUT { 0.0 } else { series * power }
 }
 
 #[cfg(test)]
@@ -116,7 +119,7 @@ mod tests {
 
     #[test]
     fn the_exponential_is_one() {
-        for i in 0..8700 {
+        for i in 0..5700 {
             let x = -0.01 * i as f32;
             let (found, expected) = (exp_of_negative(x), f64::from(x).exp());
             assert!(
