@@ -4,9 +4,10 @@
 //! a demonstration, the tests and the synthetic evaluation need no download: `object` builds a
 //! closed mesh with part labels and its true grip region from signed distances, `encoder` stands
 //! in for a vision transformer and gives ordinary patch embeddings, `files` writes both as an
-//! evaluation reads them. Nothing here knows how the
+//! evaluation reads them, `arm` is a robot arm as URDF text. Nothing here knows how the
 //! matching works, and whatever it writes says that it is simulated.
 
+mod arm;
 mod encoder;
 mod error;
 mod files;
@@ -20,6 +21,7 @@ use std::str::FromStr;
 
 use semfm_geom::suggestion::unknown_name;
 
+pub use arm::{ARM_FLANGE, ARM_HOME, ARM_NAME, arm_urdf};
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};
 pub use files::{ObjectFiles, render_views, write_labelled_mesh, write_object};
