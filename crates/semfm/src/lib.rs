@@ -59,10 +59,12 @@ mod error;
 pub mod files;
 mod grasp_request;
 mod grasp_result;
+mod motion_scene;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
 mod object_size;
 mod pipeline;
+mod planned_motion;
 mod pose_dependence;
 pub mod weight_colors;
 
@@ -74,9 +76,14 @@ pub use geom::{Mesh, Task};
 pub use grasp::find_grasps;
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
+pub use motion_scene::{
+    FingerJoint, FrameOwner, MotionFrame, MotionObject, MotionObstacle, MotionRobot, MotionScene,
+    MountedHand, ObstacleShape, SceneState,
+};
 pub use object_size::ObjectSize;
 pub use pipeline::{
     EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
     prepare, semantic_cloud,
 };
+pub use planned_motion::PlannedMotion;
 pub use pose_dependence::shares_of_poses;

@@ -12,9 +12,11 @@ use semfm_robot::{Gripper, GripperPart, Role};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::trajectory::FingerRecord;
 use super::{MatrixRows, write_json};
 use crate::Result;
 use crate::grasp_result::{AnswerFrame, GraspResult, position_and_rotation};
+use crate::motion_scene::FingerJoint;
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.grasps/1";
@@ -65,6 +67,9 @@ pub struct GripperRecord {
     pub flange_from_tcp: MatrixRows,
     /// Its rigid parts.
     pub parts: Vec<PartRecord>,
+    /// The joints that open and close it, where they are known by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<FingerRecord>,
 }
 
 /// A rigid part of the gripper: convex hulls of point sets, in the part's own frame.
@@ -275,12 +280,17 @@ impl GripperRecord {
             pad: gripper.pad,
             flange_from_tcp: rows(gripper.flange_from_tcp),
             parts: gripper.parts.iter().map(PartRecord::new).collect(),
+            joints: FingerJoint::of(gripper).iter().map(finger_record).collect(),
         }
     }
 }
 
+fn finger_record(finger: &FingerJoint) -> FingerRecord {
+    FingerRecord { joint: finger.name().into(), positions: finger.table().to_vec() }
+}
+
 impl PartRecord {
-    fn new(part: &GripperPart) -> Self {
+    pub(crate) fn new(part: &GripperPart) -> Self {
         let role = match part.role {
             Role::Palm => "palm",
             Role::Left => "left",
@@ -308,6 +318,6 @@ fn add_hulls(shape: &dyn Shape, pose: Pose, hulls: &mut Vec<Vec<[f64; 3]>>) {
     hulls.push(corners.into_iter().map(|p| (pose * p).to_array()).collect());
 }
 
-fn rows(pose: Pose) -> MatrixRows {
+pub(super) fn rows(pose: Pose) -> MatrixRows {
     pose.to_mat4().transpose().to_cols_array_2d()
 }

@@ -9,6 +9,7 @@
 //! | `point_map.json` of a transfer | `semfm.point_map/1` | [`PointMapFile`] |
 //! | `aligned.json`, the pose of an object before a camera | `semfm.aligned/1` | [`AlignedFile`] |
 //! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
+//! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
 //!
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
 //! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`). From other
@@ -30,9 +31,12 @@ mod obstacle;
 mod picture;
 mod point_map;
 mod region;
+mod rigid_pose;
 #[cfg(feature = "mcap")]
 mod ros2_grasps;
 mod stored_transfer;
+mod trajectory;
+mod trajectory_check;
 mod transfer_folder;
 mod transfer_report;
 mod transferred_region;
@@ -59,9 +63,14 @@ pub use mask::{MaskedPicture, read_mask};
 pub use obstacle::read_obstacle;
 pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
+pub use rigid_pose::read_rigid_pose;
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
 pub use stored_transfer::StoredTransfer;
+pub use trajectory::{
+    FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
+    MountedHandRecord, ObstacleRecord, ShapeRecord, TrajectoryFile, read_motion,
+};
 pub use transfer_folder::{
     ANSWERS as TRANSFER_ANSWERS, AnchorRanks, FILES as TRANSFER_FILES, ObjectAnchors,
     TransferResult, put_transfer, write_answer, write_transfer,
