@@ -19,7 +19,7 @@ pub enum Error {
         /// What was given.
         found: String,
     },
-    /// A robot description that is not what it should be, or that names what is not allowed.
+    /// A robot description (URDF, SRDF, joint limits) that is not what it should be, or that names what is not allowed.
     #[error("{}: {place}: expected {expected}, found {found}", path.display())]
     Urdf {
         /// The file.

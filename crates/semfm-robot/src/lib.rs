@@ -23,6 +23,7 @@ mod kinematics;
 mod link;
 mod link_shape;
 mod robot;
+mod srdf;
 mod urdf;
 
 pub use error::{Error, Result};
@@ -38,6 +39,7 @@ pub use link_shape::{ConvexPiece, ConvexPieces, LinkShape};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use parry3d_f64::math::Pose;
 pub use robot::Robot;
+pub use srdf::{ChainEnds, DisabledPair, EndEffector, Group, GroupState, Srdf, VirtualJoint};
 pub use urdf::{MeshPaths, MeshPlace, MeshUse, RobotDescription};
 
 #[cfg(test)]
