@@ -1,0 +1,74 @@
+//! Poses of things that do not change their size, such as a camera's in the frame of a robot's base.
+
+use std::path::Path;
+
+use parry3d_f64::math::Pose;
+use semfm_align::Sim3;
+use semfm_geom::io::{FormatError, read_json};
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::MatrixRows;
+use crate::Result;
+
+/// Farthest from 1 that the scale of a pose may be: calibrations round their numbers.
+const SCALE_TOLERANCE: f64 = 1e-4;
+
+/// Reads a rigid pose: a bare 4 × 4 matrix, rows first, or an object with it in the field `name` (such as
+/// `base_from_camera`).
+///
+/// # Errors
+/// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not JSON;
+/// [`Error::Format`](crate::Error::Format) for what is no rotation with a translation.
+pub fn read_rigid_pose(path: &Path, name: &str) -> Result<Pose> {
+    let value: Value = read_json(path)?;
+    let (place, rows) = match value.get(name) {
+        Some(rows) => (name, rows),
+        None => ("matrix", &value),
+    };
+    let expected = format!("a 4 × 4 matrix, or an object with it in the field `{name}`");
+    let rows = MatrixRows::deserialize(rows)
+        .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
+    let expected = "rows of a rotation and a translation in metres";
+    let motion = Sim3::from_rows(rows)
+        .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
+    if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {
+        let found = format!("a scale of {}", motion.scale);
+        return Err(FormatError::new(path, place, expected, found).into());
+    }
+    Ok(motion.rigid())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Pose> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pose.json");
+        std::fs::write(&path, text).unwrap();
+        read_rigid_pose(&path, "base_from_camera")
+    }
+
+    const POSE: &str = "[[0,-1,0,1],[1,0,0,2],[0,0,1,0.5],[0,0,0,1]]";
+
+    #[test]
+    fn bare_and_named_matrices_are_poses() {
+        let bare = read(POSE).unwrap();
+        assert_eq!(bare.translation.to_array(), [1.0, 2.0, 0.5]);
+        assert_eq!(read(&format!("{{\"base_from_camera\": {POSE}}}")).unwrap(), bare);
+    }
+
+    #[test]
+    fn what_is_no_rigid_pose_is_refused() {
+        for text in [
+            POSE.replace("-1,0,1", "-2,0,1").as_str(),   // sheared
+            "[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]", // scaled
+            "[[1]]",
+            "{\"base_from_object\": 3}",
+            "{",
+        ] {
+            assert!(read(text).is_err(), "{text}");
+        }
+    }
+}
