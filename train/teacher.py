@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import semfm
 from semfm.sidecar.coverage import patch_coverage
-from semfm.sidecar.onnx_encoder import OnnxEncoder
+from semfm.sidecar.onnx_encoder import open_onnx
 from semfm.sidecar.patches import embed_pictures
 
 #: Quarter turns by turns: half a circle apart within a view, a quarter between neighbouring views,
@@ -23,7 +23,7 @@ class Teacher:
     """Fuses an encoder's tokens on the surface of a mesh."""
 
     def __init__(self, encoder_json: str, threads: int = 1) -> None:
-        self._encoder = OnnxEncoder(encoder_json, "cpu", threads)
+        self._encoder = open_onnx(encoder_json, "cpu", threads)
         self.name, self.revision = self._encoder.name, self._encoder.revision
 
     def fused_field(self, mesh: semfm.Mesh, views: list[semfm.View]) -> semfm.SemanticCloud:

@@ -19,6 +19,7 @@ from train import dataset, examples, export, net, objects  # noqa: E402
 from train import train as training  # noqa: E402
 from train.augment import augmented  # noqa: E402
 from train.families import FAMILIES, LEFT_OUT  # noqa: E402
+from train.teacher import Teacher  # noqa: E402
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -46,6 +47,19 @@ class _FlatTeacher:
         points, _, _ = semfm.sample_even(mesh, 300)[:3]
         waves = np.random.default_rng(0).normal(0, 6, (3, 80))
         return semfm.SemanticCloud(points, np.sin(points @ waves).astype(np.float32))
+
+
+def test_a_teacher_fuses_its_tokens_on_the_surface(tmp_path):
+    import semfm
+    import tiny_onnx
+
+    pytest.importorskip("onnxruntime", reason=_MISSING)
+    drawn = objects.make_object("vessel", 1)
+    mesh = semfm.Mesh(drawn.vertices, drawn.faces)
+    views = semfm.render(mesh, semfm.rig(mesh, count=4, size=dataset.SIZE))
+    field = Teacher(str(tiny_onnx.write_encoder(tmp_path))).fused_field(mesh, views)
+    assert field.features.shape == (len(field.points), 7)
+    assert np.isfinite(field.features).all() and np.ptp(field.features, axis=0).max() > 0
 
 
 @pytest.fixture(scope="module")
