@@ -1,0 +1,339 @@
+//! What touches what at given joint values.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use parry3d_f64::math::Pose;
+
+use super::body::{CollisionBody, Frame, body_gap};
+use super::convex::depth;
+use super::model::CollisionModel;
+use super::moving_body::{Carried, MovingBody};
+use super::scene::Scene;
+use crate::planning::Contact;
+use crate::{Error, Result};
+
+/// Distances beyond this are as good as any, metres.
+const FAR: f64 = 0.5;
+
+/// A body that a link carries: a grasped object, a hand that is no part of the robot's description.
+#[derive(Clone, Debug)]
+pub struct AttachedBody {
+    /// Its name, unlike those of links, obstacles and other bodies.
+    pub name: String,
+    /// The link that carries it.
+    pub link: usize,
+    /// Its place there.
+    pub link_from_body: Pose,
+    /// Its shape.
+    pub body: CollisionBody,
+    /// Names of links, obstacles and other attached bodies that it may touch.
+    pub may_touch: Vec<String>,
+}
+
+/// Says what touches at given joint values: links against each other and against a scene, with bodies that links carry.
+/// Joint limits are not its matter. Cheap to derive variants from: models, scenes and bodies are shared.
+#[derive(Clone, Debug)]
+pub struct CollisionChecker {
+    model: Arc<CollisionModel>,
+    scene: Scene,
+    attached: Vec<AttachedBody>,
+    allowed: Vec<[String; 2]>,
+    /// Links with a shape, then attached bodies.
+    pub(super) bodies: Arc<[MovingBody]>,
+    /// Pairs of bodies with the number of joints that move both alike.
+    pub(super) body_pairs: Vec<BodyPair>,
+    /// Bodies and obstacles.
+    pub(super) scene_pairs: Vec<ScenePair>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BodyPair {
+    pub(super) a: usize,
+    pub(super) b: usize,
+    pub(super) common: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScenePair {
+    pub(super) body: usize,
+    pub(super) obstacle: usize,
+}
+
+/// Memory of one thread for one question after the other.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub(super) base_from_link: Vec<Pose>,
+    pub(super) frames: Vec<Frame>,
+    pub(super) carried: Vec<Carried>,
+    pub(super) travel: Vec<f64>,
+    pub(super) q: Vec<f64>,
+    pub(super) open: std::collections::VecDeque<[f64; 2]>,
+}
+
+thread_local!(static SCRATCH: RefCell<Scratch> = RefCell::default());
+
+/// Runs `work` with this thread's memory; nothing that `work` calls does so again.
+pub(super) fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
+    SCRATCH.with_borrow_mut(work)
+}
+
+impl CollisionChecker {
+    /// A robot in a scene.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where an obstacle has the name of a link.
+    pub fn new(model: Arc<CollisionModel>, scene: Scene) -> Result<Self> {
+        let bodies: Arc<[MovingBody]> = model.moving_bodies().into();
+        let (attached, allowed) = (Vec::new(), Vec::new());
+        let (body_pairs, scene_pairs) = (Vec::new(), Vec::new());
+        Self { model, scene, attached, allowed, bodies, body_pairs, scene_pairs }.paired()
+    }
+
+    /// The same in another scene; what may touch stays.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where an obstacle has the name of a link or of an attached body.
+    pub fn with_scene(&self, scene: Scene) -> Result<Self> {
+        Self { scene, ..self.clone() }.paired()
+    }
+
+    /// The same with another model of the same robot, see [`CollisionModel::with_arm`].
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where an obstacle or an attached body has the name of a link.
+    pub fn with_model(&self, model: Arc<CollisionModel>) -> Result<Self> {
+        let attached = self.attached.iter().map(|attached| attached.on(&model));
+        let bodies = model.moving_bodies().iter().cloned().chain(attached).collect();
+        Self { bodies, model, ..self.clone() }.paired()
+    }
+
+    /// The same with a body that a link carries. It is checked against the scene, other bodies, and the links that move
+    /// against it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a link that the robot does not have, and a name that is taken.
+    pub fn with_attached(&self, attached: AttachedBody) -> Result<Self> {
+        if attached.link >= self.model.arm().robot().links.len() {
+            return Err(Error::Invalid {
+                what: format!("attached body `{}`: link", attached.name),
+                expected: format!("one of {} links", self.model.arm().robot().links.len()),
+                found: attached.link.to_string(),
+            });
+        }
+        let bodies = self.bodies.iter().cloned().chain([attached.on(&self.model)]).collect();
+        let attached = self.attached.iter().cloned().chain([attached]).collect();
+        Self { bodies, attached, ..self.clone() }.paired()
+    }
+
+    /// The same without any attached body.
+    pub fn without_attached(&self) -> Result<Self> {
+        let bodies = self.model.moving_bodies().into();
+        Self { bodies, attached: Vec::new(), ..self.clone() }.paired()
+    }
+
+    /// The same where two things, named, may touch: a finger and the object, the object and the table it stands on.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a name that nothing has.
+    pub fn allowing(&self, a: &str, b: &str) -> Result<Self> {
+        for name in [a, b] {
+            let is_body = self.bodies.iter().any(|body| body.name == name);
+            let is_link = self.model.arm().robot().link(name).is_some();
+            if !(is_body || is_link || self.scene.names().any(|other| other == name)) {
+                return Err(Error::Invalid {
+                    what: "pair that may touch".into(),
+                    expected: "names of links, obstacles and attached bodies".into(),
+                    found: format!("`{name}`"),
+                });
+            }
+        }
+        let mut allowed = self.allowed.clone();
+        allowed.push([a.into(), b.into()]);
+        Self { allowed, ..self.clone() }.paired()
+    }
+
+    /// The model of the robot.
+    pub fn model(&self) -> &Arc<CollisionModel> {
+        &self.model
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The bodies that links carry.
+    pub fn attached(&self) -> &[AttachedBody] {
+        &self.attached
+    }
+
+    /// Whether nothing touches: everything that is checked is farther apart than the settings' contact distance. False
+    /// for a list of another length and for numbers that are not finite.
+    pub fn is_free(&self, q: &[f64]) -> bool {
+        self.is_sound(q)
+            && with_scratch(|scratch| {
+                self.place(q, scratch);
+                let contact = self.contact();
+                self.scene_pairs
+                    .iter()
+                    .all(|pair| self.scene_gap(pair, &scratch.frames, contact) >= contact)
+                    && self
+                        .body_pairs
+                        .iter()
+                        .all(|pair| self.body_gap(pair, &scratch.frames, contact) >= contact)
+            })
+    }
+
+    /// A lower bound of the least distance between any two things that are checked, metres, exact where it is small; at
+    /// most 0.5, and 0 where something touches or `q` is unsound.
+    pub fn clearance(&self, q: &[f64]) -> f64 {
+        if !self.is_sound(q) {
+            return 0.0;
+        }
+        with_scratch(|scratch| {
+            self.place(q, scratch);
+            let mut least = FAR;
+            for pair in &self.scene_pairs {
+                least = least.min(self.scene_gap(pair, &scratch.frames, least));
+            }
+            for pair in &self.body_pairs {
+                least = least.min(self.body_gap(pair, &scratch.frames, least));
+            }
+            if least < self.contact() { 0.0 } else { least }
+        })
+    }
+
+    /// Everything that touches at `q`, the deepest first; empty where nothing does or `q` is unsound. Depths are the
+    /// shortest ways that part the two pieces that are deepest in each other, metres; for the triangles of a mesh they
+    /// are those of the triangle that is entered deepest.
+    pub fn contacts(&self, q: &[f64]) -> Vec<Contact> {
+        if !self.is_sound(q) {
+            return Vec::new();
+        }
+        let contact = self.contact();
+        let mut contacts = with_scratch(|scratch| {
+            self.place(q, scratch);
+            let frames = &scratch.frames;
+            let scene = self.scene_pairs.iter().filter_map(|pair| {
+                (self.scene_gap(pair, frames, contact) < contact).then(|| Contact {
+                    a: self.bodies[pair.body].name.clone(),
+                    b: self.scene.obstacles()[pair.obstacle].name.clone(),
+                    depth: self.scene.obstacles()[pair.obstacle]
+                        .depth(&self.bodies[pair.body].body, &frames[pair.body]),
+                })
+            });
+            let bodies = self.body_pairs.iter().filter_map(|pair| {
+                (self.body_gap(pair, frames, contact) < contact).then(|| Contact {
+                    a: self.bodies[pair.a].name.clone(),
+                    b: self.bodies[pair.b].name.clone(),
+                    depth: self.depth(pair, frames),
+                })
+            });
+            scene.chain(bodies).collect::<Vec<_>>()
+        });
+        contacts.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        contacts
+    }
+
+    /// The deepest of the [`CollisionChecker::contacts`].
+    pub fn first_contact(&self, q: &[f64]) -> Option<Contact> {
+        self.contacts(q).into_iter().next()
+    }
+
+    pub(super) fn contact(&self) -> f64 {
+        self.model.settings().contact
+    }
+
+    pub(super) fn is_sound(&self, q: &[f64]) -> bool {
+        q.len() == self.model.arm().n_joints() && q.iter().all(|value| value.is_finite())
+    }
+
+    /// Puts all bodies where the arm holds them.
+    pub(super) fn place(&self, q: &[f64], scratch: &mut Scratch) {
+        self.model.arm().link_poses(q, &mut scratch.base_from_link);
+        scratch.frames.clear();
+        scratch.frames.extend(self.bodies.iter().map(|body| body.frame(&scratch.base_from_link)));
+    }
+
+    pub(super) fn scene_gap(&self, pair: &ScenePair, frames: &[Frame], most: f64) -> f64 {
+        let body = &self.bodies[pair.body].body;
+        self.scene.obstacles()[pair.obstacle].gap(body, &frames[pair.body], most)
+    }
+
+    pub(super) fn body_gap(&self, pair: &BodyPair, frames: &[Frame], most: f64) -> f64 {
+        let [a, b] = [pair.a, pair.b].map(|body| (&self.bodies[body].body, &frames[body]));
+        body_gap(a.0, a.1, b.0, b.1, most)
+    }
+
+    fn depth(&self, pair: &BodyPair, frames: &[Frame]) -> f64 {
+        let mut deepest = 0.0_f64;
+        for a in self.bodies[pair.a].body.pieces() {
+            let a_at = frames[pair.a].pose * a.body_from_piece;
+            for b in self.bodies[pair.b].body.pieces() {
+                let b_at = frames[pair.b].pose * b.body_from_piece;
+                deepest = deepest.max(depth(&a_at.inv_mul(&b_at), &a.convex, &b.convex));
+            }
+        }
+        deepest
+    }
+
+    /// With the lists of what is checked, made anew.
+    fn paired(mut self) -> Result<Self> {
+        self.check_names()?;
+        let bodies = &self.bodies;
+        let may_touch = |a: &str, b: &str| {
+            let is_pair =
+                |pair: &[String; 2]| pair[0] == a && pair[1] == b || pair[0] == b && pair[1] == a;
+            let tolerates = |one: &AttachedBody, other: &str, name: &str| {
+                one.name == name && one.may_touch.iter().any(|touched| touched == other)
+            };
+            self.allowed.iter().any(is_pair)
+                || self.attached.iter().any(|one| tolerates(one, b, a) || tolerates(one, a, b))
+        };
+        let n_links = self.model.moving_bodies().len();
+        let of_attached = (n_links..bodies.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+        let pairs = self.model.pairs().iter().copied().chain(of_attached);
+        self.body_pairs = pairs
+            .filter(|&[a, b]| {
+                !bodies[a].is_fixed_to(&bodies[b]) && !may_touch(&bodies[a].name, &bodies[b].name)
+            })
+            .map(|[a, b]| BodyPair { a, b, common: bodies[a].n_common(&bodies[b]) })
+            .collect();
+        // The hand is nearest to what it works on: of all links it is the likeliest to touch, so it comes first.
+        self.scene_pairs = (0..bodies.len())
+            .rev()
+            .filter(|&body| !bodies[body].path.is_empty())
+            .flat_map(|body| {
+                (0..self.scene.obstacles().len()).map(move |obstacle| ScenePair { body, obstacle })
+            })
+            .filter(|pair| {
+                let obstacle = &self.scene.obstacles()[pair.obstacle];
+                !may_touch(&bodies[pair.body].name, &obstacle.name)
+            })
+            .collect();
+        Ok(self)
+    }
+
+    fn check_names(&self) -> Result<()> {
+        let links = self.model.arm().robot().links.iter().map(|link| link.name.as_str());
+        let attached = self.attached.iter().map(|attached| attached.name.as_str());
+        let mut names: Vec<&str> = links.chain(attached).chain(self.scene.names()).collect();
+        names.sort_unstable();
+        match names.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(()),
+            Some(pair) => Err(Error::Invalid {
+                what: "names of links, obstacles and attached bodies".into(),
+                expected: "each once".into(),
+                found: format!("`{}` twice", pair[0]),
+            }),
+        }
+    }
+}
+
+impl AttachedBody {
+    fn on(&self, model: &CollisionModel) -> MovingBody {
+        let Self { name, link, link_from_body, body, .. } = self;
+        MovingBody::new(model.arm(), name.clone(), *link, *link_from_body, body.clone())
+    }
+}
