@@ -3,32 +3,22 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use parry3d_f64::math::Pose;
-use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, SharedShape};
+use parry3d_f64::shape::{Cuboid, SharedShape};
 use parry3d_f64::transformation::try_convex_hull;
 use parry3d_f64::transformation::vhacd::{VHACD, VHACDParameters};
-use semfm_geom::io::{MeshFormat, read_mesh};
-use semfm_geom::math::{DQuat, DVec3, bounds};
+use semfm_geom::math::{DVec3, bounds};
 
+use crate::Result;
 use crate::link::{Geometry, Inertial, Link, LinkGeometry};
-use crate::urdf::{MeshPaths, MeshPlace};
-use crate::{Error, Result};
+use crate::link_surface::{LinkMesh, MIN_HALF, Primitive};
+use crate::urdf::MeshPaths;
 
-/// Most triangles of a collision mesh; published grippers have some thousands.
-const MAX_TRIANGLES: usize = 300_000;
-/// Farthest corner of a mesh from its link's frame, metres: the earth has 1.3e7. Hulls of larger numbers lose their
-/// last bits; what is too large for a gripper, [`MAX_SPAN`](crate::MAX_SPAN) refuses.
-const MAX_COORDINATE: f64 = 1e7;
 /// A hull with more than this times the mesh's volume fills a space that is free (the bay between
 /// finger and palm), and the mesh is cut into convex pieces. Hulls of the grippers that we know are
 /// within 1.001.
 const MAX_HULL_RATIO: f64 = 1.15;
 /// Pieces of one mesh: with 11 for a whole gripper of three boxes a query takes 5 µs; more buys little.
 const MAX_PIECES: u32 = 16;
-/// Thinnest half edge of a box: what is flat still collides.
-const MIN_HALF: f64 = 1e-5;
-/// Segments of a circle where round shapes are cut into triangles.
-const N_SEGMENTS: u32 = 32;
-
 /// A convex shape at its place in a link.
 #[derive(Clone, Debug)]
 pub struct ConvexPiece {
@@ -58,8 +48,8 @@ impl LinkShape {
     /// read, its visuals.
     ///
     /// # Errors
-    /// [`Error::Urdf`] for the name of a mesh that leads out of the allowed folders and for a mesh that is too large;
-    /// [`Error::Geom`] for a mesh that breaks its format.
+    /// [`Error::Urdf`](crate::Error::Urdf) for the name of a mesh that leads out of the allowed folders and for a mesh that is too large;
+    /// [`Error::Geom`](crate::Error::Geom) for a mesh that breaks its format.
     pub fn new(link: &Link, paths: &MeshPaths) -> Result<Self> {
         let collisions = Self::of(&link.collisions, link, paths)?;
         if collisions.missing.is_empty() && !link.collisions.is_empty() || link.visuals.is_empty() {
@@ -82,87 +72,35 @@ impl LinkShape {
 
     fn add(&mut self, placed: &LinkGeometry, link: &Link, paths: &MeshPaths) -> Result<()> {
         let place = placed.link_from_geometry;
-        // parry's cylinders stand along y, those of URDF along z.
-        let upright =
-            place * Pose::from_rotation(DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
-        let (place, shape, surface) = match &placed.geometry {
-            Geometry::Box { size } => {
-                let cuboid = Cuboid::new((*size / 2.0).max(DVec3::splat(MIN_HALF)));
-                (place, SharedShape::new(cuboid), cuboid.to_trimesh())
+        if let Some(primitive) = Primitive::new(&placed.geometry) {
+            let place = place * primitive.geometry_from_shape;
+            let piece = ConvexPiece { link_from_piece: place, shape: primitive.shape };
+            self.pieces.push(piece);
+            self.add_surface(place, &primitive.points, &primitive.faces);
+        } else if let Geometry::Mesh { filename, scale } = &placed.geometry {
+            match LinkMesh::read(filename, *scale, link, paths)? {
+                LinkMesh::Read { points, faces } => {
+                    self.add_mesh(filename, &points, &faces, place, link);
+                }
+                LinkMesh::Missing(why) => self.missing.push(why),
             }
-            &Geometry::Cylinder { radius, length } => {
-                let cylinder = Cylinder::new((length / 2.0).max(MIN_HALF), radius.max(MIN_HALF));
-                (upright, SharedShape::new(cylinder), cylinder.to_trimesh(N_SEGMENTS))
-            }
-            &Geometry::Capsule { radius, length } => {
-                let capsule = Capsule::new_y(length / 2.0, radius.max(MIN_HALF));
-                (upright, SharedShape::new(capsule), capsule.to_trimesh(N_SEGMENTS, N_SEGMENTS / 2))
-            }
-            &Geometry::Sphere { radius } => {
-                let ball = Ball::new(radius.max(MIN_HALF));
-                (place, SharedShape::new(ball), ball.to_trimesh(N_SEGMENTS, N_SEGMENTS))
-            }
-            Geometry::Mesh { filename, scale } => {
-                return self.add_mesh(filename, *scale, place, link, paths);
-            }
-        };
-        self.pieces.push(ConvexPiece { link_from_piece: place, shape });
-        self.add_surface(place, &surface.0, &surface.1);
+        }
         Ok(())
     }
 
     fn add_mesh(
         &mut self,
         filename: &str,
-        scale: DVec3,
+        points: &[DVec3],
+        faces: &[[u32; 3]],
         place: Pose,
         link: &Link,
-        paths: &MeshPaths,
-    ) -> Result<()> {
-        let named = format!("link `{}`: mesh", link.name);
-        let file = match paths.find(filename, &named) {
-            Ok(MeshPlace::Found(file)) => file,
-            Ok(MeshPlace::Missing(why)) => {
-                self.missing.push(format!("{filename}: {why}"));
-                return Ok(());
-            }
-            Err(fault) => return Err(fault.in_file(std::path::Path::new(filename))),
-        };
-        if MeshFormat::from_path(&file).is_none() {
-            let kind = file.extension().unwrap_or_default().to_string_lossy().to_uppercase();
-            self.missing.push(format!("{filename}: {kind} is not supported"));
-            return Ok(());
-        }
-        let mesh = read_mesh(&file)?.mesh;
-        if mesh.n_faces() > MAX_TRIANGLES {
-            return Err(Error::Urdf {
-                path: file,
-                code: "size",
-                place: named,
-                expected: format!("a collision mesh of at most {MAX_TRIANGLES} triangles"),
-                found: format!("{}", mesh.n_faces()),
-            });
-        }
-        let points: Vec<DVec3> = mesh.vertices().iter().map(|&point| point * scale).collect();
-        let is_far = |p: &&DVec3| !p.is_finite() || p.abs().max_element() > MAX_COORDINATE;
-        if let Some(far) = points.iter().find(is_far) {
-            return Err(Error::Urdf {
-                path: file,
-                code: "size",
-                place: named,
-                expected: format!(
-                    "corners within {MAX_COORDINATE:e} m of the link (is a scale missing, as \
-                     scale=\"0.001 0.001 0.001\" for millimetres?)"
-                ),
-                found: format!("{:.3e} {:.3e} {:.3e}", far.x, far.y, far.z),
-            });
-        }
-        let cut = ConvexPieces::new(&points, mesh.faces());
+    ) {
+        let cut = ConvexPieces::new(points, faces);
         self.notes.extend(cut.note.map(|note| format!("link `{}`: {filename}: {note}", link.name)));
         let pieces = cut.shapes.into_iter();
         self.pieces.extend(pieces.map(|shape| ConvexPiece { link_from_piece: place, shape }));
-        self.add_surface(place, &points, mesh.faces());
-        Ok(())
+        self.add_surface(place, points, faces);
     }
 
     /// Whether there is anything to it, be it a mesh that cannot be read.

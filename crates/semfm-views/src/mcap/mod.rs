@@ -6,6 +6,7 @@
 //! uses no length, offset, count or checksum that it has not compared with the bytes.
 
 mod cameras;
+mod cdr;
 mod contents;
 mod decode;
 mod decompress;
@@ -20,11 +21,13 @@ mod metadata;
 mod pose_array;
 mod reader;
 mod record;
+mod ros2_messages;
 mod summary;
 mod topics;
 mod views_file;
 mod writer;
 
+pub use cdr::Cdr;
 pub use contents::{Attachment, Channel, Contents, MetadataRecord, Schema, TimeRange};
 pub use decode::{decode, message_error};
 pub use embeddings_file::{Dtype, EmbeddingsFile};
@@ -34,6 +37,7 @@ pub use messages::{Colors, find_mesh, read_mesh};
 pub use metadata::{EmbeddingsMetadata, METADATA_NAME, ViewsMetadata};
 pub use pose_array::{POSES_TOPIC, PoseNumbers, write_pose_array};
 pub use reader::{Message, read_bytes, read_messages};
+pub use ros2_messages::Ros2Message;
 pub use topics::TF;
 pub use views_file::{SingleView, ViewsFile, read_view, write_views};
-pub use writer::{ChunkCompression, McapWriter, write_mcap};
+pub use writer::{ChannelId, ChunkCompression, McapWriter, write_mcap};

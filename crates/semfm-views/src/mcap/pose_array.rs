@@ -1,16 +1,13 @@
 //! Poses for ROS 2: `geometry_msgs/msg/PoseArray` in CDR, as `ros2 bag play` and every ROS viewer
 //! read it, and beside it one `std_msgs/msg/Float64MultiArray` for each number that belongs to a pose:
 //! messages that every installation has, so that no package need be built to read them.
-//!
-//! CDR (OMG Common Data Representation, XCDR1, little-endian): a header of four bytes, then each
-//! number on a multiple of its own size, counted from behind the header; a string as its length with
-//! the closing zero, a sequence as its length and its members.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::contents::Schema;
+use super::cdr::Cdr;
 use super::metadata::METADATA_NAME;
+use super::ros2_messages::Ros2Message;
 use super::writer::{ChunkCompression, write_mcap};
 use crate::Result;
 use semfm_geom::io::refuse_input;
@@ -18,49 +15,6 @@ use semfm_geom::math::{DQuat, DVec3};
 
 /// Topic of the poses.
 pub const POSES_TOPIC: &str = "/grasps/poses";
-
-/// The message's definition with those it is made of, in the form that MCAP prescribes for
-/// `ros2msg`.
-const POSE_ARRAY: &str = "std_msgs/Header header
-geometry_msgs/Pose[] poses
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-";
-
-/// The definition of an array of numbers, in the same form.
-const NUMBERS: &str = "std_msgs/MultiArrayLayout layout
-float64[] data
-================================================================================
-MSG: std_msgs/MultiArrayLayout
-std_msgs/MultiArrayDimension[] dim
-uint32 data_offset
-================================================================================
-MSG: std_msgs/MultiArrayDimension
-string label
-uint32 size
-uint32 stride
-";
 
 /// A number for each pose.
 #[derive(Clone, Copy, Debug)]
@@ -91,9 +45,9 @@ pub fn write_pose_array(
     write_mcap(path, "ros2", ChunkCompression::Lz4, |file| {
         let entries = [("format", format.to_owned()), ("json", metadata.to_string())];
         file.metadata(METADATA_NAME, BTreeMap::from(entries.map(|(k, v)| (k.to_owned(), v))))?;
-        let schema = schema("geometry_msgs/msg/PoseArray", POSE_ARRAY);
+        let schema = Ros2Message::PoseArray.schema();
         file.log_encoded(POSES_TOPIC, &schema, "cdr", &pose_array(frame_id, poses))?;
-        let schema = self::schema("std_msgs/msg/Float64MultiArray", NUMBERS);
+        let schema = Ros2Message::Float64MultiArray.schema();
         for PoseNumbers { topic, label, numbers } in numbers {
             file.log_encoded(topic, &schema, "cdr", &number_array(label, numbers))?;
         }
@@ -101,21 +55,15 @@ pub fn write_pose_array(
     })
 }
 
-fn schema(name: &str, definition: &str) -> Schema {
-    Schema { name: name.to_owned(), encoding: "ros2msg".to_owned(), data: definition.into() }
-}
-
 /// The message's bytes, at time 0.
 fn pose_array(frame_id: &str, poses: &[(DVec3, DQuat)]) -> Vec<u8> {
     let mut cdr = Cdr::new();
-    cdr.u32(0); // seconds
-    cdr.u32(0); // nanoseconds
-    cdr.string(frame_id);
+    cdr.header(0, frame_id);
     cdr.length(poses.len());
     for (position, rotation) in poses {
-        position.to_array().into_iter().chain(rotation.to_array()).for_each(|x| cdr.f64(x));
+        cdr.pose(*position, *rotation);
     }
-    cdr.bytes
+    cdr.into_bytes()
 }
 
 /// The message's bytes: one dimension, then the numbers.
@@ -128,46 +76,7 @@ fn number_array(label: &str, numbers: &[f64]) -> Vec<u8> {
     cdr.u32(0); // data_offset
     cdr.length(numbers.len());
     numbers.iter().for_each(|&x| cdr.f64(x));
-    cdr.bytes
-}
-
-/// A CDR message being written.
-struct Cdr {
-    bytes: Vec<u8>,
-}
-
-impl Cdr {
-    /// Bytes before the first number; alignment is counted from behind them.
-    const HEADER: [u8; 4] = [0, 1, 0, 0]; // plain CDR, little-endian, no options
-
-    fn new() -> Self {
-        Self { bytes: Self::HEADER.to_vec() }
-    }
-
-    fn align(&mut self, size: usize) {
-        let body = self.bytes.len() - Self::HEADER.len();
-        self.bytes.resize(Self::HEADER.len() + body.next_multiple_of(size), 0);
-    }
-
-    fn u32(&mut self, value: u32) {
-        self.align(4);
-        self.bytes.extend(value.to_le_bytes());
-    }
-
-    fn length(&mut self, n: usize) {
-        self.u32(u32::try_from(n).unwrap_or(u32::MAX));
-    }
-
-    fn f64(&mut self, value: f64) {
-        self.align(8);
-        self.bytes.extend(value.to_le_bytes());
-    }
-
-    fn string(&mut self, text: &str) {
-        self.length(text.len() + 1);
-        self.bytes.extend(text.as_bytes());
-        self.bytes.push(0);
-    }
+    cdr.into_bytes()
 }
 
 #[cfg(test)]

@@ -34,6 +34,10 @@ pub struct McapWriter<'a> {
     buffer: Vec<u8>,
 }
 
+/// A topic that was declared with [`McapWriter::declare`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelId(u16);
+
 /// Writes a file of an MCAP profile (`""`: none) through `fill` and puts it in place when it is
 /// complete.
 ///
@@ -98,17 +102,43 @@ impl McapWriter<'_> {
         message_encoding: &str,
         message: &[u8],
     ) -> Result<()> {
+        let channel = self.declare(topic, schema, message_encoding, &BTreeMap::new())?;
+        self.log_to(channel, 0, message)
+    }
+
+    /// Declares a topic for messages that are encoded already; `metadata` is its channel's.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn declare(
+        &mut self,
+        topic: &str,
+        schema: &Schema,
+        message_encoding: &str,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<ChannelId> {
         let Schema { name, encoding, data } = schema;
         let schema_id = self
             .writer
             .add_schema(name, encoding, data)
             .map_err(|error| failure(self.path, error))?;
-        let channel_id = self
-            .writer
-            .add_channel(schema_id, topic, message_encoding, &BTreeMap::new())
-            .map_err(|error| failure(self.path, error))?;
-        let header =
-            mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+        self.writer
+            .add_channel(schema_id, topic, message_encoding, metadata)
+            .map(ChannelId)
+            .map_err(|error| failure(self.path, error))
+    }
+
+    /// Writes a message that is encoded already on a declared topic; `time` in nanoseconds.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn log_to(&mut self, channel: ChannelId, time: u64, message: &[u8]) -> Result<()> {
+        let header = mcap::records::MessageHeader {
+            channel_id: channel.0,
+            sequence: 0, // as rosbag2 writes it: messages are not numbered
+            log_time: time,
+            publish_time: time,
+        };
         self.writer
             .write_to_known_channel(&header, message)
             .map_err(|error| failure(self.path, error))

@@ -12,7 +12,8 @@
 //! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
 //!
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
-//! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`). From other
+//! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`), a motion as another
+//! (`write_ros2_trajectory`). From other
 //! programs come depth images, masks and intrinsics ([`read_depth_image`], [`read_mask`],
 //! [`read_intrinsics`]), per-vertex features ([`read_vertex_features`]) and obstacles
 //! ([`read_obstacle`]).
@@ -34,6 +35,8 @@ mod region;
 mod rigid_pose;
 #[cfg(feature = "mcap")]
 mod ros2_grasps;
+#[cfg(feature = "mcap")]
+mod ros2_trajectory;
 mod stored_transfer;
 mod trajectory;
 mod trajectory_check;
@@ -66,6 +69,8 @@ pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region}
 pub use rigid_pose::read_rigid_pose;
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
+#[cfg(feature = "mcap")]
+pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
 pub use stored_transfer::StoredTransfer;
 pub use trajectory::{
     FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
