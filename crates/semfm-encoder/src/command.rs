@@ -12,16 +12,13 @@ use semfm_geom::Task;
 use semfm_views::mcap::EmbeddingsFile;
 
 use crate::command_inputs::{EncoderInputs, FileState};
-use crate::encoder::{EncodedViews, Encoder, EncoderIdentity, WantedViews};
+use crate::encoder::{EncodedViews, Encoder, EncoderIdentity, PRETRAINED_ROLLS, WantedViews};
 use crate::open::OpenSettings;
 use crate::rendered_views::{Coloring, RenderedObject, ViewSettings};
 use crate::{Error, Result};
 
 /// Environment variable that names the program; else `semfm-embed` is looked for on the PATH.
 pub const PROGRAM_VARIABLE: &str = "SEMFM_EMBED";
-
-/// Rotations that encoders need which mix the place in the picture into their tokens.
-const ROLLS: u32 = 4;
 
 /// A model that `semfm-embed` runs: a Hugging Face name, a local checkpoint, an ONNX encoder's JSON, or
 /// `package.module:Class`.
@@ -126,7 +123,7 @@ impl Encoder for CommandEncoder {
 
     fn wants(&self) -> WantedViews {
         let views = ViewSettings { coloring: Coloring::Own, ..ViewSettings::default() };
-        WantedViews { views, reads_colors: true, rolls: ROLLS }
+        WantedViews { views, reads_colors: true, rolls: PRETRAINED_ROLLS }
     }
 
     fn encode(

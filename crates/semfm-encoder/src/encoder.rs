@@ -13,6 +13,10 @@ use serde::{Deserialize, Serialize};
 use crate::Result;
 use crate::rendered_views::{Coloring, RenderedObject, ViewSettings};
 
+/// Rotations that encoders need which mix the place in the picture into their tokens.
+#[cfg(any(feature = "mcap", feature = "onnx", feature = "siglip"))]
+pub(crate) const PRETRAINED_ROLLS: u32 = 4;
+
 /// Name and version of an encoder: where either differs, so do the features.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct EncoderIdentity {
@@ -56,8 +60,9 @@ impl WantedViews {
 
 /// Makes patch embeddings of rendered views.
 ///
-/// Two are here: [`NetEncoder`](crate::NetEncoder), a network that runs in this process (the built-in
-/// one among them), and `CommandEncoder` (feature `mcap`), the program `semfm-embed`.
+/// Three are here: [`NetEncoder`](crate::NetEncoder), a network of ours that runs in this process (the
+/// built-in one among them), `PretrainedEncoder` (features `onnx` and `siglip`), somebody else's that
+/// does, and `CommandEncoder` (feature `mcap`), the program `semfm-embed`.
 pub trait Encoder: fmt::Debug + Send + Sync {
     /// Its name and version.
     fn identity(&self) -> EncoderIdentity;

@@ -1,5 +1,7 @@
 //! What can go wrong between pictures and embeddings.
 
+use std::path::PathBuf;
+
 use semfm_geom::io::FormatError;
 
 /// Result of a call of this crate.
@@ -28,6 +30,18 @@ pub enum Error {
     /// A file of weights is not what its format demands.
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A pretrained network cannot be run in this process.
+    #[error(
+        "{}: {reason} (the program `semfm-embed` runs it in Python: \
+         `semfm-embed V.views.mcap -o V.emb.mcap --model MODEL`)",
+        path.display()
+    )]
+    Network {
+        /// The file that holds it.
+        path: PathBuf,
+        /// What its runtime says.
+        reason: String,
+    },
     /// The program that runs other encoders is not there.
     #[error(
         "the encoder `{model}` needs the program `{program}`, which is not there: install it with \
@@ -66,7 +80,9 @@ impl Error {
             Self::Views(cause) => cause.code(),
             Self::Invalid { .. } => "invalid",
             Self::Format(_) => "format",
-            Self::ProgramMissing { .. } | Self::ProgramFailed { .. } => "encoder",
+            Self::Network { .. } | Self::ProgramMissing { .. } | Self::ProgramFailed { .. } => {
+                "encoder"
+            }
         }
     }
 
@@ -77,6 +93,7 @@ impl Error {
             Self::Views(cause) => cause.place(),
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format(error) => Some(error.place.clone()),
+            Self::Network { path, .. } => Some(path.display().to_string()),
             Self::ProgramMissing { .. } | Self::ProgramFailed { .. } => None,
         }
     }

@@ -37,6 +37,6 @@ pub use error::{Error, Result};
 pub use layer::{ConvLayer, Layer};
 pub use net_encoder::NetEncoder;
 pub use net_file::{Background, NetHeader, write_net};
+pub use open::{OpenSettings, encoder_names, open_encoder};
 #[cfg(any(feature = "onnx", feature = "siglip"))]
 pub use pretrained::PretrainedEncoder;
-pub use open::{OpenSettings, encoder_names, open_encoder};

@@ -9,6 +9,7 @@ use semfm_geom::io::FormatError;
 use semfm_views::{EmbeddedView, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings, View};
 
 use crate::convolution::Tensor;
+use crate::coverage::coverage;
 use crate::encoder::{EncodedViews, Encoder, EncoderIdentity, WantedViews};
 use crate::layer::Size;
 use crate::net_file::{NetFile, NetHeader};
@@ -126,7 +127,7 @@ impl NetEncoder {
             cols: width / patch,
             rect: [0.0, 0.0, width as f32, height as f32],
         };
-        Ok(PatchEmbeddings::new(grid, dim, data, coverage(view, patch), valid)?)
+        Ok(PatchEmbeddings::new(grid, dim, data, coverage(view, &grid), valid)?)
     }
 
     /// Refuses pictures that are not whole patches, or too large for the network.
@@ -207,18 +208,4 @@ impl NetEncoder {
         let NetHeader { channels, mean, std, .. } = self.header();
         serde_json::json!({ "channels": channels, "mean": mean, "std": std }).to_string()
     }
-}
-
-/// Share of each patch that lies on the object, 0 to 255.
-fn coverage(view: &View, patch: usize) -> Vec<u8> {
-    let (height, width) = picture_size(&view.camera);
-    let (rows, columns) = (height / patch, width / patch);
-    let mut counts = vec![0u32; rows * columns];
-    for (y, line) in view.triangles.chunks_exact(width).enumerate() {
-        for (x, &triangle) in line.iter().enumerate() {
-            counts[y / patch * columns + x / patch] += u32::from(triangle >= 0);
-        }
-    }
-    let pixels = (patch * patch) as f64;
-    counts.iter().map(|&n| (255.0 * f64::from(n) / pixels).round_ties_even() as u8).collect()
 }

@@ -8,6 +8,8 @@ use crate::builtin::{BUILTIN_ENCODERS, BuiltinEncoder};
 use crate::command::CommandEncoder;
 use crate::encoder::Encoder;
 use crate::net_encoder::NetEncoder;
+#[cfg(any(feature = "onnx", feature = "siglip"))]
+use crate::pretrained::PretrainedEncoder;
 use crate::{Error, Result};
 
 /// How an encoder outside of this process is called.
@@ -32,8 +34,9 @@ pub fn encoder_names() -> String {
     )
 }
 
-/// Opens an encoder: a built-in one by its name, a network of ours by its file (`NAME.net`), and
-/// everything else through the program `semfm-embed` (feature `mcap`).
+/// Opens an encoder: a built-in one by its name, a network of ours by its file (`NAME.net`), an
+/// `ENCODER.json` (feature `onnx`) or a folder with a SigLIP checkpoint (feature `siglip`) in this
+/// process, and everything else through the program `semfm-embed` (feature `mcap`).
 ///
 /// ```
 /// use semfm_encoder::{OpenSettings, open_encoder};
@@ -43,7 +46,8 @@ pub fn encoder_names() -> String {
 /// ```
 ///
 /// # Errors
-/// Those of [`NetEncoder::read`]; [`Error::Invalid`] for a name without meaning: empty, or of an
+/// Those of [`NetEncoder::read`], `PretrainedEncoder::read_onnx` and
+/// `PretrainedEncoder::read_siglip`; [`Error::Invalid`] for a name without meaning: empty, or of an
 /// encoder outside in a build without MCAP files.
 pub fn open_encoder(name: &str, settings: &OpenSettings) -> Result<Arc<dyn Encoder>> {
     if let Some(builtin) = BuiltinEncoder::named(name) {
@@ -54,6 +58,14 @@ pub fn open_encoder(name: &str, settings: &OpenSettings) -> Result<Arc<dyn Encod
     }
     if name.trim().is_empty() {
         return Err(Error::invalid("encoder", encoder_names(), "an empty name"));
+    }
+    #[cfg(feature = "onnx")]
+    if name.ends_with(".json") {
+        return Ok(Arc::new(PretrainedEncoder::read_onnx(Path::new(name), settings)?));
+    }
+    #[cfg(feature = "siglip")]
+    if crate::pretrained::is_siglip_folder(Path::new(name)) {
+        return Ok(Arc::new(PretrainedEncoder::read_siglip(Path::new(name), settings)?));
     }
     #[cfg(feature = "mcap")]
     return Ok(Arc::new(CommandEncoder::new(name, *settings)));

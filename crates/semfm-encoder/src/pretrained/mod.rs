@@ -1,0 +1,20 @@
+//! Pretrained networks of others in this process: what an ENCODER.json describes (feature `onnx`) and
+//! SigLIP's vision tower (feature `siglip`).
+//!
+//! A [`TokenNetwork`](token_network::TokenNetwork) makes raw tokens of a picture;
+//! [`PretrainedEncoder`] turns the pictures, drops outliers, scales and averages as the program
+//! `semfm-embed` does (`python/semfm/sidecar/patches.py`).
+
+mod content;
+mod encoder;
+#[cfg(feature = "onnx")]
+mod onnx;
+mod resize;
+mod rolled_tokens;
+#[cfg(feature = "siglip")]
+mod siglip;
+mod token_network;
+
+pub use encoder::PretrainedEncoder;
+#[cfg(feature = "siglip")]
+pub(crate) use siglip::is_siglip_folder;
