@@ -105,6 +105,23 @@ impl CollisionModel {
         Ok(Self { bodies: self.bodies.iter().map(place).collect(), arm, ..self.clone() })
     }
 
+    /// The same without some links, by name: fingers of the description, where another hand stands for them. Names that
+    /// no link has are passed over.
+    #[must_use]
+    pub fn without_links(&self, names: &[&str]) -> Self {
+        let stays: Vec<bool> =
+            self.bodies.iter().map(|body| !names.contains(&body.name.as_str())).collect();
+        let place: Vec<usize> =
+            (0..stays.len()).map(|i| stays[..i].iter().filter(|s| **s).count()).collect();
+        let pairs = self.pairs.iter().filter(|pair| pair.iter().all(|&body| stays[body]));
+        let bodies = self.bodies.iter().zip(&stays).filter(|(_, stays)| **stays);
+        Self {
+            pairs: pairs.map(|pair| pair.map(|body| place[body])).collect(),
+            bodies: bodies.map(|(body, _)| body.clone()).collect(),
+            ..self.clone()
+        }
+    }
+
     /// The arm that moves them.
     pub fn arm(&self) -> &Arc<Arm> {
         &self.arm
