@@ -59,7 +59,7 @@ const HALVINGS: usize = 5;
 fn merge(waypoints: &[Vec<f64>], near: f64) -> Vec<Vec<f64>> {
     let last = &waypoints[waypoints.len() - 1];
     let mut merged = vec![waypoints[0].clone()];
-    for waypoint in &waypoints[1..waypoints.len() - 1] {
+    for waypoint in &waypoints[..waypoints.len() - 1] {
         if apart(waypoint, &merged[merged.len() - 1]) > near {
             merged.push(waypoint.clone());
         }

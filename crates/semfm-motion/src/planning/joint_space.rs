@@ -6,6 +6,9 @@ use rand::{Rng, RngExt};
 
 use crate::{Error, Result};
 
+/// By how much a value may pass a limit and still count as within, radians or metres: files round their numbers.
+pub(crate) const LIMIT_SLACK: f64 = 1e-9;
+
 /// The values that a joint may take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointRange {
@@ -79,7 +82,8 @@ impl JointSpace {
             );
         }
         for (joint, &value) in self.joints.iter().zip(q) {
-            if !value.is_finite() || value < joint.lower || value > joint.upper {
+            let within = value >= joint.lower - LIMIT_SLACK && value <= joint.upper + LIMIT_SLACK;
+            if !value.is_finite() || !within {
                 return invalid(
                     format!("joint `{}` in {what}", joint.name),
                     format!("a value within {} … {}", joint.lower, joint.upper),

@@ -14,6 +14,7 @@ mod tree;
 mod validity;
 
 pub use blend::{BlendSettings, blend};
+pub(crate) use curve::CurvePiece;
 pub use curve::{Curve, CurveCoefficients};
 pub use joint_space::{JointRange, JointSpace};
 pub use rrt_connect::{PlanSettings, Planned, PlannedPath, path_length, plan_path};
