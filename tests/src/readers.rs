@@ -108,6 +108,7 @@ fn json(path: &Path) -> bool {
     read |= files::GraspsFile::read(path, mesh).is_ok();
     read |= files::read_aligned(path, Some(mesh)).is_ok();
     read |= files::read_pose(path).is_ok();
+    read |= files::read_scene(path).is_ok();
     if let Ok(image) = semfm::align::DepthImage::new(4, 3, vec![1.0; 12]) {
         read |= files::read_intrinsics(path, &image).is_ok();
     }

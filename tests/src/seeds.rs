@@ -241,6 +241,10 @@ fn jsons(folder: &Path) -> Vec<Vec<u8>> {
         .into_bytes(),
     );
     for text in [
+        r#"{"format": "semfm.scene/1", "tables": [{"name": "t", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+            "boxes": [{"name": "b", "size": [1, 1, 0.1], "position": [0, 0, 1], "quaternion_xyzw": [0, 0, 0, 1]}],
+            "cylinders": [{"name": "c", "radius": 0.1, "length": 0.2, "position": [0, 0, 1]}],
+            "meshes": [{"name": "m", "file": "none.ply", "scale": 0.001, "position": [0, 0, 0]}]}"#,
         r#"{"fx": 500.0, "fy": 500.0, "cx": 2.0, "cy": 1.5, "width": 4, "height": 3}"#,
         r#"{"K": [500, 0, 2, 0, 500, 1.5, 0, 0, 1], "width": 4, "height": 3, "D": [0, 0, 0, 0, 0]}"#,
         "[[500, 0, 2], [0, 500, 1.5], [0, 0, 1]]",

@@ -30,6 +30,9 @@ pub enum Error {
     /// The pose of a model in what a camera sees.
     #[error(transparent)]
     Align(#[from] semfm_align::Error),
+    /// Motions: collisions, planning, timing.
+    #[error(transparent)]
+    Motion(#[from] semfm_motion::Error),
     /// An argument outside what it may be.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
@@ -64,6 +67,9 @@ impl Error {
             Self::Robot(cause) => cause.code(),
             Self::Grasp(cause) => cause.code(),
             Self::Align(cause) => cause.code(),
+            Self::Motion(semfm_motion::Error::Robot(cause)) => cause.code(),
+            Self::Motion(semfm_motion::Error::Geom(cause)) => cause.code(),
+            Self::Motion(_) => "invalid",
             Self::Fmap(_) | Self::Invalid { .. } => "invalid",
             Self::Format(_) => "format",
         }
@@ -79,6 +85,10 @@ impl Error {
             Self::Robot(cause) => cause.place(),
             Self::Grasp(cause) => cause.place(),
             Self::Align(cause) => cause.place(),
+            Self::Motion(semfm_motion::Error::Robot(cause)) => cause.place(),
+            Self::Motion(semfm_motion::Error::Geom(cause)) => cause.place(),
+            Self::Motion(semfm_motion::Error::Invalid { what, .. }) => Some(what.clone()),
+            Self::Motion(_) => None,
             Self::Fmap(_) => None,
             Self::Invalid { what, .. } => Some(what.clone()),
             Self::Format(error) => Some(error.place.clone()),

@@ -220,15 +220,6 @@ impl Obstacle {
         });
         depths.fold(0.0, f64::max)
     }
-
-    /// Number of triangles, points or pieces.
-    pub(crate) fn n_items(&self) -> usize {
-        match &self.shape {
-            Shape::Primitive(_) | Shape::HalfSpace => 1,
-            Shape::Body(body) => body.n_pieces(),
-            Shape::Surface(surface) => surface.n_items(),
-        }
-    }
 }
 
 fn primitive_gap(

@@ -49,11 +49,6 @@ impl Surface {
         Self { items, places: points.to_vec(), tree, is_closed: false }
     }
 
-    /// Number of triangles or points.
-    pub(crate) fn n_items(&self) -> usize {
-        self.items.len()
-    }
-
     /// A lower bound of the distance between a body and this, exact where it is small; `most` where it is that or
     /// more, 0 where they meet.
     pub(crate) fn gap(&self, body: &CollisionBody, body_at: &Frame, at: &Frame, most: f64) -> f64 {

@@ -8,6 +8,7 @@
 //! | `report.json` of a transfer | `semfm.report/1` | [`TransferReportFile`] |
 //! | `point_map.json` of a transfer | `semfm.point_map/1` | [`PointMapFile`] |
 //! | `aligned.json`, the pose of an object before a camera | `semfm.aligned/1` | [`AlignedFile`] |
+//! | what stands around an arm | `semfm.scene/1` | [`SceneFile`] |
 //! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
 //! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
 //!
@@ -37,6 +38,7 @@ mod rigid_pose;
 mod ros2_grasps;
 #[cfg(feature = "mcap")]
 mod ros2_trajectory;
+mod scene;
 mod stored_transfer;
 mod trajectory;
 mod trajectory_check;
@@ -71,6 +73,10 @@ pub use rigid_pose::read_rigid_pose;
 pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
+pub use scene::{
+    BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord, SceneContents,
+    SceneFile, SphereRecord, TablePlaneRecord, read_scene,
+};
 pub use stored_transfer::StoredTransfer;
 pub use trajectory::{
     FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
