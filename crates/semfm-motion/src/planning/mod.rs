@@ -10,6 +10,8 @@ mod rrt_connect;
 mod shorten;
 #[cfg(test)]
 pub(crate) mod test_worlds;
+#[cfg(test)]
+mod tests;
 mod tree;
 mod validity;
 

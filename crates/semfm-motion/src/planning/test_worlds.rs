@@ -8,8 +8,11 @@ pub struct Boxes {
     pub boxes: Vec<BoxObstacle>,
     /// True of joints whose values that differ by 2π are one.
     pub continuous: Vec<bool>,
+    /// Distance that counts as contact.
+    pub margin: f64,
 }
 
+#[derive(Clone)]
 pub struct BoxObstacle {
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
@@ -17,7 +20,7 @@ pub struct BoxObstacle {
 
 impl Boxes {
     pub fn none(n_joints: usize) -> Self {
-        Self { boxes: Vec::new(), continuous: vec![false; n_joints] }
+        Self { boxes: Vec::new(), continuous: vec![false; n_joints], margin: 0.0 }
     }
 
     pub fn of(boxes: &[(&[f64], &[f64])]) -> Self {
@@ -26,7 +29,12 @@ impl Boxes {
             .iter()
             .map(|(lower, upper)| BoxObstacle { lower: lower.to_vec(), upper: upper.to_vec() })
             .collect();
-        Self { boxes, continuous: vec![false; n_joints] }
+        Self { boxes, continuous: vec![false; n_joints], margin: 0.0 }
+    }
+
+    /// The same with `margin` around each box.
+    pub fn with_margin(&self, margin: f64) -> Self {
+        Self { boxes: self.boxes.clone(), continuous: self.continuous.clone(), margin }
     }
 
     /// Distance of `q` from the nearest box; negative inside, by the way to the nearest side.
@@ -49,7 +57,7 @@ impl Boxes {
                 nearest = (distance, index);
             }
         }
-        nearest
+        (nearest.0 - self.margin, nearest.1)
     }
 }
 
