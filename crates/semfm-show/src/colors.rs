@@ -56,6 +56,20 @@ pub(crate) const APPROACH: [f32; 3] = [0.72, 0.33, 0.58];
 /// The table below an object.
 pub(crate) const TABLE: [f32; 3] = [0.90, 0.87, 0.81];
 
+/// Links of a robot by turns, so that one is told from the next.
+const LINKS: [[f32; 3]; 2] = [[0.87, 0.88, 0.90], [0.62, 0.68, 0.77]];
+/// The object of a motion.
+pub(crate) const OBJECT: [f32; 3] = [0.90, 0.62, 0.10];
+/// What stands around it.
+pub(crate) const OBSTACLE: [f32; 3] = [0.72, 0.69, 0.63];
+/// Two things that touch and must not.
+pub(crate) const COLLIDING: [f32; 3] = [0.84, 0.30, 0.08];
+
+/// The colour of a robot's link by its place in the chain.
+pub(crate) fn link_color(place: usize) -> [f32; 3] {
+    LINKS[place % LINKS.len()]
+}
+
 /// The colours of a hand's parts: the nearer to the object the darker.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HandColors {

@@ -99,7 +99,7 @@ pub(crate) fn affine(rows: &MatrixRows) -> DAffine3 {
 
 /// A convex piece by its corners; nothing where they have no hull (all in one plane). A palm that is wide
 /// along its own y is drawn narrower at the wrist.
-fn drawn_piece(corners: &[[f64; 3]], kind: PartKind) -> Surface {
+pub(crate) fn drawn_piece(corners: &[[f64; 3]], kind: PartKind) -> Surface {
     let corners: Vec<DVec3> = corners.iter().copied().map(DVec3::from_array).collect();
     let Some((low, high)) = box_of(&corners) else { return hull(&corners) };
     let size = high - low;

@@ -3,6 +3,7 @@
 //! - [`write_transfer`] writes everything that a transfer leaves behind: the files for programs (by
 //!   [`semfm::files`]), the pictures and the scene for Foxglove.
 //! - [`TransferFigure`], [`write_grasp_picture`] and [`write_sheet`] draw pictures (PNG).
+//! - [`write_plan_folder`] writes a motion for programs, for ROS 2, for viewers and for people.
 //! - [`groups_of_paths`] and [`write_page`] make one HTML page with an interactive viewer.
 //! - `foxglove` (feature `mcap`) holds scenes for Foxglove.
 //! - [`colors`] is the one table of colours, [`html`] the pieces that every page is made of.
@@ -15,15 +16,20 @@ mod error;
 pub mod foxglove;
 mod hand;
 pub mod html;
+mod motion;
 mod page;
 mod pictures;
 mod surface;
 mod transfer_files;
 
 pub use error::{Error, Result};
+pub use motion::{PLAN_FILES, write_animated_glb, write_plan_folder};
 pub use page::{
     Fact, Group, Hands, Layer, LegendEntry, Panel, Picture, VertexColors, groups_of_paths,
     write_page,
 };
-pub use pictures::{TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_sheet};
+pub use pictures::{
+    NearMiss, TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_miss_picture,
+    write_motion_picture, write_sheet,
+};
 pub use transfer_files::{TRANSFER_FILES, TransferFiles, write_transfer};

@@ -55,6 +55,46 @@ impl Surface {
     }
 }
 
+/// Edges whose triangles differ by more than this stay sharp: a cylinder of 32 sides turns by 11°, a chamfer by 45°.
+const CREASE_COSINE: f64 = 0.82; // 35°
+
+impl Surface {
+    /// The same triangles with a vertex of its own on each side of a sharp edge, so that normals summed at a vertex shade
+    /// flat sides flat and round ones round. Triangles around a vertex go with the first whose normal is near theirs.
+    pub(crate) fn with_creases(&self) -> Self {
+        // Vertex of this surface, then its sides: the normal of the first triangle of each, and its new number.
+        let mut sides: Vec<Vec<(DVec3, u32)>> = vec![Vec::new(); self.vertices.len()];
+        let mut creased = Self::default();
+        for face in &self.faces {
+            let [a, b, c] = face.map(|v| self.vertices[v as usize]);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let corners = face.map(|v| {
+                let of_vertex = &mut sides[v as usize];
+                let near = of_vertex.iter().find(|side| side.0.dot(normal) >= CREASE_COSINE);
+                if let Some(side) = near {
+                    return side.1;
+                }
+                let new = creased.vertices.len() as u32;
+                creased.vertices.push(self.vertices[v as usize]);
+                of_vertex.push((normal, new));
+                new
+            });
+            creased.faces.push(corners);
+        }
+        creased
+    }
+
+    /// Unit normals of the vertices: those of the triangles around each, weighted by area.
+    pub(crate) fn normals(&self) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.vertices.len()];
+        for face in &self.faces {
+            let [a, b, c] = face.map(|v| self.vertices[v as usize]);
+            face.iter().for_each(|&v| normals[v as usize] += (b - a).cross(c - a));
+        }
+        normals.into_iter().map(|n| n.try_normalize().unwrap_or(DVec3::Z)).collect()
+    }
+}
+
 /// The surface that a piece of a profile (distance from the z axis, height) sweeps around the axis.
 fn turned(from: (f64, f64), to: (f64, f64)) -> Surface {
     let mut surface = Surface::default();
@@ -80,6 +120,19 @@ mod tests {
         let (low, high) = bounds(&arrow.vertices).unwrap();
         assert!((low.z + 2.0).abs() < 1e-12 && (high.z - 1.0).abs() < 1e-12);
         assert!((high.x - 0.26).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_box_has_three_vertices_at_each_corner_and_a_ball_keeps_its_own() {
+        let (vertices, faces) = parry3d_f64::shape::Cuboid::new(DVec3::ONE).to_trimesh();
+        let block = Surface { vertices, faces }.with_creases();
+        assert_eq!((block.vertices.len(), block.faces.len()), (24, 12));
+        for (p, n) in block.vertices.iter().zip(block.normals()) {
+            assert!((n.abs().max_element() - 1.0).abs() < 1e-12 && (p.dot(n) - 1.0).abs() < 1e-12);
+        }
+        let ball = Surface::ball(DVec3::ZERO, 1.0);
+        let creased = ball.with_creases();
+        assert!(creased.vertices.len() < ball.vertices.len() + 4 * N_AROUND as usize);
     }
 
     #[test]

@@ -42,6 +42,7 @@ pub use self::appearance::{Appearance, Material};
 pub use self::atomic::{replace_atomically, write_atomically};
 pub use self::contents::foreign_kind;
 pub use self::format_error::FormatError;
+pub use self::gltf::write_glb;
 pub use self::image::{Texture, Wrap};
 use self::input::Input;
 pub use self::input::{read_at_most, read_file};

@@ -9,15 +9,16 @@ use std::path::Path;
 use semfm::files::{GraspRecord, GraspsFile};
 use semfm::geom::math::{DVec3, bounds};
 use semfm::geom::{Mesh, Pinhole, Task};
-use semfm::views::{RenderSettings, SurfaceColor, View, render};
+use semfm::views::View;
 
+use super::painted::Painted;
 use super::scale_bar::draw_scale_bar;
 use super::sheet::{Entry, PICTURE_SIDE, Row, Sheet};
 use super::upright::upright;
 use super::viewpoints::viewpoints_around;
 use super::{Viewpoints, WeightedMesh};
 use crate::Result;
-use crate::colors::{APPROACH, CONTACT, HandColors, TABLE, grasp_color, weight_colors};
+use crate::colors::{APPROACH, CONTACT, HandColors, TABLE, grasp_color};
 use crate::hand::{DrawnHand, affine};
 use crate::surface::Surface;
 
@@ -210,37 +211,6 @@ fn tinted(under: [u8; 3], over: [u8; 3]) -> [u8; 3] {
         let (under, over) = (f32::from(under[c]), f32::from(over[c]));
         (under + OPACITY * (over - under)).round() as u8
     })
-}
-
-/// A surface with a colour per vertex.
-#[derive(Clone)]
-struct Painted {
-    surface: Surface,
-    colors: Vec<[f32; 3]>,
-}
-
-impl Painted {
-    fn object(object: WeightedMesh<'_>) -> Self {
-        let vertices = object.mesh.vertices().to_vec();
-        let surface = Surface { vertices, faces: object.mesh.faces().to_vec() };
-        Self { surface, colors: weight_colors(object.weights) }
-    }
-
-    fn add(&mut self, surface: &Surface, color: [f32; 3]) {
-        self.surface.add(surface);
-        self.colors.resize(self.surface.vertices.len(), color);
-    }
-
-    fn mesh(&self) -> Result<Mesh> {
-        Ok(Mesh::new(self.surface.vertices.clone(), self.surface.faces.clone())?)
-    }
-
-    fn rendered(&self, camera: Pinhole, edges: f64, task: &Task) -> Result<View> {
-        let settings = RenderSettings { supersampling: 3, edges, ..Default::default() };
-        let colors = SurfaceColor::Vertices(&self.colors);
-        let mut views = render(&self.mesh()?, &colors, &[camera], &settings, task)?;
-        Ok(views.remove(0))
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@ mod canvas;
 mod feature_colors;
 mod features_picture;
 mod grasp_picture;
+mod motion_picture;
+mod painted;
 mod pair_rotation;
 mod scale_bar;
 mod sheet;
@@ -14,6 +16,7 @@ mod upright;
 mod viewpoints;
 
 pub use grasp_picture::write_grasp_picture;
+pub use motion_picture::{NearMiss, write_miss_picture, write_motion_picture};
 pub use sheet::write_sheet;
 pub use transfer_figure::TransferFigure;
 pub use viewpoints::{Viewpoints, viewpoints};
@@ -21,6 +24,7 @@ pub use viewpoints::{Viewpoints, viewpoints};
 pub(crate) use grasp_picture::{
     ARROW, ARROW_GAP, ARROW_RADIUS, N_SHOWN, OPACITY, TABLE_REACH, ball_radius,
 };
+pub(crate) use motion_picture::write_motion_picture_of;
 pub(crate) use pair_rotation::WeightedMesh;
 pub(crate) use transfer_figure::ObjectFigure;
 pub(crate) use upright::upright;

@@ -15,6 +15,8 @@ mod scene;
 mod skin;
 mod write;
 
+pub use self::write::write_glb;
+
 use self::accessor::Accessors;
 use self::buffers::Buffers;
 use self::json::{Asset, Root, Versioned};

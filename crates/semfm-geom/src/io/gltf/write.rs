@@ -52,27 +52,42 @@ pub(super) fn write(
         "accessors": arrays.accessors, "bufferViews": arrays.views,
         "buffers": [{"byteLength": arrays.n_bytes}],
     });
+    write_glb(out, &json, arrays.n_bytes, |out| {
+        write_blocks(out, mesh.vertices(), |block, p| {
+            block.extend(p.as_vec3().to_array().iter().flat_map(|x| x.to_le_bytes()));
+        })?;
+        write_blocks(out, attributes.colors.unwrap_or_default(), |block, color| {
+            block.extend(color);
+        })?;
+        for (_, values) in attributes.scalars {
+            write_blocks(out, *values, |block, &x| block.extend((x as f32).to_le_bytes()))?;
+        }
+        write_blocks(out, mesh.faces().as_flattened(), |block, id| block.extend(id.to_le_bytes()))
+    })
+}
+
+/// Writes a GLB: the JSON of a glTF whose one buffer is the `n_bytes` (a multiple of 4) that `fill` writes.
+///
+/// # Errors
+/// Those of `out`; also where the whole would be larger than the 4 GiB that a GLB holds.
+pub fn write_glb(
+    out: &mut dyn Write,
+    json: &Value,
+    n_bytes: usize,
+    fill: impl FnOnce(&mut dyn Write) -> Result<()>,
+) -> Result<()> {
     let mut json = json.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
-
-    let total = word(12 + 8 + json.len() + 8 + arrays.n_bytes)?;
+    let total = word(12 + 8 + json.len() + 8 + n_bytes)?;
     for part in [&b"glTF"[..], &2u32.to_le_bytes(), &total.to_le_bytes()] {
         out.write_all(part)?;
     }
     out.write_all(&word(json.len())?.to_le_bytes())?;
     out.write_all(b"JSON")?;
     out.write_all(&json)?;
-    out.write_all(&word(arrays.n_bytes)?.to_le_bytes())?;
+    out.write_all(&word(n_bytes)?.to_le_bytes())?;
     out.write_all(b"BIN\0")?;
-
-    write_blocks(out, mesh.vertices(), |block, p| {
-        block.extend(p.as_vec3().to_array().iter().flat_map(|x| x.to_le_bytes()));
-    })?;
-    write_blocks(out, attributes.colors.unwrap_or_default(), |block, color| block.extend(color))?;
-    for (_, values) in attributes.scalars {
-        write_blocks(out, *values, |block, &x| block.extend((x as f32).to_le_bytes()))?;
-    }
-    write_blocks(out, mesh.faces().as_flattened(), |block, id| block.extend(id.to_le_bytes()))
+    fill(out)
 }
 
 /// A length in a GLB.

@@ -1,0 +1,12 @@
+//! Motions to be looked at: bodies at their frames, an animated model, and the folder of a plan.
+
+mod animated_glb;
+mod bodies;
+mod frame_tracks;
+mod plan_folder;
+
+pub use animated_glb::write_animated_glb;
+pub use plan_folder::{PLAN_FILES, write_plan_folder};
+
+pub(crate) use bodies::{BodyKind, MotionBodies, affine_of};
+pub(crate) use frame_tracks::FrameTracks;
