@@ -306,7 +306,7 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_no_worker(small):
     ("name", "text", "message"),
     [
         ("m.csv", "mesh,features\na.ply,a.npy\na.ply,b.npy\n", "line 3: .* 'a.ply' at line 2"),
-        ("m.csv", "mesh,embedding\na.ply,a.mcap\n", "line 2: .*one of embeddings.* found none"),
+        ("m.csv", "mesh,embedding\na.ply,a.mcap\n", "line 2: .*embeddings.* column 'embedding'"),
         ("m.csv", "file\na.ply\n", r"line 2: expected a mesh, found the columns \['file'\]"),
         ("m.csv", "mesh,features\n", "at least one row"),
         ("m.jsonl", '{"mesh": "a.ply", "features": "f"}\n{', "line 2: expected JSON"),

@@ -5,8 +5,7 @@ A manifest names the targets, a folder takes the answers::
     import semfm.batch
 
     summary = semfm.batch.transfer(
-        "mug.obj", "grip.json", "library.csv", "answers",
-        source_embeddings="mug.emb.mcap", workers=8, progress=True)
+        "mug.obj", "grip.json", "library.csv", "answers", workers=8, progress=True)
     print(summary.n_done, "of", summary.n_rows, summary.verdicts)
     for record in semfm.batch.records("answers"):
         if record["verdict"] == "accept":

@@ -76,9 +76,17 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("source", help="mesh of the demonstrated object")
     add("region", help="its region file")
-    add("manifest", help=".csv, .jsonl or .parquet: mesh, name, embeddings | features | cloud")
+    add(
+        "manifest",
+        help=".csv, .jsonl or .parquet: mesh, name, and embeddings, features, cloud or none of them",
+    )
     add("-o", "--out", required=True, help="folder of answers")
-    add("--source-embeddings", required=True, metavar="FILE", help=".emb.mcap of the source")
+    add("--source-embeddings", metavar="FILE", help=".emb.mcap of the source")
+    add(
+        "--encoder",
+        metavar="NAME",
+        help="makes the features of objects without any, the source among them (builtin)",
+    )
     how = parser.add_argument_group("what is computed")
     add = how.add_argument
     add("--method", help="fused (default), semfm, anchored, sinkhorn, nearest or wks")

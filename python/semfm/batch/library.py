@@ -17,9 +17,13 @@ from . import pool, ray_runner, shards
 from .journal import Journal
 from .manifest import Row, read_manifest, rows_of
 from .record import Record
-from .task import Demonstration
+from .task import WITHOUT_FEATURES, Demonstration
 
 _Path = Union[str, "os.PathLike[str]"]
+
+
+#: The encoder where none is named.
+_DEFAULT = "builtin"
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,7 @@ def transfer(
     source_features: Any = None,
     source_embeddings: Any = None,
     source_cloud: Any = None,
+    encoder: Optional[str] = None,
     method: Optional[str] = None,
     rule: Optional[str] = None,
     settings: Optional[TransferSettings] = None,
@@ -106,6 +111,11 @@ def transfer(
         settings, but manifests may follow one another.
     source_features, source_embeddings, source_cloud : optional
         As in `semfm.prepare`, for a source that is not prepared.
+    encoder : str, optional
+        Makes the features of the source, where it brings none, and of every object of the manifest
+        that brings none: a name as in `semfm.prepare`. ``"builtin"`` where none is named and the
+        features of the source are its own; where the source brings others, the encoder that made them
+        must be named.
     method, rule, settings : optional
         As in `semfm.transfer`.
     seed : int, default 0
@@ -163,6 +173,7 @@ def transfer(
             "cloud": source_cloud,
         },
         settings=_settings(method, rule, settings),
+        encoder=_absolute(encoder),
         seed=seed,
         k=k,
         working_vertices=working_vertices,
@@ -171,6 +182,7 @@ def transfer(
         point_maps=point_maps,
         timeout_s=timeout_s,
     )
+    _check_features(rows, demonstration)
     with Journal(out, demonstration.identity(), format=format, shard_size=shard_size) as journal:
         todo = [row for row in rows if not _is_done(journal, row, retry_failed)]
         journal.forget(row.name for row in todo)
@@ -228,7 +240,12 @@ def _is_done(journal: Journal, row: Row, retry_failed: bool) -> bool:
 
 
 def _demonstration(
-    source: Any, region: Any, *, semantics: dict[str, Any], **options: Any
+    source: Any,
+    region: Any,
+    *,
+    semantics: dict[str, Any],
+    encoder: Optional[str],
+    **options: Any,
 ) -> Demonstration:
     if isinstance(source, PreparedObject):
         given = [name for name, value in semantics.items() if value is not None]
@@ -239,7 +256,15 @@ def _demonstration(
             )
     else:
         same = ("settings", "seed", "k", "working_vertices", "n_samples", "cache")
-        source = prepare(source, **semantics, **{name: options[name] for name in same})
+        given_features = any(value is not None for value in semantics.values())
+        source = prepare(
+            source,
+            **semantics,
+            encoder=None if given_features else encoder,
+            **{name: options[name] for name in same},
+        )
+    if encoder is None and source.encoder is not None and source.encoder["name"] == _DEFAULT:
+        encoder = _DEFAULT
     if not isinstance(region, Region):
         region = Region.read(region, source.mesh)
     if region.n_vertices != source.mesh.n_vertices:
@@ -250,7 +275,27 @@ def _demonstration(
         )
     if region.is_empty:
         raise InvalidInput("region: expected a vertex inside, found none", place="region")
-    return Demonstration(source, region, **options)
+    return Demonstration(source, region, encoder=encoder, **options)
+
+
+def _check_features(rows: Iterable[Row], demonstration: Demonstration) -> None:
+    """Refuses objects without features before any work, where no encoder may make them."""
+    if demonstration.encoder is not None or demonstration.settings.method in WITHOUT_FEATURES:
+        return
+    for row in rows:
+        if row.embeddings is None and row.features is None and row.cloud is None:
+            raise InvalidInput(
+                f"{row.name}: expected one of embeddings, features, cloud, or `encoder` to be the one "
+                "that made the source's features, found none",
+                place=row.name,
+            )
+
+
+def _absolute(encoder: Optional[str]) -> Optional[str]:
+    """An encoder's files by their whole path, since workers may stand elsewhere."""
+    if encoder is not None and os.path.exists(encoder):
+        return os.path.abspath(encoder)
+    return encoder
 
 
 def _settings(

@@ -4,9 +4,10 @@ A CSV, JSONL or Parquet file with one row per object and these columns; others a
 
 ========== ===================================================================================
 mesh       the mesh file
-embeddings its ``NAME.emb.mcap``
-features   or a ``.npy`` file, (n, d): a feature vector per vertex
-cloud      or an ``.npz`` file with `points` (m, 3), `features` (m, d) and perhaps `n_views` (m,)
+embeddings its ``NAME.emb.mcap``,
+features   or a ``.npy`` file, (n, d): a feature vector per vertex,
+cloud      or an ``.npz`` file with `points` (m, 3), `features` (m, d) and perhaps `n_views` (m,),
+           or none of the three: an encoder makes the features
 name       unique; the text of `mesh` where there is no such column
 ========== ===================================================================================
 
@@ -21,6 +22,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from io import BytesIO, StringIO
 from typing import Any, Optional, Union
 
@@ -45,7 +47,7 @@ class Row:
     mesh : str
         Path of the mesh.
     embeddings, features, cloud : str or None
-        Paths; one of them is given.
+        Paths; one of them at most is given. An object without any is encoded.
     key : str
         A digest of the row as written and of the sizes and dates of its files: an answer is good
         for as long as its key is.
@@ -77,7 +79,8 @@ def read_manifest(path: _Path) -> list[Row]:
     FileError
         It cannot be read.
     FormatError
-        A row without a mesh or without features, a name that comes twice, a broken line.
+        A row without a mesh or with more than one kind of features, a name that comes twice, a
+        broken line.
     """
     path = os.fspath(path)
     kind = os.path.splitext(path)[1].lower()
@@ -134,10 +137,12 @@ def checked(
         if mesh is None:
             raise _wrong(manifest, place, "a mesh", f"the columns {sorted(map(str, entry))}")
         given = [column for column in FILES[1:] if texts[column] is not None]
-        if len(given) != 1:
-            raise _wrong(
-                manifest, place, "one of embeddings, features, cloud", " and ".join(given) or "none"
-            )
+        if len(given) > 1:
+            wanted = "at most one of embeddings, features, cloud"
+            raise _wrong(manifest, place, wanted, " and ".join(given))
+        if not given and (column := _misspelt(entry)) is not None:
+            wanted = "one of embeddings, features, cloud, or none of them"
+            raise _wrong(manifest, place, wanted, f"the column {column!r}")
         name = texts["name"] or mesh
         if name in places:
             raise _wrong(manifest, place, "names that differ", f"{name!r} at {places[name]} too")
@@ -146,6 +151,12 @@ def checked(
     if not rows:
         raise FormatError(f"{manifest}: expected at least one row, found none", place=manifest)
     return rows
+
+
+def _misspelt(entry: Mapping[str, Any]) -> Optional[str]:
+    """A column that looks like one of ours: its object would be encoded in silence."""
+    others = (str(column) for column in entry if column not in ("name", *FILES))
+    return next((c for c in others if get_close_matches(c.lower(), FILES[1:], 1, 0.8)), None)
 
 
 def _row(name: str, texts: Mapping[str, Optional[str]], folder: str) -> Row:

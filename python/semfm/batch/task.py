@@ -21,9 +21,13 @@ from .._semfm import (
     __version__,
     prepare,
 )
-from ..errors import Cancelled, FormatError
+from ..errors import Cancelled, FormatError, InvalidInput
 from .manifest import Row
 from .record import Record, answer, failure
+
+
+#: Methods that read no features, so that no object needs any.
+WITHOUT_FEATURES = frozenset({"wks"})
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Demonstration:
         On the source's mesh as given.
     settings : TransferSettings
     seed : int
+    encoder : str or None
+        Makes the features of targets that bring none; ``None`` where nobody may.
     k, working_vertices, n_samples : int or None
         How targets are prepared; see `semfm.prepare`.
     cache : str, bool or None
@@ -52,6 +58,7 @@ class Demonstration:
     region: Region
     settings: TransferSettings
     seed: int = 0
+    encoder: Optional[str] = None
     k: Optional[int] = None
     working_vertices: Optional[int] = None
     n_samples: Optional[int] = None
@@ -69,6 +76,7 @@ class Demonstration:
             "region": _digest(self.region.weights),
             "settings": json.loads(json.dumps(self.settings.to_dict(), sort_keys=True)),
             "seed": self.seed,
+            "encoder": self.source.encoder,
             "k": self.k,
             "working_vertices": self.working_vertices,
             "n_samples": self.n_samples,
@@ -103,7 +111,9 @@ class Demonstration:
         except Exception as error:
             return failure(row, error, seconds=time.monotonic() - start)
 
-    def _prepare(self, row: Row, tick: Optional[Callable[[str, int, int], object]]) -> Any:
+    def _prepare(
+        self, row: Row, tick: Optional[Callable[[str, int, int], object]]
+    ) -> PreparedObject:
         mesh = Mesh.read(row.mesh)
         semantics: dict[str, Any] = {}
         if row.embeddings is not None:
@@ -112,7 +122,9 @@ class Demonstration:
             semantics["features"] = _array(row.features)
         elif row.cloud is not None:
             semantics["cloud"] = _cloud(row.cloud)
-        return prepare(
+        elif self.encoder is not None:
+            semantics["encoder"] = self.encoder
+        target = prepare(
             mesh,
             settings=self.settings,
             k=self.k,
@@ -123,6 +135,8 @@ class Demonstration:
             progress=tick,
             **semantics,
         )
+        _check_encoders(self.source, target)
+        return target
 
     def _deadline(self, start: float) -> Optional[Callable[[str, int, int], object]]:
         """Stops the work from inside, at the next step it tells; the pool has a harder way too."""
@@ -135,6 +149,20 @@ class Demonstration:
                 raise TimeoutError(f"not done after {limit:g} s, in {stage}")
 
         return tick
+
+
+def _check_encoders(source: PreparedObject, target: PreparedObject) -> None:
+    """Features of two encoders, or of two versions of one, have nothing to do with each other."""
+    if source.encoder is None or target.encoder is None:
+        return
+    ours, theirs = (
+        " ".join(str(side.encoder[key]) for key in ("name", "version")) for side in (target, source)
+    )
+    if ours != theirs:
+        raise InvalidInput(
+            f"encoder: expected {theirs}, which made the features of the source, found {ours}",
+            place="encoder",
+        )
 
 
 def _digest(*arrays: Any) -> str:
