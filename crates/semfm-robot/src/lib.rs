@@ -22,9 +22,11 @@ mod joint_limits_file;
 mod kinematics;
 mod link;
 mod link_shape;
+mod link_surface;
 mod robot;
 mod srdf;
 mod urdf;
+mod yaml;
 
 pub use error::{Error, Result};
 pub use gripper::{
@@ -33,9 +35,13 @@ pub use gripper::{
 };
 pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
 pub use joint_limits_file::{JointLimitsFile, ToldLimits};
-pub use kinematics::{Arm, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
+pub use kinematics::{
+    Arm, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY, IkAnswer, IkSettings,
+    IkSolution, InverseKinematics, Preference,
+};
 pub use link::{Geometry, Inertial, Link, LinkGeometry};
 pub use link_shape::{ConvexPiece, ConvexPieces, LinkShape};
+pub use link_surface::LinkSurface;
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use parry3d_f64::math::Pose;
 pub use robot::Robot;

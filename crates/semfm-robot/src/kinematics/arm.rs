@@ -7,6 +7,7 @@ use semfm_geom::suggestion::unknown_name;
 
 use super::arm_joint::{ArmJoint, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
 use super::chain::{Chain, Follows};
+use super::cholesky;
 use super::ends;
 use crate::joint_limits_file::JointLimitsFile;
 use crate::robot::Robot;
@@ -142,6 +143,51 @@ impl Arm {
         self.chain.tip_with_jacobian(&q[..self.n_joints()], jacobian);
     }
 
+    /// How easily the tip moves in every direction: the product of the Jacobian's singular values, m³ for six joints
+    /// and more; zero at a singular position.
+    ///
+    /// > √det(J Jᵀ), or √det(Jᵀ J) for fewer than six joints
+    ///
+    /// Yoshikawa 1985, "Manipulability of robotic mechanisms", eq. 6.
+    ///
+    /// # Panics
+    /// Where `q` is shorter than the list of joints.
+    pub fn manipulability(&self, q: &[f64]) -> f64 {
+        let n = self.n_joints();
+        let mut jacobian = vec![0.0; 6 * n];
+        self.jacobian(q, &mut jacobian);
+        let size = n.min(6);
+        let mut gram = vec![0.0; size * size];
+        for i in 0..size {
+            for j in 0..=i {
+                gram[i * size + j] = if n >= 6 {
+                    (0..n).map(|k| jacobian[i * n + k] * jacobian[j * n + k]).sum()
+                } else {
+                    (0..6).map(|k| jacobian[k * n + i] * jacobian[k * n + j]).sum()
+                };
+            }
+        }
+        if !cholesky::factor(&mut gram, size) {
+            return 0.0;
+        }
+        (0..size).map(|i| gram[i * (size + 1)]).product()
+    }
+
+    /// How far the joint that is closest to a limit stands from it, as a share of half its range: 1 in the middle and
+    /// for joints without limits, 0 at a limit, below 0 beyond.
+    pub fn limit_margin(&self, q: &[f64]) -> f64 {
+        let margin = |(joint, q): (&ArmJoint, &f64)| {
+            let half = 0.5 * (joint.upper - joint.lower);
+            let least = (q - joint.lower).min(joint.upper - q);
+            match half {
+                _ if half.is_infinite() => 1.0,
+                _ if half > 0.0 => least / half,
+                _ => 0.0,
+            }
+        };
+        self.joints.iter().zip(q).map(margin).fold(1.0, f64::min)
+    }
+
     /// Checks joint values that come from outside; `what` names them in the message.
     ///
     /// # Errors
@@ -256,6 +302,16 @@ fn joints(
     file: Option<&JointLimitsFile>,
     notes: &mut Vec<String>,
 ) -> Result<Vec<ArmJoint>> {
+    let unknown: Vec<&str> = file
+        .into_iter()
+        .flat_map(|file| file.joints.keys())
+        .filter(|name| robot.joint(name).is_none())
+        .map(String::as_str)
+        .collect();
+    if !unknown.is_empty() {
+        let names = unknown.join(", ");
+        notes.push(format!("joints of the limits file that the robot does not have: {names}"));
+    }
     let (mut joints, mut no_velocity, mut no_acceleration) = (Vec::new(), Vec::new(), Vec::new());
     for &index in variables {
         let joint = &robot.joints[index];

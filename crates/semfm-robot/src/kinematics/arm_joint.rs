@@ -1,5 +1,7 @@
 //! A joint of an arm with the limits that it keeps.
 
+use std::f64::consts::TAU;
+
 use crate::joint::{Joint, JointKind};
 use crate::joint_limits_file::ToldLimits;
 use crate::{Error, Result};
@@ -72,6 +74,26 @@ impl ArmJoint {
     /// Whether it turns without limits: positions that differ by 2π are the same place.
     pub fn is_continuous(&self) -> bool {
         self.kind != JointKind::Prismatic && self.lower.is_infinite() && self.upper.is_infinite()
+    }
+
+    /// Where positions are sampled: the range, or the one turn in its middle where it is wider. A side without a limit
+    /// lies one turn, or a metre, from the other.
+    pub fn sampling_range(&self) -> [f64; 2] {
+        let widest = if self.kind == JointKind::Prismatic { 1.0 } else { TAU };
+        match (self.lower.is_finite(), self.upper.is_finite()) {
+            (true, true)
+                if self.upper - self.lower <= widest || self.kind == JointKind::Prismatic =>
+            {
+                [self.lower, self.upper]
+            }
+            (true, true) => {
+                let middle = 0.5 * (self.lower + self.upper);
+                [middle - 0.5 * widest, middle + 0.5 * widest]
+            }
+            (true, false) => [self.lower, self.lower + widest],
+            (false, true) => [self.upper - widest, self.upper],
+            (false, false) => [-0.5 * widest, 0.5 * widest],
+        }
     }
 }
 

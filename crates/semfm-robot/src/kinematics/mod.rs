@@ -3,7 +3,10 @@
 mod arm;
 mod arm_joint;
 mod chain;
+mod cholesky;
 mod ends;
+mod inverse;
 
 pub use arm::{Arm, ArmSettings};
 pub use arm_joint::{ArmJoint, DEFAULT_ACCELERATION, DEFAULT_VELOCITY};
+pub use inverse::{IkAnswer, IkSettings, IkSolution, InverseKinematics, Preference};

@@ -20,6 +20,6 @@ mod tree;
 mod xml;
 
 pub use description::{MeshUse, RobotDescription};
-pub(crate) use fault::{Fault, quoted};
+pub(crate) use fault::{Fault, quoted, short};
 pub use mesh_paths::{MeshPaths, MeshPlace};
 pub(crate) use xml::{Element, MAX_BYTES, XmlElements};
