@@ -80,6 +80,19 @@ pub struct SafetyController {
 }
 
 impl JointKind {
+    /// URDF's name for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Revolute => "revolute",
+            Self::Continuous => "continuous",
+            Self::Prismatic => "prismatic",
+            Self::Fixed => "fixed",
+            Self::Floating => "floating",
+            Self::Planar => "planar",
+            Self::Spherical => "spherical",
+        }
+    }
+
     /// Whether one number, an angle or a length, tells where the joint stands.
     pub fn has_position(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)

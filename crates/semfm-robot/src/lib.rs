@@ -36,8 +36,8 @@ pub use gripper::{
 pub use joint::{Joint, JointKind, JointLimits, Mimic, SafetyController};
 pub use joint_limits_file::{JointLimitsFile, ToldLimits};
 pub use kinematics::{
-    Arm, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY, IkAnswer, IkSettings,
-    IkSolution, InverseKinematics, Preference,
+    Arm, ArmFiles, ArmJoint, ArmSettings, DEFAULT_ACCELERATION, DEFAULT_VELOCITY, IkAnswer,
+    IkSettings, IkSolution, InverseKinematics, OpenedArm, Preference,
 };
 pub use link::{Geometry, Inertial, Link, LinkGeometry};
 pub use link_shape::{ConvexPiece, ConvexPieces, LinkShape};
@@ -61,8 +61,10 @@ mod tests {
         assert_send_sync::<Error>();
         assert_send_sync::<Gripper>();
         assert_send_sync::<GripperSettings>();
+        assert_send_sync::<InverseKinematics>();
         assert_send_sync::<MeshPaths>();
         assert_send_sync::<Robot>();
         assert_send_sync::<RobotDescription>();
+        assert_send_sync::<Srdf>();
     }
 }

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use parry3d_f64::math::Pose;
 use semfm_geom::math::{DVec3, bounds};
 
-use crate::link_shape::LinkShape;
 use super::pads;
+use crate::link_shape::LinkShape;
 use crate::robot::Robot;
 
 /// Samples of a drive in which fingers are compared.

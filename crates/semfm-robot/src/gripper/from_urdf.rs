@@ -8,8 +8,8 @@ use semfm_geom::math::{DMat3, DQuat, DVec3};
 
 use super::builtin::BuiltinGripper;
 use super::finger_pair::{FingerPair, PadGap};
-use crate::link_shape::{ConvexPiece, LinkShape, inertia_box};
 use super::{DriveJoint, Gripper, GripperPart, MAX_SPAN, Motion, Role};
+use crate::link_shape::{ConvexPiece, LinkShape, inertia_box};
 use crate::robot::Robot;
 use crate::urdf::{MeshPaths, RobotDescription};
 use crate::{Error, JointKind, Result};

@@ -24,6 +24,13 @@ use super::arm_joint::ArmJoint;
 use super::chain::Frame;
 use crate::{Error, Result};
 
+/// Most solutions and restarts that may be asked for: some seconds.
+const MAX_SOLUTIONS: usize = 1_000;
+const MAX_RESTARTS: usize = 100_000;
+
+/// Largest joint value and coordinate, radians or metres: beyond, rounding exceeds the tolerances.
+const MAX_NUMBER: f64 = 1e6;
+
 /// How inverse kinematics searches and what counts as a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IkSettings {
@@ -89,13 +96,17 @@ impl InverseKinematics {
     /// Inverse kinematics of an arm with settings.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a number of solutions of zero and for tolerances that are not above zero.
+    /// [`Error::OutOfRange`] for more than 1,000 solutions or none, more than 100,000 restarts, and tolerances below
+    /// 1e-12.
     pub fn new(arm: Arc<Arm>, settings: IkSettings) -> Result<Self> {
         let out_of_range = |what, expected: &str, found: String| {
             Err(Error::OutOfRange { what, expected: expected.into(), found })
         };
-        if settings.solutions == 0 {
-            return out_of_range("solutions", "at least 1", "0".into());
+        if !(1..=MAX_SOLUTIONS).contains(&settings.solutions) {
+            return out_of_range("solutions", "1 to 1000", settings.solutions.to_string());
+        }
+        if settings.restarts > MAX_RESTARTS {
+            return out_of_range("restarts", "at most 100000", settings.restarts.to_string());
         }
         for (what, tolerance) in [
             ("position_tolerance", settings.position_tolerance),
@@ -123,8 +134,8 @@ impl InverseKinematics {
     /// solutions are preferred, one value a joint; values outside of the limits are moved to them.
     ///
     /// # Errors
-    /// [`Error::Arm`] for a pose or a `near` that is not finite, or with the wrong number of values. That no solution
-    /// was found is no error: [`IkAnswer::solutions`] is empty.
+    /// [`Error::Arm`] for a pose or a `near` that is not finite or beyond a million, and for a wrong number of values.
+    /// That no solution was found is no error: [`IkAnswer::solutions`] is empty.
     pub fn solve(&self, base_from_tip: &Pose, near: &[f64]) -> Result<IkAnswer> {
         let target = target(base_from_tip)?;
         let near = self.start(near)?;
@@ -157,11 +168,14 @@ impl InverseKinematics {
     /// Where the search begins.
     fn start(&self, near: &[f64]) -> Result<Vec<f64>> {
         let joints = self.arm.joints();
-        if near.len() != joints.len() || near.iter().any(|position| !position.is_finite()) {
+        let odd = near.iter().find(|position| !(position.abs() <= MAX_NUMBER));
+        if near.len() != joints.len() || odd.is_some() {
+            let found =
+                odd.map_or_else(|| near.len().to_string(), |odd| format!("{odd} among them"));
             return Err(Error::Arm {
                 what: "near".into(),
-                expected: format!("{} finite joint values", joints.len()),
-                found: format!("{near:?}"),
+                expected: format!("{} joint values of at most {MAX_NUMBER:e}", joints.len()),
+                found,
             });
         }
         Ok(joints.iter().zip(near).map(|(joint, q)| q.clamp(joint.lower, joint.upper)).collect())
@@ -212,13 +226,14 @@ impl InverseKinematics {
 /// The target as a rotation matrix and a point, if it is one.
 fn target(pose: &Pose) -> Result<Frame> {
     let length = pose.rotation.length();
-    if pose.is_finite() && (length - 1.0).abs() < 1e-6 {
+    let is_near = pose.translation.abs().max_element() <= MAX_NUMBER;
+    if pose.is_finite() && is_near && (length - 1.0).abs() < 1e-6 {
         let unit = Pose::from_parts(pose.translation, pose.rotation.normalize());
         return Ok(Frame::from(&unit));
     }
     Err(Error::Arm {
         what: "pose".into(),
-        expected: "finite numbers and a unit quaternion".into(),
+        expected: format!("coordinates of at most {MAX_NUMBER:e} and a unit quaternion"),
         found: format!("position {}, quaternion {}", pose.translation, pose.rotation),
     })
 }
