@@ -1,7 +1,8 @@
-//! Robot descriptions and parallel-jaw grippers.
+//! Robot descriptions, arms and parallel-jaw grippers.
 //!
 //! [`RobotDescription`] reads URDF files under limits and gives a [`Robot`]: links and joints as
-//! plain data, with forward kinematics. A [`Gripper`] comes from such a description or from the
+//! plain data, with forward kinematics. An [`Arm`] is a chain of its joints with limits ([`JointLimitsFile`], [`Srdf`])
+//! and kinematics on flat arrays; [`InverseKinematics`] finds joint values for a pose. A [`Gripper`] comes from such a description or from the
 //! table of built-in ones. Its frame (TCP) has its origin between the finger pads, +z along the
 //! approach and y along the closing direction. Lengths are metres, angles radians.
 //!
