@@ -2,13 +2,18 @@
 
 use super::joint_space::{JointSpace, short_way};
 
+/// Nodes whose distances are summed together, joint by joint, so that the compiler uses vector instructions.
+const LANES: usize = 8;
+
 /// Joint values with a parent each. Roots come first and have themselves as parent.
 ///
-/// The nearest node is found by a scan that leaves a node as soon as its partial distance is too long. On the
-/// 1 400 problems of MotionBenchMaker nine trees in ten stay below 300 nodes, where a scan takes under 2 µs; a
-/// k-d tree (kiddo) would need the number of joints at compile time and copies for the turns of continuous joints.
+/// The nearest node is found by a scan over all. With seven joints it takes .06 µs for 30 nodes, .6 µs for 300 and 9 µs for
+/// 1 000; a k-d tree (kiddo 6.3) takes .15, 3 and 4 µs, and would need the number of joints at compile time. A motion
+/// check takes longer, and trees of more than a thousand nodes are rare.
 pub(super) struct Tree {
     n_joints: usize,
+    /// Blocks of `n_joints` × [`LANES`] values; lanes without a node are infinite.
+    blocks: Vec<f64>,
     /// Flat, `n_joints` a node.
     values: Vec<f64>,
     parents: Vec<u32>,
@@ -16,23 +21,32 @@ pub(super) struct Tree {
 
 impl Tree {
     pub fn new(n_joints: usize) -> Self {
-        Self { n_joints, values: Vec::new(), parents: Vec::new() }
+        Self { n_joints, blocks: Vec::new(), values: Vec::new(), parents: Vec::new() }
     }
 
     pub fn len(&self) -> usize {
         self.parents.len()
     }
 
-    pub fn add_root(&mut self, q: &[f64]) {
-        let index = self.parents.len() as u32;
-        self.values.extend_from_slice(q);
-        self.parents.push(index);
+    /// A node without a parent; its index.
+    pub fn add_root(&mut self, q: &[f64]) -> usize {
+        self.add(q, self.len())
     }
 
+    /// A node below another; its index.
     pub fn add(&mut self, q: &[f64], parent: usize) -> usize {
+        let index = self.len();
+        let (block, lane) = (index / LANES, index % LANES);
+        if lane == 0 {
+            self.blocks.extend(std::iter::repeat_n(f64::INFINITY, self.n_joints * LANES));
+        }
+        let block = &mut self.blocks[block * self.n_joints * LANES..];
+        for (values, &value) in block.chunks_exact_mut(LANES).zip(q) {
+            values[lane] = value;
+        }
         self.values.extend_from_slice(q);
         self.parents.push(parent as u32);
-        self.parents.len() - 1
+        index
     }
 
     pub fn node(&self, index: usize) -> &[f64] {
@@ -43,35 +57,73 @@ impl Tree {
     pub fn nearest(&self, space: &JointSpace, q: &[f64]) -> usize {
         let mut nearest = 0;
         let mut least = f64::INFINITY;
-        'nodes: for (index, node) in self.values.chunks_exact(self.n_joints).enumerate() {
-            let mut squares = 0.0;
-            for (joint, (&a, &b)) in space.joints().iter().zip(node.iter().zip(q)) {
-                let way = short_way(joint, a, b);
-                squares += way * way;
-                if squares >= least {
-                    continue 'nodes;
+        for (number, block) in self.blocks.chunks_exact(self.n_joints * LANES).enumerate() {
+            let mut squares = [0.0; LANES];
+            for ((joint, values), &value) in
+                space.joints().iter().zip(block.chunks_exact(LANES)).zip(q)
+            {
+                if joint.is_continuous() {
+                    for (square, &from) in squares.iter_mut().zip(values) {
+                        *square += short_way(joint, from, value).powi(2);
+                    }
+                } else {
+                    for (square, &from) in squares.iter_mut().zip(values) {
+                        *square += (value - from) * (value - from);
+                    }
                 }
             }
-            (nearest, least) = (index, squares);
+            for (lane, &square) in squares.iter().enumerate() {
+                // False of what is not a number: the turns of an infinite value.
+                if square < least {
+                    (nearest, least) = (number * LANES + lane, square);
+                }
+            }
         }
         nearest
     }
 
     /// Joint values from `index` up to its root, in that order.
-    pub fn to_root(&self, mut index: usize) -> Vec<Vec<f64>> {
-        let mut branch = vec![self.node(index).to_vec()];
-        while self.parents[index] as usize != index {
-            index = self.parents[index] as usize;
-            branch.push(self.node(index).to_vec());
-        }
-        branch
+    pub fn to_root(&self, index: usize) -> Vec<Vec<f64>> {
+        self.branch(index).map(|index| self.node(index).to_vec()).collect()
     }
 
     /// The root above `index`.
-    pub fn root(&self, mut index: usize) -> usize {
-        while self.parents[index] as usize != index {
-            index = self.parents[index] as usize;
+    pub fn root(&self, index: usize) -> usize {
+        self.branch(index).last().unwrap_or(index)
+    }
+
+    fn branch(&self, index: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(index), |&index| {
+            let parent = self.parents[index] as usize;
+            (parent != index).then_some(parent)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::super::joint_space::JointRange;
+    use super::*;
+
+    #[test]
+    fn the_nearest_is_what_a_search_of_all_finds() {
+        let joint = |limit: f64| JointRange { name: "j".into(), lower: -limit, upper: limit };
+        let space = JointSpace::new(vec![joint(2.0), joint(f64::INFINITY), joint(1.0)]).unwrap();
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut draw = || -> Vec<f64> { (0..3).map(|_| random.random_range(-9.0..9.0)).collect() };
+        let mut tree = Tree::new(3);
+        let root = tree.add_root(&draw());
+        for n in 1..60 {
+            let q = draw();
+            let all = (0..n).map(|i| space.distance(tree.node(i), &q));
+            let least = all.fold(f64::INFINITY, f64::min);
+            let nearest = tree.nearest(&space, &q);
+            assert!((space.distance(tree.node(nearest), &q) - least).abs() < 1e-12);
+            let added = tree.add(&q, nearest);
+            assert_eq!(tree.root(added), root);
+            assert_eq!(tree.to_root(added).last().map(Vec::as_slice), Some(tree.node(root)));
         }
-        index
     }
 }
