@@ -11,7 +11,6 @@ use std::path::{Component, Path, PathBuf};
 
 use semfm_geom::io::FormatError;
 
-
 /// Graphs lie in attributes of nodes of graphs; no real network goes as deep.
 const DEEPEST: usize = 32;
 /// Values of a tensor in one byte: types of one bit are the smallest.
@@ -47,7 +46,7 @@ pub(super) fn external_files(network: &Path, bytes: &[u8]) -> crate::Result<Vec<
             // Reading the file says why it cannot be followed.
             _ => false,
         };
-        if !below || location.contains(['\0', '\\']) || leads_away {
+        if !below || location.is_empty() || location.contains(['\0', '\\']) || leads_away {
             let expected = "weights inside the folder of the network";
             let found = format!("`{location}`");
             return Err(FormatError::new(network, "external data", expected, found).into());
@@ -261,7 +260,13 @@ mod tests {
     use super::*;
 
     fn field(number: u8, content: &[u8]) -> Vec<u8> {
-        let mut bytes = vec![number << 3 | 2, content.len() as u8];
+        let mut bytes = vec![number << 3 | 2];
+        let mut length = content.len();
+        while length > 127 {
+            bytes.push(length as u8 | 128);
+            length >>= 7;
+        }
+        bytes.push(length as u8);
         bytes.extend(content);
         bytes
     }
@@ -285,14 +290,14 @@ mod tests {
         let found = files(&tensor).unwrap();
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].path, Path::new("folder/net.data"));
-        assert!(files(&[]).unwrap().is_empty());
+        assert!(files(&field(9, &[0; 4])).unwrap().is_empty());
     }
 
     #[test]
     fn weights_outside_of_the_folder_are_refused() {
         for location in ["../net.data", "/etc/passwd", "a/../../b", "a\\..\\b", "", "./x/.."] {
             let error = files(&entry("location", location)).unwrap_err().to_string();
-            assert!(error.contains("inside the folder") || location.is_empty(), "{error}");
+            assert!(error.contains("inside the folder"), "{error}");
         }
     }
 
@@ -307,12 +312,15 @@ mod tests {
 
     #[test]
     fn what_is_no_message_is_refused() {
-        let deep = (0..60).fold(Vec::new(), |inner: Vec<u8>, _| {
-            if inner.len() > 120 { inner } else { field(1, &field(5, &field(6, &inner))) }
-        });
         for bytes in [&b"\xff"[..], b"\x3a\x7f", b"\x3b", b"\x08", &[0xff; 30]] {
             assert!(external_files(Path::new("net.onnx"), bytes).is_err(), "{bytes:?}");
         }
-        assert!(external_files(Path::new("net.onnx"), &field(7, &deep)).is_ok());
+        // Graphs in attributes of nodes of graphs.
+        for (levels, is_read) in [(3, true), (60, false), (3000, false)] {
+            let nested =
+                (0..levels).fold(Vec::new(), |graph, _| field(1, &field(5, &field(6, &graph))));
+            let read = external_files(Path::new("net.onnx"), &field(7, &nested));
+            assert_eq!(read.is_ok(), is_read, "{levels} levels");
+        }
     }
 }

@@ -10,9 +10,9 @@ use semfm_geom::io::FormatError;
 use semfm_views::PatchGrid;
 
 use super::description::{Layout, OnnxDescription};
+use crate::Error;
 use crate::pretrained::resize::{Filter, resized};
 use crate::pretrained::token_network::{Picture, RawTokens, TokenNetwork};
-use crate::Error;
 
 /// What computes: part of the version of embeddings. As in the root `Cargo.toml`.
 pub(super) const RUNTIME: &str = "rten-0.24";
