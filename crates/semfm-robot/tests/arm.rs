@@ -90,6 +90,14 @@ fn a_tip_is_found_before_fingers_and_several_arms_are_refused() {
     assert_eq!(arm.robot().links[arm.tip()].name, "palm");
     assert_eq!(arm.n_joints(), 5);
 
+    // A single jaw is known by its name.
+    let jaw = fingers[..fingers.find(r#"<link name="g"/>"#).unwrap()]
+        .replace("name=\"f\"", "name=\"jaw\"");
+    let jaw = jaw.replace("link=\"f\"", "link=\"jaw\"");
+    let single = format!("<robot name='one'><link name='root'/>{a}{jaw}</robot>");
+    let arm = Arm::new(robot(&single), &ArmSettings::default()).unwrap();
+    assert_eq!((arm.robot().links[arm.tip()].name.as_str(), arm.n_joints()), ("palm", 5));
+
     let b = one("b", "root");
     let double = format!("<robot name='two'><link name='root'/>{a}{b}</robot>");
     let error = Arm::new(robot(&double), &ArmSettings::default()).unwrap_err().to_string();
@@ -110,7 +118,7 @@ fn bad_requests_name_what_is_wrong() {
     };
     assert!(with(None, "tool1", &[]).contains("did you mean `tool0`?"));
     assert!(with(Some("finger"), "tool0", &[]).contains("a link on another branch"));
-    assert!(with(None, "base", &[]).contains("at least one joint that moves"));
+    assert!(with(None, "base", &[]).contains("expected 1 to 100 joints that move, found 0"));
     assert!(with(None, "tool0", &[("lift", 0.1)]).contains("one that the arm moves"));
     assert!(with(None, "tool0", &[("wrist", 0.1)]).contains("follows another"));
     assert!(with(None, "tool0", &[("slide", 0.1)]).contains("expected 0.01 to 0.04, found 0.1"));
@@ -121,6 +129,19 @@ fn bad_requests_name_what_is_wrong() {
         crossed.contains("joint `elbow`: limits") && crossed.contains("-2 and -3"),
         "{crossed}"
     );
+    let long: String = (0..101)
+        .map(|i| {
+            format!(
+                r#"<link name="l{}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>
+                <child link="l{}"/></joint>"#,
+                i + 1,
+                i + 1
+            )
+        })
+        .collect();
+    let long = robot(&format!(r#"<robot name="long"><link name="l0"/>{long}</robot>"#));
+    let error = Arm::new(long, &ArmSettings::default()).unwrap_err().to_string();
+    assert!(error.contains("found 101"), "{error}");
     let floating = ARM.replace(r#"name="stand" type="fixed""#, r#"name="stand" type="floating""#);
     let error = Arm::new(robot(&floating), &settings()).unwrap_err().to_string();
     assert!(error.contains("name a base beyond it, such as `base`"), "{error}");

@@ -16,6 +16,9 @@ use crate::{Error, Result};
 /// By how much a position may pass a limit and still count as within, radians or metres: files round their numbers.
 const LIMIT_SLACK: f64 = 1e-9;
 
+/// Most joints of an arm: arrays grow with their square.
+const MAX_JOINTS: usize = 100;
+
 /// What a description does not say. The default finds base and tip by itself.
 #[derive(Clone, Debug, Default)]
 pub struct ArmSettings {
@@ -55,12 +58,12 @@ impl Arm {
         let ends = ends::find(&robot, settings.base.as_deref(), settings.tip.as_deref())?;
         let mut notes = ends.notes;
         let variables = variables(&robot, &ends.path);
-        if variables.is_empty() {
+        if !(1..=MAX_JOINTS).contains(&variables.len()) {
             let [base, tip] = [ends.base, ends.tip].map(|link| &robot.links[link].name);
             return Err(Error::Arm {
                 what: format!("chain from `{base}` to `{tip}`"),
-                expected: "at least one joint that moves".into(),
-                found: "none".into(),
+                expected: format!("1 to {MAX_JOINTS} joints that move"),
+                found: variables.len().to_string(),
             });
         }
         let positions = fixed_positions(&robot, &variables, &settings.fixed)?;
@@ -218,11 +221,11 @@ impl Arm {
 /// The joints that move the path by themselves, in the order in which they first do.
 fn variables(robot: &Robot, path: &[usize]) -> Vec<usize> {
     let leaders = robot.leaders();
-    let mut variables = Vec::new();
+    let (mut variables, mut known) = (Vec::new(), vec![false; robot.joints.len()]);
     for &joint in path {
         let leader = leaders[joint];
         let moves = [joint, leader].iter().all(|&j| robot.joints[j].kind.has_position());
-        if moves && !variables.contains(&leader) {
+        if moves && !std::mem::replace(&mut known[leader], true) {
             variables.push(leader);
         }
     }

@@ -9,6 +9,9 @@ use crate::{Error, Result};
 /// A chain of this many joints that move by themselves counts as an arm, a shorter one at the end of an arm as a finger.
 const MIN_ARM_JOINTS: usize = 4;
 
+/// What names of a single joint that closes a hand, and of its link, contain.
+const FINGER_NAMES: [&str; 4] = ["finger", "jaw", "gripper", "knuckle"];
+
 /// Frames that descriptions put at the end of an arm, the preferred first: ends of names in lower case. `tool0` and
 /// `flange` are those of ROS REP 199, the others are what Franka, Kinova and Universal Robots call theirs.
 const TIP_NAMES: [&str; 8] = [
@@ -63,9 +66,11 @@ fn link(robot: &Robot, what: &str, name: &str) -> Result<usize> {
 
 /// Joints from base to tip.
 fn path(robot: &Robot, base: usize, tip: usize) -> Result<Vec<usize>> {
+    let mut joint_to = vec![None; robot.links.len()];
+    robot.joints.iter().enumerate().for_each(|(i, joint)| joint_to[joint.child] = Some(i));
     let (mut path, mut at) = (Vec::new(), tip);
     while at != base {
-        let Some(joint) = robot.joint_to(at) else {
+        let Some(joint) = joint_to[at] else {
             let [base, tip] = [base, tip].map(|link| &robot.links[link].name);
             return Err(Error::Arm {
                 what: format!("tip `{tip}`"),
@@ -98,14 +103,13 @@ fn path(robot: &Robot, base: usize, tip: usize) -> Result<Vec<usize>> {
 fn find_tip(robot: &Robot, base: usize) -> Result<usize> {
     let longest = longest_chains(robot);
     let bodies = robot.bodies();
+    let mut moving_on = vec![Vec::new(); robot.links.len()];
+    for (i, joint) in robot.joints.iter().enumerate().filter(|(_, j)| j.kind.has_position()) {
+        moving_on[bodies[joint.parent]].push(i);
+    }
     let mut body = bodies[base];
     loop {
-        let moving: Vec<usize> = (0..robot.joints.len())
-            .filter(|&joint| {
-                let joint = &robot.joints[joint];
-                joint.kind.has_position() && bodies[joint.parent] == body
-            })
-            .collect();
+        let moving = &moving_on[body];
         // Joints from here on, this one included.
         let counts = |&joint: &usize| {
             let joint = &robot.joints[joint];
@@ -114,9 +118,10 @@ fn find_tip(robot: &Robot, base: usize) -> Result<usize> {
         let arms: Vec<usize> =
             moving.iter().copied().filter(|joint| counts(joint) >= MIN_ARM_JOINTS).collect();
         match (moving.as_slice(), arms.as_slice()) {
-            ([only], _) | (_, [only]) => body = robot.joints[*only].child,
-            (_, []) => break,
-            (_, several) => return Err(several_arms(robot, several)),
+            (_, [only]) => body = robot.joints[*only].child,
+            (_, [_, _, ..]) => return Err(several_arms(robot, &arms)),
+            ([only], []) if !is_finger(robot, *only) => body = robot.joints[*only].child,
+            _ => break,
         }
     }
     if body == bodies[base] {
@@ -127,6 +132,15 @@ fn find_tip(robot: &Robot, base: usize) -> Result<usize> {
         });
     }
     Ok(tip_of_body(robot, &bodies, body))
+}
+
+/// Whether a joint is by its name, or that of its link, the one that closes a hand.
+fn is_finger(robot: &Robot, joint: usize) -> bool {
+    let joint = &robot.joints[joint];
+    [&joint.name, &robot.links[joint.child].name].iter().any(|name| {
+        let name = name.to_ascii_lowercase();
+        FINGER_NAMES.iter().any(|finger| name.contains(finger))
+    })
 }
 
 fn several_arms(robot: &Robot, joints: &[usize]) -> Error {

@@ -120,8 +120,9 @@ impl<'a> Descent<'a> {
             for i in 0..n {
                 let weighted = weight * row[i];
                 self.gradient[i] += weighted * e;
-                for j in 0..=i {
-                    self.normal[i * n + j] += weighted * row[j];
+                let normal_row = &mut self.normal[i * n..=i * n + i];
+                for (entry, other) in normal_row.iter_mut().zip(row) {
+                    *entry += weighted * other;
                 }
             }
         }

@@ -168,7 +168,7 @@ impl InverseKinematics {
     /// Where the search begins.
     fn start(&self, near: &[f64]) -> Result<Vec<f64>> {
         let joints = self.arm.joints();
-        let odd = near.iter().find(|position| !(position.abs() <= MAX_NUMBER));
+        let odd = near.iter().find(|position| position.is_nan() || position.abs() > MAX_NUMBER);
         if near.len() != joints.len() || odd.is_some() {
             let found =
                 odd.map_or_else(|| near.len().to_string(), |odd| format!("{odd} among them"));
