@@ -11,7 +11,7 @@ use semfm::files;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{read_mesh, read_mesh_or_points, read_points};
 use semfm::grasp::{GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with};
-use semfm::robot::{Gripper, GripperSettings, MeshPaths, RobotDescription};
+use semfm::robot::{Gripper, GripperSettings, JointLimitsFile, MeshPaths, RobotDescription, Srdf};
 use semfm::views::mcap::{EmbeddingsFile, ViewsFile, inspect, read_view};
 use semfm::{Mesh, Task};
 use semfm_eval::{AnnotatedMesh, MapResults, Results};
@@ -37,7 +37,7 @@ pub struct Reader {
 }
 
 /// All of them.
-pub const READERS: [Reader; 14] = [
+pub const READERS: [Reader; 16] = [
     Reader { name: "obj", extension: "obj", read: mesh },
     Reader { name: "off", extension: "off", read: mesh },
     Reader { name: "ply", extension: "ply", read: mesh },
@@ -49,6 +49,8 @@ pub const READERS: [Reader; 14] = [
     Reader { name: "embeddings", extension: "mcap", read: embeddings },
     Reader { name: "json", extension: "json", read: json },
     Reader { name: "urdf", extension: "urdf", read: robot },
+    Reader { name: "srdf", extension: "srdf", read: srdf },
+    Reader { name: "joint_limits", extension: "yaml", read: joint_limits },
     Reader { name: "npy", extension: "npy", read: npy },
     Reader { name: "npz", extension: "npz", read: npz },
     Reader { name: "png", extension: "png", read: picture },
@@ -109,6 +111,8 @@ fn json(path: &Path) -> bool {
     read |= files::read_aligned(path, Some(mesh)).is_ok();
     read |= files::read_pose(path).is_ok();
     read |= files::read_scene(path).is_ok();
+    read |= files::TrajectoryFile::read(path).is_ok();
+    read |= files::read_motion(path).is_ok();
     if let Ok(image) = semfm::align::DepthImage::new(4, 3, vec![1.0; 12]) {
         read |= files::read_intrinsics(path, &image).is_ok();
     }
@@ -130,7 +134,9 @@ fn robot(path: &Path) -> bool {
     }
     if let Ok(description) = RobotDescription::read(&urdf) {
         let _ = description.meshes(&MeshPaths::new(&urdf, &Default::default()));
-        let _ = description.tree();
+        if let Ok(tree) = description.tree() {
+            let _ = Arm::new(tree.into(), &ArmSettings::default());
+        }
     }
     let Ok(gripper) = Gripper::from_urdf(&urdf, &GripperSettings::default()) else { return false };
     let Ok(gripper) = GripperGeometry::new(&gripper) else { return false };
@@ -141,6 +147,21 @@ fn robot(path: &Path) -> bool {
     let settings = GraspSettings { n_samples: 4, neighbour_rounds: 0, ..Default::default() };
     let task = Task::default();
     find_grasps_with(object, &weights, &gripper, &Scene::new(), &settings, &task).is_ok()
+}
+
+/// An SRDF for the synthetic arm.
+fn srdf(path: &Path) -> bool {
+    static ROBOT: OnceLock<semfm::robot::Robot> = OnceLock::new();
+    let robot = ROBOT.get_or_init(|| {
+        let text = semfm_synth::arm_urdf();
+        let description = RobotDescription::parse(text.as_bytes(), "arm.urdf").expect("a URDF");
+        description.tree().expect("one tree")
+    });
+    Srdf::read(path, robot).is_ok()
+}
+
+fn joint_limits(path: &Path) -> bool {
+    JointLimitsFile::read(path).is_ok()
 }
 
 fn npy(path: &Path) -> bool {

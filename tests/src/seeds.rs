@@ -21,6 +21,29 @@ const MAX_SEED: u64 = 64 << 10;
 /// Most files of the shared corpus for one reader.
 const MAX_FROM_CORPUS: usize = 200;
 
+/// An SRDF of the synthetic arm with every element that is read.
+const SRDF: &str = r#"<?xml version="1.0"?><robot name="synth_arm">
+  <group name="arm"><chain base_link="base" tip_link="flange"/></group>
+  <group name="hand"><link name="hand"/><joint name="left_finger_joint"/><passive_joint name="right_finger_joint"/></group>
+  <group name="all"><group name="arm"/><group name="hand"/></group>
+  <group_state name="ready" group="arm"><joint name="joint1" value="0.5"/><joint name="joint2" value="-1e-1"/></group_state>
+  <end_effector name="gripper" parent_link="flange" group="hand" parent_group="arm"/>
+  <virtual_joint name="world" type="fixed" parent_frame="world" child_link="base"/>
+  <passive_joint name="right_finger_joint"/>
+  <disable_default_collisions link="left_finger"/><enable_collisions link1="base" link2="left_finger"/>
+  <disable_collisions link1="base" link2="hand" reason="Never"/>
+</robot>"#;
+
+/// Limits as MoveIt and roboplan write them.
+const JOINT_LIMITS: &str = "# limits\ndefault_velocity_scaling_factor: 0.1\njoint_limits:\n  joint1:\n    \
+    has_velocity_limits: true\n    max_velocity: 2.175\n    has_acceleration_limits: true\n    \
+    max_acceleration: 3.75\n    has_jerk_limits: false\n    max_jerk: 300.0\n  \
+    joint2: {min_position: -1.5, max_position: 1e0, max_acceleration: [2.0]}\n";
+
+/// The same table inside parameters of ROS 2.
+const JOINT_LIMITS_OF_ROS: &str = "/**:\n  ros__parameters:\n    robot_description_planning:\n      \
+    joint_limits:\n        \"joint1\": {max_velocity: 2}\n";
+
 /// The seeds of a reader: files made here and, where it is at hand, those of the shared corpus.
 ///
 /// # Panics
@@ -43,6 +66,8 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
         "embeddings" => [Dtype::F16, Dtype::F32].map(|d| embeddings(folder.path(), d)).into(),
         "json" => jsons(folder.path()),
         "urdf" => robots(folder.path()),
+        "srdf" => vec![SRDF.into()],
+        "joint_limits" => vec![JOINT_LIMITS.into(), JOINT_LIMITS_OF_ROS.into()],
         "npy" => vec![
             npy("<f4", seed_mesh().n_vertices(), 2, 4),
             npy("<f8", seed_mesh().n_vertices(), 1, 8),
@@ -57,7 +82,8 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
 pub fn from_corpus(reader: &str) -> Vec<Vec<u8>> {
     let (kind, extension) = match reader {
         "views" | "embeddings" => ("mcap", "mcap"),
-        "urdf" => ("urdf", "urdf"),
+        "urdf" | "srdf" => ("urdf", reader),
+        "joint_limits" => ("urdf", "yaml"),
         other => ("mesh", other),
     };
     let Some(corpus) = shared("corpus") else { return Vec::new() };
@@ -245,6 +271,15 @@ fn jsons(folder: &Path) -> Vec<Vec<u8>> {
             "boxes": [{"name": "b", "size": [1, 1, 0.1], "position": [0, 0, 1], "quaternion_xyzw": [0, 0, 0, 1]}],
             "cylinders": [{"name": "c", "radius": 0.1, "length": 0.2, "position": [0, 0, 1]}],
             "meshes": [{"name": "m", "file": "none.ply", "scale": 0.001, "position": [0, 0, 0]}]}"#,
+        r#"{"format": "semfm.trajectory/1", "joint_names": ["a"], "grasp": null, "object": null,
+            "robot": {"name": "r", "file": "none.urdf", "base": "b", "tip": "t",
+              "hash": "blake3:af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262"},
+            "hand": {"name": "h", "parts": [], "openings": [0.08], "tip_from_part": [[]]},
+            "obstacles": [{"name": "o", "shape": {"type": "box", "size": [1, 1, 1]},
+              "base_from_obstacle": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]]}],
+            "segments": [{"kind": "to_pre_grasp", "points": [
+              {"time": 0, "positions": [0], "velocities": [0], "accelerations": [0], "opening": 0.08},
+              {"time": 1, "positions": [1], "velocities": [0], "accelerations": [0], "opening": 0.08}]}]}"#,
         r#"{"fx": 500.0, "fy": 500.0, "cx": 2.0, "cy": 1.5, "width": 4, "height": 3}"#,
         r#"{"K": [500, 0, 2, 0, 500, 1.5, 0, 0, 1], "width": 4, "height": 3, "D": [0, 0, 0, 0, 0]}"#,
         "[[500, 0, 2], [0, 500, 1.5], [0, 0, 1]]",

@@ -15,8 +15,8 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, info, region, show,
-    transfer, views,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, ik, info, region,
+    show, transfer, views,
 };
 use options::Common;
 pub use process::own_process;
@@ -46,6 +46,7 @@ enum Command {
     Align(Box<align::AlignCommand>),
     Eval(Box<eval::EvalCommand>),
     EvalMaps(eval_maps::EvalMapsCommand),
+    Ik(Box<ik::IkCommand>),
     Info(info::InfoCommand),
     Completions(completions::CompletionsCommand),
 }
@@ -97,6 +98,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Command::Align(command) => command.run(&common),
         Command::Eval(command) => command.run(&common),
         Command::EvalMaps(command) => command.run(&common),
+        Command::Ik(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     };

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{MeshFormat, printable_name, read_at_most, read_mesh};
-use semfm::robot::{MeshPaths, MeshPlace, RobotDescription};
+use semfm::robot::{Arm, ArmJoint, ArmSettings, MeshPaths, MeshPlace, RobotDescription};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
 
@@ -101,6 +102,7 @@ fn look_at_urdf(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Res
             }
         })
         .collect();
+    let arm = look_for_arm(&description);
     Ok(json!({
         "kind": "urdf",
         "name": description.name(),
@@ -112,7 +114,35 @@ fn look_at_urdf(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Res
         "missing_meshes": missing,
         "tree": description.tree_findings(),
         "notes": description.notes(),
+        "arm": arm,
     }))
+}
+
+/// The arm of a robot: ends, joints with limits, what was assumed; or why none is found. `null` for a fragment.
+fn look_for_arm(description: &RobotDescription) -> Value {
+    let Ok(robot) = description.tree() else { return Value::Null };
+    let arm = match Arm::new(Arc::new(robot), &ArmSettings::default()) {
+        Ok(arm) => arm,
+        Err(error) => return json!({ "none": error.to_string() }),
+    };
+    let link = |index: usize| &arm.robot().links[index].name;
+    // Infinite limits are null: JSON has no infinity.
+    let joint = |joint: &ArmJoint| {
+        json!({
+            "name": joint.name,
+            "kind": joint.kind.name(),
+            "lower": joint.lower,
+            "upper": joint.upper,
+            "velocity": joint.velocity,
+            "acceleration": joint.acceleration,
+        })
+    };
+    json!({
+        "base": link(arm.base()),
+        "tip": link(arm.tip()),
+        "joints": arm.joints().iter().map(joint).collect::<Vec<Value>>(),
+        "assumed": arm.notes(),
+    })
 }
 
 /// URDF by its extension, or by a first element where no other extension speaks against it.
@@ -158,6 +188,7 @@ fn show(path: &Path, report: &Value) {
                 items.iter().for_each(|item| console::data(format_args!("    {item}")));
             }
             Value::String(text) => console::data(format_args!("  {key:24} {text}")),
+            Value::Object(arm) if key == "arm" => show_arm(arm),
             Value::Array(sides) if key == "size" => {
                 let sides: Vec<String> = sides
                     .iter()
@@ -168,5 +199,32 @@ fn show(path: &Path, report: &Value) {
             }
             other => console::data(format_args!("  {key:24} {other}")),
         }
+    }
+}
+
+/// The arm as a table: a line a joint.
+fn show_arm(arm: &serde_json::Map<String, Value>) {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    if let Some(none) = arm.get("none") {
+        console::data(format_args!("  {:24} none: {}", "arm", text(none)));
+        return;
+    }
+    let ends = format!("{} to {}", text(&arm["base"]), text(&arm["tip"]));
+    console::data(format_args!("  {:24} {ends}", "arm"));
+    for joint in arm["joints"].as_array().into_iter().flatten() {
+        let number = |key: &str| joint[key].as_f64().map_or("unlimited".into(), |x| format!("{x}"));
+        let range = match (joint["lower"].is_null(), joint["upper"].is_null()) {
+            (true, true) => "unlimited".to_owned(),
+            _ => format!("{} to {}", number("lower"), number("upper")),
+        };
+        let (name, kind) = (text(&joint["name"]), text(&joint["kind"]));
+        console::data(format_args!(
+            "    {name:22} {kind}, {range}; velocity {}, acceleration {}",
+            number("velocity"),
+            number("acceleration")
+        ));
+    }
+    for note in arm["assumed"].as_array().into_iter().flatten() {
+        console::data(format_args!("    {}", text(note)));
     }
 }

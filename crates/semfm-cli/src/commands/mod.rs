@@ -8,6 +8,7 @@ mod encoder_options;
 pub mod eval;
 pub mod eval_maps;
 pub mod grasp;
+pub mod ik;
 pub mod info;
 pub mod region;
 mod report_options;

@@ -9,6 +9,10 @@ use super::pose_error::PoseError;
 /// Iterations after which a descent is given up. Nearly all that arrive do so within 20.
 const MAX_ITERATIONS: usize = 60;
 
+/// Share of the tolerances at which a descent ends. Convergence is quadratic, so this takes one step more than the
+/// tolerances themselves, and neighbouring poses get answers that differ as little as they do.
+const ARRIVAL: f64 = 1e-3;
+
 /// A descent that does not lower its cost by this factor in [`PATIENCE`] iterations is in a local minimum. Half the
 /// patience gives up on one in six that would arrive; twice as much takes a third longer for few more.
 const LEAST_PROGRESS: f64 = 0.8;
@@ -99,9 +103,8 @@ impl<'a> Descent<'a> {
     }
 
     fn is_reached(&self, error: &PoseError) -> bool {
-        // A tenth: whole turns and the clamp at limits round afterwards.
-        error.distance() <= 0.1 * self.settings.position_tolerance
-            && error.angle() <= 0.1 * self.settings.rotation_tolerance
+        error.distance() <= ARRIVAL * self.settings.position_tolerance
+            && error.angle() <= ARRIVAL * self.settings.rotation_tolerance
     }
 
     /// With e weighted and J the tip's Jacobian, the step solves (projected at limits)

@@ -97,7 +97,7 @@ impl InverseKinematics {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for more than 1,000 solutions or none, more than 100,000 restarts, and tolerances below
-    /// 1e-12.
+    /// 1e-10.
     pub fn new(arm: Arc<Arm>, settings: IkSettings) -> Result<Self> {
         let out_of_range = |what, expected: &str, found: String| {
             Err(Error::OutOfRange { what, expected: expected.into(), found })
@@ -113,8 +113,8 @@ impl InverseKinematics {
             ("rotation_tolerance", settings.rotation_tolerance),
         ] {
             // Below, rounding of forward kinematics decides.
-            if !(tolerance.is_finite() && tolerance >= 1e-12) {
-                return out_of_range(what, "at least 1e-12", tolerance.to_string());
+            if !(tolerance.is_finite() && tolerance >= 1e-10) {
+                return out_of_range(what, "at least 1e-10", tolerance.to_string());
             }
         }
         Ok(Self { arm, settings })
