@@ -12,17 +12,17 @@ use crate::console;
 use crate::options::Common;
 use crate::output::OutputFile;
 
-/// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views
+/// Put results on one HTML page, in three dimensions: transfers, meshes with regions and grasps, views, motions
 ///
 /// The page needs no network. Pointing at the source lights the matched place of the target, and the
 /// other way round. A region after a transfer's folder is the true one, which the answer is held against.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  semfm-cli show semfm-demo/transfer -o demo.html\n  \
     semfm-cli show mug.obj grip.json mug.views.mcap -o mug.html\n  \
-    semfm-cli show out true-grip.json -o judged.html")]
+    semfm-cli show out true-grip.json -o judged.html\n  semfm-cli show plan/trajectory.json -o motion.html")]
 pub struct ShowCommand {
     /// Folders that `transfer -o` wrote (the true region on the target may follow), meshes, regions and
-    /// grasps (after their mesh), views files
+    /// grasps (after their mesh), views files, folders that `plan -o` wrote or their trajectory.json
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Where to write the page; `-` is stdout
@@ -49,12 +49,12 @@ impl ShowCommand {
     }
 }
 
-/// The files themselves and those in folders: `show` reads a folder of `transfer`, or of `demo` with
-/// one inside.
+/// The files themselves and those in folders: `show` reads a folder of `transfer` or `plan`, or of `demo` with
+/// such inside.
 fn files_of(paths: &[PathBuf]) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for path in paths {
-        let folders = [path.clone(), path.join("transfer")];
+        let folders = [path.clone(), path.join("transfer"), path.join("plan")];
         let entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
         files.extend(entries.flatten().map(|entry| entry.path()));
         files.push(path.clone());

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use semfm::files::PartRecord;
-use semfm::geom::math::{DAffine3, DMat3, DVec3, bounds};
+use semfm::geom::math::{DAffine3, DMat3, DVec3};
 use semfm::robot::{LinkSurface, Pose};
 use semfm::{FrameOwner, MotionFrame, MotionScene, ObstacleShape, SceneState};
 
@@ -193,9 +193,4 @@ fn cloud(points: &[DVec3]) -> Surface {
         surface.add_at(&cube, DAffine3::from_translation(point));
     }
     surface
-}
-
-/// The middle of a body's box, in its frame.
-pub(crate) fn middle_of(surface: &Surface) -> DVec3 {
-    bounds(&surface.vertices).map_or(DVec3::ZERO, |(low, high)| (low + high) / 2.0)
 }

@@ -8,5 +8,5 @@ mod plan_folder;
 pub use animated_glb::write_animated_glb;
 pub use plan_folder::{PLAN_FILES, write_plan_folder};
 
-pub(crate) use bodies::{BodyKind, MotionBodies, affine_of};
-pub(crate) use frame_tracks::FrameTracks;
+pub(crate) use bodies::{Body, BodyKind, MotionBodies, affine_of};
+pub(crate) use frame_tracks::{FrameTracks, continuous};

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::encoding::{EncodedMesh, encode_bytes, encode_numbers};
 use super::grasps::{Hands, HandsData};
 use super::group::{Group, Layer, Panel, Picture, VertexColors};
+use super::motion::{Motion, MotionData};
 use crate::colors::{MARKED, PLAIN, color_bytes, hex};
 use crate::html::base64;
 
@@ -28,6 +29,7 @@ struct GroupData<'a> {
     source_of: Option<String>,
     pictures: Vec<PictureData<'a>>,
     hands: Option<&'a HandsData>,
+    motion: Option<&'a MotionData>,
 }
 
 #[derive(Serialize)]
@@ -99,6 +101,7 @@ impl<'a> GroupData<'a> {
             source_of: group.source_of.as_ref().map(|ids| encode_numbers(ids.iter().copied())),
             pictures: pictures.map(|picture| PictureData::new(picture, upright)).collect(),
             hands: group.hands.as_ref().map(Hands::data),
+            motion: group.motion.as_ref().map(Motion::data),
         }
     }
 }

@@ -12,10 +12,12 @@ use crate::colors::{MARKED, NamedColor, PLAIN, color_bytes, css_properties, verd
 use crate::html::{Field, escape, fill, policy};
 
 /// The viewer, in the order in which its files build on each other.
-const VIEWER: [&str; 6] = [
+const VIEWER: [&str; 8] = [
     include_str!("viewer/painter.js"),
     include_str!("viewer/panel.js"),
     include_str!("viewer/hands.js"),
+    include_str!("viewer/charts.js"),
+    include_str!("viewer/motion.js"),
     include_str!("viewer/theme.js"),
     include_str!("viewer/decode.js"),
     include_str!("viewer/viewer.js"),
@@ -93,6 +95,7 @@ mod tests {
             source_of,
             pictures: Vec::new(),
             hands: None,
+            motion: None,
         }
     }
 

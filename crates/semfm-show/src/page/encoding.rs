@@ -41,7 +41,7 @@ pub(super) fn encode_numbers(numbers: impl IntoIterator<Item = u32>) -> String {
 const STEPS: f64 = (1 << 20) as f64;
 
 /// A mesh whose coordinates are whole numbers of steps.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct EncodedMesh {
     n: usize,
     /// Size of a step along each axis.
@@ -53,18 +53,23 @@ pub(super) struct EncodedMesh {
 
 impl EncodedMesh {
     pub(super) fn new(mesh: &Mesh) -> Self {
-        let (low, high) = bounds(mesh.vertices()).unwrap_or_default();
+        Self::of(mesh.vertices(), mesh.faces())
+    }
+
+    /// A surface by its corners and triangles.
+    pub(super) fn of(vertices: &[DVec3], faces: &[[u32; 3]]) -> Self {
+        let (low, high) = bounds(vertices).unwrap_or_default();
         let step = ((high - low) / STEPS).max(DVec3::splat(f64::MIN_POSITIVE));
-        let mut steps = Vec::with_capacity(3 * mesh.n_vertices());
+        let mut steps = Vec::with_capacity(3 * vertices.len());
         for k in 0..3 {
-            let along = mesh.vertices().iter();
+            let along = vertices.iter();
             steps.extend(along.map(|p| ((p[k] - low[k]) / step[k]).round() as u32));
         }
         Self {
-            n: mesh.n_vertices(),
+            n: vertices.len(),
             step: step.to_array(),
             positions: encode_numbers(steps),
-            faces: encode_numbers(mesh.faces().as_flattened().iter().copied()),
+            faces: encode_numbers(faces.as_flattened().iter().copied()),
         }
     }
 }

@@ -61,6 +61,7 @@ pub(super) fn grasps_group(
         source_of: None,
         pictures: Vec::new(),
         hands: Some(hands),
+        motion: None,
     }))
 }
 

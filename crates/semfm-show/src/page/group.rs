@@ -4,6 +4,7 @@ use semfm::geom::math::DVec3;
 use semfm::{Mesh, Task};
 
 use super::grasps::Hands;
+use super::motion::Motion;
 use crate::pictures::{Viewpoints, viewpoints};
 use crate::{Error, Result};
 
@@ -95,6 +96,8 @@ pub struct Group {
     pub pictures: Vec<Picture>,
     /// Hands at the first panel's mesh.
     pub hands: Option<Hands>,
+    /// What moves around the first panel's mesh.
+    pub motion: Option<Motion>,
 }
 
 impl VertexColors {

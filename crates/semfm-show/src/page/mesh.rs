@@ -37,6 +37,7 @@ pub(super) fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
         source_of: None,
         pictures: Vec::new(),
         hands: None,
+        motion: None,
     })
 }
 

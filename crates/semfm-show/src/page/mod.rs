@@ -10,6 +10,7 @@ mod encoding;
 mod grasps;
 mod group;
 mod mesh;
+mod motion;
 mod paths;
 mod transfer_folder;
 #[cfg(feature = "mcap")]
@@ -18,4 +19,5 @@ mod views;
 pub use document::write_page;
 pub use grasps::Hands;
 pub use group::{Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors};
+pub use motion::Motion;
 pub use paths::groups_of_paths;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::files::{GRASPS_FORMAT, REGION_FORMAT};
+use semfm::files::{GRASPS_FORMAT, REGION_FORMAT, TRAJECTORY_FORMAT};
 use semfm::geom::io::{FormatError, MeshFormat, read_json};
 use semfm::{Region, Task};
 use serde_json::Value;
@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::grasps::grasps_group;
 use super::group::Group;
 use super::mesh::{add_region, mesh_group};
+use super::motion::motion_group;
 use super::transfer_folder::{add_truth, transfer_groups};
 use crate::{Error, Result};
 
@@ -17,13 +18,14 @@ use crate::{Error, Result};
 fn expected() -> String {
     format!(
         "the folder that `transfer -o` wrote, with the true region (JSON) after it where that is known, \
-         a mesh ({}), a region or grasps (JSON) after their mesh, or a views file (MCAP)",
+         a mesh ({}), a region or grasps (JSON) after their mesh, a views file (MCAP), or a motion (the \
+         folder of a plan, or its trajectory.json)",
         MeshFormat::readable_names()
     )
 }
 
-/// The groups of all paths: one for each folder of a transfer (and one for its grasps), mesh and views
-/// file; a region file is shown on the mesh before it, a file of grasps beside it. A region file after a
+/// The groups of all paths: one for each folder of a transfer (and one for its grasps), mesh, views file and
+/// motion; a region file is shown on the mesh before it, a file of grasps beside it. A region file after a
 /// transfer's folder is the true region on its target.
 ///
 /// # Errors
@@ -35,6 +37,11 @@ pub fn groups_of_paths(paths: &[PathBuf], task: &Task) -> Result<Vec<Group>> {
     let mut before: Option<Before> = None;
     for path in paths {
         if !path.is_dir() && extension(path) == "json" {
+            if format_of(path).is_ok_and(|format| format.as_deref() == Some(TRAJECTORY_FORMAT)) {
+                groups.push(motion_group(path, task)?);
+                before = None;
+                continue;
+            }
             match &mut before {
                 None => return Err(json_alone(path)),
                 Some(Before::Mesh(mesh)) => mesh.add_json(path, &mut groups, task)?,
@@ -82,6 +89,9 @@ impl MeshBefore {
     }
 }
 
+/// The file of a motion in the folder of a plan.
+const TRAJECTORY: &str = "trajectory.json";
+
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
@@ -109,10 +119,16 @@ fn format_of(path: &Path) -> Result<Option<String>> {
 }
 
 fn groups_of_folder(folder: &Path, task: &Task) -> Result<Vec<Group>> {
-    // `demo` writes its transfer into a folder of its own.
+    // `demo` writes its transfer and its motion into folders of their own.
     let of_demo = folder.join("transfer");
-    if let Some(folder) = [folder, &of_demo].into_iter().find(|f| f.join("report.json").is_file()) {
-        return transfer_groups(folder, task);
+    let transfer = [folder, &of_demo].into_iter().find(|f| f.join("report.json").is_file());
+    let mut groups = transfer.map_or(Ok(Vec::new()), |folder| transfer_groups(folder, task))?;
+    let motions = [folder.join(TRAJECTORY), folder.join("plan").join(TRAJECTORY)];
+    for motion in motions.iter().filter(|path| path.is_file()) {
+        groups.push(motion_group(motion, task)?);
+    }
+    if !groups.is_empty() {
+        return Ok(groups);
     }
     let found = match folder.join("results.json").is_file() {
         true => "an evaluation, which has its own page: index.html",

@@ -179,6 +179,7 @@ impl TransferFolder {
             source_of: Some(self.map.source_of),
             pictures: Vec::new(),
             hands: None,
+            motion: None,
         }
     }
 }

@@ -33,6 +33,7 @@ pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
         source_of: None,
         pictures,
         hands: None,
+        motion: None,
     })
 }
 

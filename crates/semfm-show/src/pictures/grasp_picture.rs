@@ -9,12 +9,12 @@ use std::path::Path;
 use semfm::files::{GraspRecord, GraspsFile};
 use semfm::geom::math::{DVec3, bounds};
 use semfm::geom::{Mesh, Pinhole, Task};
+use semfm::upright::upright;
 use semfm::views::View;
 
 use super::painted::Painted;
 use super::scale_bar::draw_scale_bar;
 use super::sheet::{Entry, PICTURE_SIDE, Row, Sheet};
-use super::upright::upright;
 use super::viewpoints::viewpoints_around;
 use super::{Viewpoints, WeightedMesh};
 use crate::Result;

@@ -12,7 +12,6 @@ mod sheet;
 mod stroke_font;
 mod transfer_figure;
 mod transfer_picture;
-mod upright;
 mod viewpoints;
 
 pub use grasp_picture::write_grasp_picture;
@@ -26,6 +25,6 @@ pub(crate) use grasp_picture::{
 };
 pub(crate) use motion_picture::write_motion_picture_of;
 pub(crate) use pair_rotation::WeightedMesh;
+pub(crate) use semfm::upright::upright;
 pub(crate) use transfer_figure::ObjectFigure;
-pub(crate) use upright::upright;
 pub(crate) use viewpoints::{PairedViewpoints, paired_viewpoints, viewpoints_around};

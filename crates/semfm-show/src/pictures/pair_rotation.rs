@@ -2,9 +2,8 @@
 
 use faer::{Mat, Side};
 use semfm::geom::math::{DMat3, DQuat, DVec3};
+use semfm::upright::Upright;
 use semfm::{Mesh, Region};
-
-use super::upright::Upright;
 
 /// Correlation of matched points from which on a point map tells how the target is turned, where
 /// nothing else does and where both objects stand. Maps between objects of one kind reached .45 to .87,
@@ -159,12 +158,16 @@ pub(super) fn best_rotation(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use semfm::geom::math::DMat3;
     use semfm_geom::zoo;
 
-    use super::super::upright::tests::turned;
     use super::*;
+
+    pub(in super::super) fn turned(mesh: &Mesh, turn: DMat3) -> Mesh {
+        let vertices = mesh.vertices().iter().map(|&p| turn * p).collect();
+        Mesh::new(vertices, mesh.faces().to_vec()).unwrap()
+    }
 
     #[test]
     fn a_turned_copy_is_turned_back() {

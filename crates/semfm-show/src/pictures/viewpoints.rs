@@ -5,10 +5,10 @@ use semfm::Region;
 use semfm::geom::math::{DMat3, DVec3};
 use semfm::geom::sampling::fibonacci_directions;
 use semfm::geom::{Mesh, Pinhole, Task};
+use semfm::upright::upright;
 use semfm::views::{RigSettings, camera_towards, triangle_ids};
 
 use super::pair_rotation::{Standing, WeightedMesh, pair_rotation};
-use super::upright::upright;
 use crate::Result;
 
 /// Side of the small pictures that the viewpoints are chosen by, and how many there are.
@@ -211,7 +211,7 @@ fn best_of(candidates: impl Iterator<Item = usize>, scores: &[f64]) -> Option<us
 mod tests {
     use semfm_geom::zoo;
 
-    use super::super::upright::tests::turned;
+    use super::super::pair_rotation::tests::turned;
     use super::*;
 
     #[test]

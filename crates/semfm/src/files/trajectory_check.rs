@@ -92,3 +92,53 @@ fn check_point(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use semfm_motion::SegmentKind;
+
+    use super::*;
+
+    fn point(time: f64, q: f64) -> TrajectoryPoint {
+        let [positions, velocities, accelerations] = [vec![q], vec![0.0], vec![0.0]];
+        TrajectoryPoint { time, positions, velocities, accelerations, opening: 0.04 }
+    }
+
+    fn sound() -> Vec<Segment> {
+        vec![
+            Segment {
+                kind: SegmentKind::ToPreGrasp,
+                points: vec![point(0.0, 0.0), point(0.5, 0.4), point(1.0, 1.0)],
+            },
+            Segment { kind: SegmentKind::Approach, points: vec![point(1.0, 1.0), point(2.0, 1.1)] },
+        ]
+    }
+
+    #[test]
+    fn faults_are_named_by_their_place() {
+        let joints = ["a".to_owned()];
+        check_segments(Path::new("t.json"), &joints, &sound()).unwrap();
+        let spoil: [(&str, fn(&mut Vec<Segment>)); 10] = [
+            ("segments", |s| s.clear()),
+            ("segments[1].points", |s| s[1].points.truncate(1)),
+            ("segments[0].points[1].time", |s| s[0].points[1].time = 0.0),
+            ("segments[0].points[0].time", |s| s[0].points[0].time = 0.1),
+            ("segments[1].points[0].time", |s| s[1].points[0].time = 1.2),
+            ("segments[1].points[0].positions", |s| s[1].points[0].positions[0] = 1.01),
+            ("segments[1].points[1].velocities", |s| s[1].points[1].velocities[0] = 0.1),
+            ("segments[0].points[1].accelerations", |s| s[0].points[1].accelerations.push(0.0)),
+            ("segments[0].points[1].positions", |s| s[0].points[1].positions[0] = f64::NAN),
+            ("segments[0].points[2].opening", |s| s[0].points[2].opening = -0.1),
+        ];
+        for (place, spoil) in spoil {
+            let mut segments = sound();
+            spoil(&mut segments);
+            let error = check_segments(Path::new("t.json"), &joints, &segments).unwrap_err();
+            assert_eq!(error.place().as_deref(), Some(place), "{error}");
+        }
+        for names in [vec![], vec!["a".to_owned(); 2], vec![String::new()]] {
+            let error = check_segments(Path::new("t.json"), &names, &sound()).unwrap_err();
+            assert_eq!(error.place().as_deref(), Some("joint_names"), "{error}");
+        }
+    }
+}

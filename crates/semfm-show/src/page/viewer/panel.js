@@ -19,7 +19,7 @@ class Panel {
     this.positions = data.positions;
     this.faces = data.faces;
     this.layers = data.layers;
-    // Hands that stand at the object, if there are any.
+    // What stands or moves beside the mesh: hands, or an arm.
     this.hands = data.hands;
     // The place on the first object that each vertex is matched to: its own, until panels are linked.
     this.matched = data.positions;

@@ -1,7 +1,7 @@
 // The page: groups of panels side by side, in one of several layers of colour. Data: {plain, marked,
 // groups: [{title, facts: [{name, value}], layers: [{name, kind, legend: [{color, text}]}], panels: [{name,
 // note, n, step, positions, faces, upright, yaw, pitch, colors}], sourceOf, pictures: [{name, png, yaw,
-// pitch}], hands}]}. Arrays are read by `decode.js`, hands by `hands.js`.
+// pitch}], hands, motion}]}. Arrays are read by `decode.js`, hands by `hands.js`, motions by `motion.js`.
 
 const VERDICTS = ["accept", "check", "refuse"];
 const TOO_OLD = "This browser is too old for this page: it cannot decompress the meshes (DecompressionStream). Open it in one from 2023 or newer.";
@@ -155,9 +155,19 @@ function pictureButton({ name, png, yaw, pitch }, panel) {
   return made;
 }
 
+// The panels, with the controls of hands or of a motion beside them.
+function figures(group, panels, hands) {
+  if (!hands) return [element("div", panels.map(panel => panel.figure), "panels")];
+  const controls = group.motion ? new MotionControls(panels[0], hands) : new HandControls(panels[0], hands);
+  panels[0].controls = controls;
+  const beside = element("div", [panels[0].figure, controls.element], "panels beside");
+  return controls.below ? [beside, controls.below] : [beside];
+}
+
 async function addGroup(painter, group, weightColors) {
   const sourceOf = group.sourceOf && await decodeNumbers(group.sourceOf);
-  const hands = group.hands && new Hands(group.hands);
+  const motion = group.motion && await Motion.decoded(group.motion);
+  const hands = group.hands ? new Hands(group.hands) : motion;
   const panels = await decodePanels(painter, group, sourceOf, hands, weightColors);
   panels.forEach(answerPointer);
   if (sourceOf) link(panels, sourceOf);
@@ -167,9 +177,7 @@ async function addGroup(painter, group, weightColors) {
     factsList(group.facts),
     element("div", [...buttons, cameraControls(panels)], "controls"),
     legend,
-    hands
-      ? element("div", [panels[0].figure, new HandControls(panels[0], hands).element], "panels beside")
-      : element("div", panels.map(panel => panel.figure), "panels"),
+    ...figures(group, panels, hands),
     element("div", group.pictures.map(picture => pictureButton(picture, panels[0])), "pictures"),
   ]));
   show(0);
