@@ -5,6 +5,7 @@
 pub(crate) mod bisection;
 mod blend;
 mod curve;
+mod edges;
 pub(crate) mod joint_space;
 mod rrt_connect;
 mod shorten;

@@ -3,6 +3,7 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::edges::edge_is_free;
 use super::joint_space::{JointSpace, between};
 use super::tree::Tree;
 use super::validity::Validity;
@@ -102,7 +103,7 @@ pub fn plan_path(
 
     for &goal in &free_goals {
         let unrolled = space.toward(start, &goals[goal]);
-        if validity.motion_is_free(start, &unrolled) {
+        if edge_is_free(validity, start, &unrolled) {
             let mut waypoints = vec![start.to_vec()];
             if unrolled != start {
                 waypoints.push(unrolled);
@@ -112,7 +113,7 @@ pub fn plan_path(
     }
 
     let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
-    let mut search = Search { space, validity, longest_edge: settings.longest_edge };
+    let search = Search { space, validity, longest_edge: settings.longest_edge };
     let mut from_start = Tree::new(space.n_joints());
     from_start.add_root(start);
     let mut from_goals = Tree::new(space.n_joints());
@@ -129,7 +130,7 @@ pub fn plan_path(
             (&mut from_goals, &mut from_start)
         };
         let Some(new) = search.extend(growing, &sample) else { continue };
-        let Some(met) = search.connect(other, &growing.node(new).to_vec()) else { continue };
+        let Some(met) = search.connect(other, growing.node(new)) else { continue };
         let (in_start, in_goals) = if start_grows { (new, met) } else { (met, new) };
         let mut waypoints = from_start.to_root(in_start);
         waypoints.reverse();
@@ -157,13 +158,13 @@ struct Search<'a, V> {
 
 impl<V: Validity> Search<'_, V> {
     /// One edge from the nearest node toward `q`, at most the longest; its end, where it is free.
-    fn extend(&mut self, tree: &mut Tree, q: &[f64]) -> Option<usize> {
+    fn extend(&self, tree: &mut Tree, q: &[f64]) -> Option<usize> {
         let nearest = tree.nearest(self.space, q);
         self.step(tree, nearest, q).map(|step| step.node)
     }
 
     /// Edges from the nearest node toward `q` until it is reached; `None` where one is not free.
-    fn connect(&mut self, tree: &mut Tree, q: &[f64]) -> Option<usize> {
+    fn connect(&self, tree: &mut Tree, q: &[f64]) -> Option<usize> {
         let mut node = tree.nearest(self.space, q);
         loop {
             let step = self.step(tree, node, q)?;
@@ -174,7 +175,7 @@ impl<V: Validity> Search<'_, V> {
         }
     }
 
-    fn step(&mut self, tree: &mut Tree, from: usize, q: &[f64]) -> Option<Step> {
+    fn step(&self, tree: &mut Tree, from: usize, q: &[f64]) -> Option<Step> {
         let start = tree.node(from);
         let distance = self.space.distance(start, q);
         let arrived = distance <= self.longest_edge;

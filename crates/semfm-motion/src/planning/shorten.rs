@@ -4,6 +4,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::edges::edge_is_free;
 use super::joint_space::{between, straight_length};
 use super::rrt_connect::path_length;
 use super::validity::Validity;
@@ -19,9 +20,10 @@ pub struct ShortenSettings {
     pub failures: usize,
 }
 
+/// On MotionBenchMaker 30 failures make paths 1 to 2 % shorter than 12 and take a quarter longer; 8 make them 1 to 2 % longer.
 impl Default for ShortenSettings {
     fn default() -> Self {
-        Self { seed: 0, chords: 200, failures: 30 }
+        Self { seed: 0, chords: 200, failures: 12 }
     }
 }
 
@@ -55,7 +57,7 @@ fn drop_waypoints(validity: &impl Validity, path: &mut Vec<Vec<f64>>) {
     let mut at = 0;
     while at + 2 < path.len() {
         if let Some(to) =
-            (at + 2..path.len()).rev().find(|&to| validity.motion_is_free(&path[at], &path[to]))
+            (at + 2..path.len()).rev().find(|&to| edge_is_free(validity, &path[at], &path[to]))
         {
             path.drain(at + 1..to);
         }
@@ -82,7 +84,7 @@ fn cut(validity: &impl Validity, path: &mut Vec<Vec<f64>>, one: f64, other: f64)
     old.extend_from_slice(&path[from.edge + 1..=to.edge]);
     old.push(to.q.clone());
     let gain = path_length(&old) - straight_length(&from.q, &to.q);
-    if gain < LEAST_GAIN * length || !validity.motion_is_free(&from.q, &to.q) {
+    if gain < LEAST_GAIN * length || !edge_is_free(validity, &from.q, &to.q) {
         return false;
     }
     path.splice(from.edge + 1..=to.edge, [from.q, to.q]);
