@@ -1862,6 +1862,186 @@ class Region:
         """
         ...
 
+class Robot:
+    """An arm: the joints of a robot between a base and a tip. Joint values are arrays of n numbers, base to tip,
+    radians or metres; poses are (4, 4) matrices in the base link's frame, metres.
+
+    Made by `Robot.from_urdf`.
+
+    Examples
+    --------
+    >>> import math, pathlib, semfm, tempfile
+    >>> link = '<link name="{}"/>'
+    >>> joint = '''<joint name="{0}{1}" type="revolute"><parent link="{0}"/><child link="{1}"/>
+    ... <origin xyz="{2} 0 0"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'''
+    >>> hand = '<joint name="h" type="fixed"><parent link="c"/><child link="d"/><origin xyz=".5 0 0"/></joint>'
+    >>> parts = [*map(link.format, "abcd"), joint.format("a", "b", 0), joint.format("b", "c", 0.5), hand]
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "planar.urdf"
+    >>> _ = path.write_text(f'<robot name="planar">{"".join(parts)}</robot>')
+    >>> robot = semfm.Robot.from_urdf(path, tip="d")
+    >>> robot.joint_names
+    ['ab', 'bc']
+    >>> pose = robot.forward([math.pi / 6, math.pi / 3])
+    >>> pose[:3, 3].round(3).tolist()
+    [0.433, 0.75, 0.0]
+    >>> robot.solve_ik(pose)["solutions"].round(3).tolist()
+    [[0.524, 1.047]]
+    """
+    @property
+    def acceleration_limits(self) -> NDArray[numpy.float64]:
+        """(n,) float64 array: greatest acceleration of each joint, per second squared."""
+        ...
+    @property
+    def base(self) -> str:
+        """str: the link in whose frame poses are told."""
+        ...
+    def forward(self, q: ArrayLike) -> NDArray[numpy.float64]:
+        """The pose of the tip (forward kinematics). Limits are not asked for.
+
+        Parameters
+        ----------
+        q : (n,) array_like
+            Joint values.
+
+        Returns
+        -------
+        (4, 4) float64 array
+        """
+        ...
+    @staticmethod
+    def from_urdf(urdf: _Path, *, srdf: Optional[_Path] = None, limits: Optional[_Path] = None, base: Optional[str] = None, tip: Optional[str] = None, fixed: Optional[Mapping[str, Any]] = None) -> Robot:
+        """Reads an arm from its files.
+
+        Parameters
+        ----------
+        urdf : path
+            Links and joints.
+        srdf : path, optional
+            The chain that is meant as the arm, and named states.
+        limits : path, optional
+            Joint limits as MoveIt writes them (``joint_limits.yaml``).
+        base : str, optional
+            The link in whose frame poses are told; by default the SRDF's, or the root.
+        tip : str, optional
+            The link that the arm moves; by default the SRDF's, or the end of the one chain of joints.
+        fixed : dict, optional
+            Positions of joints outside the chain by name, such as fingers.
+
+        Returns
+        -------
+        Robot
+        """
+        ...
+    def jacobian(self, q: ArrayLike) -> NDArray[numpy.float64]:
+        """How fast the tip moves for each joint.
+
+        Parameters
+        ----------
+        q : (n,) array_like
+            Joint values.
+
+        Returns
+        -------
+        (6, n) float64 array
+            Linear above angular velocity of the tip's frame, in the base's frame.
+        """
+        ...
+    @property
+    def joint_names(self) -> list[str]:
+        """list of str: names of the joints, base to tip."""
+        ...
+    @property
+    def limits(self) -> NDArray[numpy.float64]:
+        """(n, 2) float64 array: lowest and highest position of each joint; infinite where there is no limit."""
+        ...
+    def link_poses(self, q: ArrayLike) -> dict[str, Any]:
+        """The pose of every link. Joints outside the chain stand where they were fixed, mimics follow.
+
+        Parameters
+        ----------
+        q : (n,) array_like
+            Joint values.
+
+        Returns
+        -------
+        dict
+            (4, 4) float64 arrays by the names of the links.
+        """
+        ...
+    def manipulability(self, q: ArrayLike) -> float:
+        """How easily the tip moves in every direction (Yoshikawa's measure); zero at a singular position.
+
+        Parameters
+        ----------
+        q : (n,) array_like
+            Joint values.
+
+        Returns
+        -------
+        float
+        """
+        ...
+    @property
+    def n_joints(self) -> int:
+        """int: number of joints."""
+        ...
+    @property
+    def name(self) -> str:
+        """str: as in the URDF."""
+        ...
+    @property
+    def notes(self) -> list[str]:
+        """list of str: what was found, assumed or passed over when the files were read."""
+        ...
+    def solve_ik(self, pose: ArrayLike, *, near: Optional[ArrayLike] = None, solutions: int = 8, restarts: int = 50, seed: int = 0, preference: str = 'none') -> dict[str, Any]:
+        """Joint values that bring the tip to a pose (inverse kinematics). Each solution was checked by forward kinematics.
+
+        Parameters
+        ----------
+        pose : (4, 4) array_like
+            Where the tip shall be, in the base's frame.
+        near : (n,) array_like, optional
+            Where the search begins; by default zero, or the limit next to it.
+        solutions : int, default 8
+            Distinct solutions to look for: more than .1 rad apart, whole turns aside.
+        restarts : int, default 50
+            Random starts in a row without a new solution after which the search ends.
+        seed : int, default 0
+            Of the random starts.
+        preference : str, default "none"
+            What an arm with more joints than it needs does with them: ``"none"``, ``"near"`` (to where the search
+            began), ``"limits"`` (away from them) or ``"manipulability"``.
+
+        Returns
+        -------
+        dict
+            ``solutions`` (k, n), the nearest to `near` first, with ``position_errors`` (k,), metres, and
+            ``rotation_errors`` (k,), radians; where none was found, ``closest`` is a dict of ``positions`` (n,),
+            ``position_error`` and ``rotation_error`` of the best try, else None; ``tries``, how often the search began.
+        """
+        ...
+    def state(self, name: str) -> NDArray[numpy.float64]:
+        """Joint values of a state that the SRDF names.
+
+        Parameters
+        ----------
+        name : str
+            Of the state.
+
+        Returns
+        -------
+        (n,) float64 array
+        """
+        ...
+    @property
+    def tip(self) -> str:
+        """str: the link that the arm moves."""
+        ...
+    @property
+    def velocity_limits(self) -> NDArray[numpy.float64]:
+        """(n,) float64 array: greatest speed of each joint, per second."""
+        ...
+
 class SemanticCloud:
     """Points on an object's surface, each with a feature vector.
 

@@ -23,6 +23,7 @@ from typing import Any, Callable, Optional
 import numpy as np
 import semfm
 from semfm import _semfm
+from small_arm import write_arm
 
 STUBS = Path(semfm.__file__).with_name("_semfm.pyi")
 #: Runs other programs' code, or changes the process.
@@ -98,7 +99,7 @@ class Caller:
         self.numbers = np.random.default_rng(seed)
         self.folder = folder
         self.pool: dict[str, list[Any]] = {}
-        for value in ordinary_objects():
+        for value in ordinary_objects(folder):
             self.keep(value)
 
     def keep(self, value: Any) -> None:
@@ -181,6 +182,7 @@ class Caller:
 
     def path(self) -> Any:
         names = ("new.json", "new.ply", "new.npz", "garbage.obj", "garbage.json", "empty.ply", "out")
+        names += ("small.urdf",)
         name = self.chosen(*names, "no/such/folder/x.ply", "a\0b", "")
         return self.chosen(str(self.folder / name), self.folder / name, str(self.folder))
 
@@ -274,7 +276,7 @@ def short(value: Any) -> str:
     return repr(value)[:120]
 
 
-def ordinary_objects() -> list[Any]:
+def ordinary_objects(folder: Path) -> list[Any]:
     """One small object of every class, and meshes that are hard."""
     mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=150) for i in (0, 1))
     features = [each.shared_features() for each in (mug, kettle)]
@@ -293,6 +295,7 @@ def ordinary_objects() -> list[Any]:
     grasps = semfm.find_grasps(ball, whole, gripper, scale=0.03, n_samples=30, top=3)
     points = semfm.sample_uniform(mug.mesh, 200)[0] * 0.1 + np.array([0, 0, 1.0])
     alignment = semfm.align(mug.mesh, points, viewpoint=None, n_starts=4)
+    robot = semfm.Robot.from_urdf(write_arm(folder))
     shape, basis = source.shape, source.shape.basis
     triangle = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     flat = semfm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
@@ -307,7 +310,7 @@ def ordinary_objects() -> list[Any]:
         mug, source, matching, result, shape, basis, shape.laplacian, source.cloud, matching.anchors,
         semfm.Clusters([0, 1, 0]), matching.functional_map, result.point_map, mug.region, whole,
         result.hypotheses, semfm.TransferSettings("nearest"), camera, view, patches, embeddings,
-        semfm.ViewsFile(ball, [view]), gripper, grasps, list(grasps), alignment,
+        semfm.ViewsFile(ball, [view]), gripper, grasps, list(grasps), alignment, robot,
         semfm.SurfaceIndex(ball), semfm.HeatGeodesics(ball),
         huge, tiny, alone,
     ]  # fmt: skip

@@ -35,6 +35,7 @@ mod pinhole;
 mod point_map;
 mod prepared;
 mod region;
+mod robot;
 mod settings;
 mod shape;
 mod shared;
@@ -93,6 +94,8 @@ mod _semfm {
     use crate::prepared::{_restore_prepared, PreparedObject, prepare};
     #[pymodule_export]
     use crate::region::Region;
+    #[pymodule_export]
+    use crate::robot::{_restore_robot, Robot};
     #[pymodule_export]
     use crate::settings::{_restore_settings, TransferSettings};
     #[pymodule_export]

@@ -13,6 +13,8 @@ use semfm_robot::{
 /// A column that slides, an arm whose wrist follows its elbow, a tool, a finger; on a base that is turned.
 const ARM: &str = r#"<robot name="arm"><link name="world"/><link name="base"/><link name="column"/>
     <link name="upper"/><link name="fore"/><link name="hand"/><link name="tool0"/><link name="finger"/>
+    <link name="mark"/><joint name="mark" type="fixed"><parent link="base"/><child link="mark"/>
+      <origin xyz="0.3 0 0" rpy="0 0.5 3.1"/></joint>
     <joint name="stand" type="fixed"><parent link="world"/><child link="base"/>
       <origin xyz="0 0 0.9" rpy="0 0 1.5707963267948966"/></joint>
     <joint name="lift" type="prismatic"><parent link="base"/><child link="column"/><axis xyz="0 0 1"/>
@@ -177,7 +179,7 @@ proptest! {
     fn chain_and_links_agree_from_any_base_and_the_jacobian_is_the_derivative(
         lift in -0.2..0.5, shoulder in -PI..PI, elbow in -1.5..2.5, twist in -3.0..3.0,
     ) {
-        for base in ["world", "base", "column"] {
+        for base in ["world", "base", "column", "mark"] {
             let arm = Arm::new(robot(ARM), &ArmSettings { base: Some(base.into()), ..settings() }).unwrap();
             let all = [lift, shoulder, elbow, twist];
             let q = &all[4 - arm.n_joints()..];

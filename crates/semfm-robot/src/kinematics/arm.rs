@@ -22,7 +22,7 @@ const MAX_JOINTS: usize = 100;
 /// What a description does not say. The default finds base and tip by itself.
 #[derive(Clone, Debug, Default)]
 pub struct ArmSettings {
-    /// The link in whose frame poses are told; by default the root.
+    /// The link in whose frame poses are told, on the way to the tip or fixed to a link there; by default the root.
     pub base: Option<String>,
     /// The link that the arm moves; by default the end of the one chain of joints from the base, a frame that is named
     /// as such (`tool0`, `flange`, …) where there is one.
@@ -69,7 +69,7 @@ impl Arm {
         let positions = fixed_positions(&robot, &variables, &settings.fixed)?;
         let follows = follows(&robot, &variables, &positions);
         let joints = joints(&robot, &variables, settings.limits.as_ref(), &mut notes)?;
-        let chain = Chain::new(&robot, &ends.path, &follows);
+        let chain = Chain::new(&robot, ends.base_from_start, &ends.path, &follows);
         Ok(Self { base: ends.base, tip: ends.tip, joints, follows, chain, notes, robot })
     }
 

@@ -63,9 +63,9 @@ impl From<&Pose> for Frame {
 }
 
 impl Chain {
-    /// `path`: joints of the robot from base to tip; `follows`: one a joint of the robot.
-    pub fn new(robot: &Robot, path: &[usize], follows: &[Follows]) -> Self {
-        let mut before = Pose::IDENTITY;
+    /// `path`: joints of the robot from where it starts to the tip; `follows`: one a joint of the robot.
+    pub fn new(robot: &Robot, base_from_start: Pose, path: &[usize], follows: &[Follows]) -> Self {
+        let mut before = base_from_start;
         let mut joints = Vec::new();
         for &index in path {
             let joint = &robot.joints[index];

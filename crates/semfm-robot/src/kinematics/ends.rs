@@ -1,5 +1,6 @@
 //! Which links an arm begins and ends at.
 
+use parry3d_f64::math::Pose;
 use semfm_geom::suggestion::unknown_name;
 
 use crate::joint::JointKind;
@@ -29,6 +30,8 @@ const TIP_NAMES: [&str; 8] = [
 pub(super) struct Ends {
     pub base: usize,
     pub tip: usize,
+    /// Where the path begins, in the base's frame: they differ where the base is a frame beside the chain.
+    pub base_from_start: Pose,
     /// Joints from base to tip.
     pub path: Vec<usize>,
     pub notes: Vec<String>,
@@ -53,7 +56,11 @@ pub(super) fn find(robot: &Robot, base: Option<&str>, tip: Option<&str>) -> Resu
         }
     };
     let path = path(robot, base_link, tip_link)?;
-    Ok(Ends { base: base_link, tip: tip_link, path, notes })
+    let start = path.first().map_or(tip_link, |&joint| robot.joints[joint].parent);
+    // Both are one rigid body, so positions do not matter.
+    let poses = robot.link_poses(&[]);
+    let base_from_start = poses[base_link].inverse() * poses[start];
+    Ok(Ends { base: base_link, tip: tip_link, base_from_start, path, notes })
 }
 
 fn link(robot: &Robot, what: &str, name: &str) -> Result<usize> {
@@ -64,12 +71,13 @@ fn link(robot: &Robot, what: &str, name: &str) -> Result<usize> {
     })
 }
 
-/// Joints from base to tip.
+/// Joints from base to tip. The base may be any link that is fixed to one on the way from the root to the tip.
 fn path(robot: &Robot, base: usize, tip: usize) -> Result<Vec<usize>> {
     let mut joint_to = vec![None; robot.links.len()];
     robot.joints.iter().enumerate().for_each(|(i, joint)| joint_to[joint.child] = Some(i));
+    let fixed_to = rigid_bodies(robot);
     let (mut path, mut at) = (Vec::new(), tip);
-    while at != base {
+    while fixed_to[at] != fixed_to[base] {
         let Some(joint) = joint_to[at] else {
             let [base, tip] = [base, tip].map(|link| &robot.links[link].name);
             return Err(Error::Arm {
@@ -97,6 +105,16 @@ fn path(robot: &Robot, base: usize, tip: usize) -> Result<Vec<usize>> {
         }
     }
     Ok(path)
+}
+
+/// For each link, the top link of all that is fixed to it by joints of the type `fixed`. [`Robot::bodies`] also joins
+/// what may float.
+fn rigid_bodies(robot: &Robot) -> Vec<usize> {
+    let mut bodies: Vec<usize> = (0..robot.links.len()).collect();
+    for joint in robot.joints.iter().filter(|joint| joint.kind == JointKind::Fixed) {
+        bodies[joint.child] = bodies[joint.parent];
+    }
+    bodies
 }
 
 /// The end of the one arm: from the base along the joints, as long as one of them leads on to an arm.
