@@ -4,11 +4,12 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
+use semfm_geom::math::DVec3;
 
 use super::body::{CollisionBody, Frame, body_gap};
 use super::convex::depth;
 use super::model::CollisionModel;
-use super::moving_body::{Carried, MovingBody};
+use super::moving_body::{Carried, MovingBody, RigidGroup};
 use super::scene::Scene;
 use crate::planning::Contact;
 use crate::{Error, Result};
@@ -41,23 +42,28 @@ pub struct CollisionChecker {
     allowed: Vec<[String; 2]>,
     /// Links with a shape, then attached bodies.
     pub(super) bodies: Arc<[MovingBody]>,
-    /// Pairs of bodies with the number of joints that move both alike.
-    pub(super) body_pairs: Vec<BodyPair>,
-    /// Bodies and obstacles.
+    /// The same bodies, by what moves them.
+    pub(super) groups: Arc<[RigidGroup]>,
+    pub(super) group_pairs: Vec<GroupPair>,
     pub(super) scene_pairs: Vec<ScenePair>,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct BodyPair {
+/// Two groups, and which of their bodies are checked against each other.
+#[derive(Clone, Debug)]
+pub(super) struct GroupPair {
     pub(super) a: usize,
     pub(super) b: usize,
+    /// Number of joints that move both alike.
     pub(super) common: usize,
+    bodies: Vec<[usize; 2]>,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// A group and an obstacle, and which of the group's bodies are checked against it.
+#[derive(Clone, Debug)]
 pub(super) struct ScenePair {
-    pub(super) body: usize,
-    pub(super) obstacle: usize,
+    pub(super) group: usize,
+    obstacle: usize,
+    bodies: Vec<usize>,
 }
 
 /// Memory of one thread for one question after the other.
@@ -65,6 +71,8 @@ pub(super) struct ScenePair {
 pub(super) struct Scratch {
     pub(super) base_from_link: Vec<Pose>,
     pub(super) frames: Vec<Frame>,
+    /// Centres of the groups' spheres.
+    pub(super) centres: Vec<DVec3>,
     pub(super) carried: Vec<Carried>,
     pub(super) travel: Vec<f64>,
     pub(super) q: Vec<f64>,
@@ -86,8 +94,8 @@ impl CollisionChecker {
     pub fn new(model: Arc<CollisionModel>, scene: Scene) -> Result<Self> {
         let bodies: Arc<[MovingBody]> = model.moving_bodies().into();
         let (attached, allowed) = (Vec::new(), Vec::new());
-        let (body_pairs, scene_pairs) = (Vec::new(), Vec::new());
-        Self { model, scene, attached, allowed, bodies, body_pairs, scene_pairs }.paired()
+        let (groups, group_pairs, scene_pairs) = (Arc::default(), Vec::new(), Vec::new());
+        Self { model, scene, attached, allowed, bodies, groups, group_pairs, scene_pairs }.paired()
     }
 
     /// The same in another scene; what may touch stays.
@@ -177,11 +185,11 @@ impl CollisionChecker {
                 let contact = self.contact();
                 self.scene_pairs
                     .iter()
-                    .all(|pair| self.scene_gap(pair, &scratch.frames, contact) >= contact)
+                    .all(|pair| self.scene_gap(pair, scratch, contact) >= contact)
                     && self
-                        .body_pairs
+                        .group_pairs
                         .iter()
-                        .all(|pair| self.body_gap(pair, &scratch.frames, contact) >= contact)
+                        .all(|pair| self.group_gap(pair, scratch, contact) >= contact)
             })
     }
 
@@ -195,10 +203,10 @@ impl CollisionChecker {
             self.place(q, scratch);
             let mut least = FAR;
             for pair in &self.scene_pairs {
-                least = least.min(self.scene_gap(pair, &scratch.frames, least));
+                least = least.min(self.scene_gap(pair, scratch, least));
             }
-            for pair in &self.body_pairs {
-                least = least.min(self.body_gap(pair, &scratch.frames, least));
+            for pair in &self.group_pairs {
+                least = least.min(self.group_gap(pair, scratch, least));
             }
             if least < self.contact() { 0.0 } else { least }
         })
@@ -215,22 +223,26 @@ impl CollisionChecker {
         let mut contacts = with_scratch(|scratch| {
             self.place(q, scratch);
             let frames = &scratch.frames;
-            let scene = self.scene_pairs.iter().filter_map(|pair| {
-                (self.scene_gap(pair, frames, contact) < contact).then(|| Contact {
-                    a: self.bodies[pair.body].name.clone(),
-                    b: self.scene.obstacles()[pair.obstacle].name.clone(),
-                    depth: self.scene.obstacles()[pair.obstacle]
-                        .depth(&self.bodies[pair.body].body, &frames[pair.body]),
-                })
-            });
-            let bodies = self.body_pairs.iter().filter_map(|pair| {
-                (self.body_gap(pair, frames, contact) < contact).then(|| Contact {
-                    a: self.bodies[pair.a].name.clone(),
-                    b: self.bodies[pair.b].name.clone(),
-                    depth: self.depth(pair, frames),
-                })
-            });
-            scene.chain(bodies).collect::<Vec<_>>()
+            let mut contacts = Vec::new();
+            for pair in &self.scene_pairs {
+                let obstacle = &self.scene.obstacles()[pair.obstacle];
+                for &i in &pair.bodies {
+                    let MovingBody { name, body, .. } = &self.bodies[i];
+                    if obstacle.gap(body, &frames[i], contact) < contact {
+                        let depth = obstacle.depth(body, &frames[i]);
+                        contacts.push(Contact { a: name.clone(), b: obstacle.name.clone(), depth });
+                    }
+                }
+            }
+            for &[a, b] in self.group_pairs.iter().flat_map(|pair| &pair.bodies) {
+                if self.body_gap(a, b, frames, contact) < contact {
+                    let depth = self.depth(a, b, frames);
+                    let names = [a, b].map(|body| self.bodies[body].name.clone());
+                    let [a, b] = names;
+                    contacts.push(Contact { a, b, depth });
+                }
+            }
+            contacts
         });
         contacts.sort_by(|a, b| b.depth.total_cmp(&a.depth));
         contacts
@@ -254,25 +266,51 @@ impl CollisionChecker {
         self.model.arm().link_poses(q, &mut scratch.base_from_link);
         scratch.frames.clear();
         scratch.frames.extend(self.bodies.iter().map(|body| body.frame(&scratch.base_from_link)));
+        scratch.centres.clear();
+        let centres = self.groups.iter().map(|group| group.centre(&scratch.base_from_link));
+        scratch.centres.extend(centres);
     }
 
-    pub(super) fn scene_gap(&self, pair: &ScenePair, frames: &[Frame], most: f64) -> f64 {
-        let body = &self.bodies[pair.body].body;
-        self.scene.obstacles()[pair.obstacle].gap(body, &frames[pair.body], most)
+    /// A lower bound of the distance between a group and an obstacle, exact where it is small; `most` where it is that
+    /// or more, 0 where they meet.
+    pub(super) fn scene_gap(&self, pair: &ScenePair, scratch: &Scratch, most: f64) -> f64 {
+        let obstacle = &self.scene.obstacles()[pair.obstacle];
+        let group = &self.groups[pair.group];
+        if obstacle.bound_distance(scratch.centres[pair.group]) - group.radius >= most {
+            return most;
+        }
+        let mut least = most;
+        for &body in &pair.bodies {
+            least = obstacle.gap(&self.bodies[body].body, &scratch.frames[body], least);
+        }
+        least
     }
 
-    pub(super) fn body_gap(&self, pair: &BodyPair, frames: &[Frame], most: f64) -> f64 {
-        let [a, b] = [pair.a, pair.b].map(|body| (&self.bodies[body].body, &frames[body]));
-        body_gap(a.0, a.1, b.0, b.1, most)
+    /// The same between two groups.
+    pub(super) fn group_gap(&self, pair: &GroupPair, scratch: &Scratch, most: f64) -> f64 {
+        let apart = scratch.centres[pair.a].distance(scratch.centres[pair.b]);
+        if apart - self.groups[pair.a].radius - self.groups[pair.b].radius >= most {
+            return most;
+        }
+        let mut least = most;
+        for &[a, b] in &pair.bodies {
+            least = self.body_gap(a, b, &scratch.frames, least);
+        }
+        least
     }
 
-    fn depth(&self, pair: &BodyPair, frames: &[Frame]) -> f64 {
+    fn body_gap(&self, a: usize, b: usize, frames: &[Frame], most: f64) -> f64 {
+        body_gap(&self.bodies[a].body, &frames[a], &self.bodies[b].body, &frames[b], most)
+    }
+
+    fn depth(&self, a: usize, b: usize, frames: &[Frame]) -> f64 {
         let mut deepest = 0.0_f64;
-        for a in self.bodies[pair.a].body.pieces() {
-            let a_at = frames[pair.a].pose * a.body_from_piece;
-            for b in self.bodies[pair.b].body.pieces() {
-                let b_at = frames[pair.b].pose * b.body_from_piece;
-                deepest = deepest.max(depth(&a_at.inv_mul(&b_at), &a.convex, &b.convex));
+        for piece_a in self.bodies[a].body.pieces() {
+            let a_at = frames[a].pose * piece_a.body_from_piece;
+            for piece_b in self.bodies[b].body.pieces() {
+                let b_at = frames[b].pose * piece_b.body_from_piece;
+                let found = depth(&a_at.inv_mul(&b_at), &piece_a.convex, &piece_b.convex);
+                deepest = deepest.max(found);
             }
         }
         deepest
@@ -294,24 +332,27 @@ impl CollisionChecker {
         let n_links = self.model.moving_bodies().len();
         let of_attached = (n_links..bodies.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
         let pairs = self.model.pairs().iter().copied().chain(of_attached);
-        self.body_pairs = pairs
+        let checked: Vec<[usize; 2]> = pairs
             .filter(|&[a, b]| {
                 !bodies[a].is_fixed_to(&bodies[b]) && !may_touch(&bodies[a].name, &bodies[b].name)
             })
-            .map(|[a, b]| BodyPair { a, b, common: bodies[a].n_common(&bodies[b]) })
             .collect();
+        let groups = RigidGroup::of_bodies(self.model.arm(), bodies);
+        self.group_pairs = group_pairs(&groups, &checked);
         // The hand is nearest to what it works on: of all links it is the likeliest to touch, so it comes first.
-        self.scene_pairs = (0..bodies.len())
-            .rev()
-            .filter(|&body| !bodies[body].path.is_empty())
-            .flat_map(|body| {
-                (0..self.scene.obstacles().len()).map(move |obstacle| ScenePair { body, obstacle })
-            })
-            .filter(|pair| {
-                let obstacle = &self.scene.obstacles()[pair.obstacle];
-                !may_touch(&bodies[pair.body].name, &obstacle.name)
-            })
-            .collect();
+        let moving = groups.iter().enumerate().rev().filter(|(_, group)| !group.path.is_empty());
+        let mut scene_pairs = Vec::new();
+        for (group, RigidGroup { members, .. }) in moving {
+            for (obstacle, name) in self.scene.names().enumerate() {
+                let checked = |&&body: &&usize| !may_touch(&bodies[body].name, name);
+                let bodies: Vec<usize> = members.iter().filter(checked).copied().collect();
+                if !bodies.is_empty() {
+                    scene_pairs.push(ScenePair { group, obstacle, bodies });
+                }
+            }
+        }
+        self.scene_pairs = scene_pairs;
+        self.groups = groups.into();
         Ok(self)
     }
 
@@ -329,6 +370,23 @@ impl CollisionChecker {
             }),
         }
     }
+}
+
+/// Pairs of bodies, by the groups that they belong to.
+fn group_pairs(groups: &[RigidGroup], checked: &[[usize; 2]]) -> Vec<GroupPair> {
+    let group_of = |body: usize| groups.iter().position(|group| group.members.contains(&body));
+    let mut pairs: Vec<GroupPair> = Vec::new();
+    for &[i, j] in checked {
+        let (Some(a), Some(b)) = (group_of(i), group_of(j)) else { continue };
+        match pairs.iter_mut().find(|pair| (pair.a, pair.b) == (a, b)) {
+            Some(pair) => pair.bodies.push([i, j]),
+            None => {
+                let common = groups[a].n_common(&groups[b]);
+                pairs.push(GroupPair { a, b, common, bodies: vec![[i, j]] });
+            }
+        }
+    }
+    pairs
 }
 
 impl AttachedBody {

@@ -95,14 +95,16 @@ impl Convex {
     }
 
     /// Distance from a point in the shape's frame, 0 inside; of cores that have a formula, else `None`.
+    #[inline]
     pub(crate) fn point_distance(&self, p: DVec3) -> Option<f64> {
         let distance = match self.core {
             Core::Point => p.length(),
             Core::Segment { half } => DVec3::new(p.x, p.y, (p.z.abs() - half).max(0.0)).length(),
             Core::Cuboid { half } => (p.abs() - half).max(DVec3::ZERO).length(),
             Core::Cylinder { radius, half } => {
-                let beside = (p.x.hypot(p.y) - radius).max(0.0);
-                beside.hypot((p.z.abs() - half).max(0.0))
+                let beside = ((p.x * p.x + p.y * p.y).sqrt() - radius).max(0.0);
+                let above = (p.z.abs() - half).max(0.0);
+                (beside * beside + above * above).sqrt()
             }
             Core::Triangle(corners) => return Some(triangle_distance(corners, p) - self.rounding),
             Core::Hull(_) => return None,
@@ -125,7 +127,7 @@ impl SupportMap for Core {
             Self::Segment { half } => DVec3::new(0.0, 0.0, half.copysign(direction.z)),
             Self::Cuboid { half } => half.copysign(direction),
             Self::Cylinder { radius, half } => {
-                let beside = direction.x.hypot(direction.y);
+                let beside = (direction.x * direction.x + direction.y * direction.y).sqrt();
                 let factor = if beside > 0.0 { radius / beside } else { 0.0 };
                 DVec3::new(factor * direction.x, factor * direction.y, half.copysign(direction.z))
             }

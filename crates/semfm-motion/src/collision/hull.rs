@@ -45,7 +45,7 @@ impl Hull {
             return farthest_of(&self.corners, direction);
         }
         let cell = cell_of(direction);
-        let [from, to] = [self.starts[cell], self.starts[cell + 1]].map(|i| i as usize);
+        let (from, to) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
         farthest_of(&self.candidates[from..to], direction)
     }
 }

@@ -4,8 +4,8 @@ use super::checker::{CollisionChecker, Scratch, with_scratch};
 use super::moving_body::Carried;
 use crate::planning::{Contact, Validity};
 
-/// Distances are looked at as far as this, metres: what is farther away is not worth the look. On the problems of
-/// MotionBenchMaker .05 and .2 take a fifth longer.
+/// Distances are looked at as far as this, metres: what is farther away is not worth the look. For the motions of
+/// `check_problems` (crates/semfm/examples) .05 takes a quarter longer, and .2 as long.
 const LOOK: f64 = 0.1;
 
 impl CollisionChecker {
@@ -23,9 +23,9 @@ impl CollisionChecker {
         with_scratch(|scratch| {
             scratch.travel.clear();
             scratch.travel.extend(from.iter().zip(to).map(|(from, to)| (to - from).abs()));
-            scratch.carried.resize_with(self.bodies.len(), Default::default);
-            for (body, carried) in self.bodies.iter().zip(&mut scratch.carried) {
-                body.set_travel(&scratch.travel, carried);
+            scratch.carried.resize_with(self.groups.len(), Default::default);
+            for (group, carried) in self.groups.iter().zip(&mut scratch.carried) {
+                group.set_travel(&scratch.travel, carried);
             }
             scratch.open.clear();
             // The far end is the likelier to touch: the near one is mostly where the last motion ended.
@@ -66,17 +66,17 @@ impl CollisionChecker {
         q.extend(from.iter().zip(to).map(|(from, to)| from + time * (to - from)));
         self.place(&q, scratch);
         scratch.q = q;
-        let Scratch { base_from_link, frames, carried, travel, .. } = scratch;
-        for ((body, carried), frame) in self.bodies.iter().zip(carried.iter_mut()).zip(&*frames) {
-            body.set_state(travel, base_from_link, frame, carried);
+        let Scratch { base_from_link, centres, carried, travel, .. } = scratch;
+        for ((group, carried), &centre) in self.groups.iter().zip(carried).zip(&*centres) {
+            group.set_state(travel, base_from_link, centre, carried);
         }
         let contact = self.contact();
         let kept = 0.5 * contact;
         let mut share = most;
         for pair in &self.scene_pairs {
-            let approach = carried[pair.body].after(0);
+            let approach = scratch.carried[pair.group].after(0);
             let wanted = (approach.gap(share) + kept).clamp(contact, LOOK);
-            let gap = self.scene_gap(pair, frames, wanted);
+            let gap = self.scene_gap(pair, scratch, wanted);
             if gap < contact {
                 return None;
             }
@@ -85,11 +85,12 @@ impl CollisionChecker {
                 share = share.min(approach.share(gap - kept));
             }
         }
-        for pair in &self.body_pairs {
-            let [a, b] = [pair.a, pair.b].map(|body| carried[body].after(pair.common));
-            let approach = a.and(&b);
+        for pair in &self.group_pairs {
+            let common = pair.common;
+            let a = scratch.carried[pair.a].after(common);
+            let approach = a.and(&scratch.carried[pair.b].after(common));
             let wanted = (approach.gap(share) + kept).clamp(contact, LOOK);
-            let gap = self.body_gap(pair, frames, wanted);
+            let gap = self.group_gap(pair, scratch, wanted);
             if gap < contact {
                 return None;
             }
@@ -116,8 +117,8 @@ impl Validity for CollisionChecker {
 
     fn displacement(&self, travel: &[f64]) -> f64 {
         let mut carried = Carried::default();
-        let ways = self.bodies.iter().map(|body| {
-            body.set_travel(travel, &mut carried);
+        let ways = self.groups.iter().map(|group| {
+            group.set_travel(travel, &mut carried);
             carried.anywhere()
         });
         ways.fold(0.0, f64::max)

@@ -20,6 +20,19 @@ pub(crate) struct MovingBody {
     pub(crate) path: Vec<PathJoint>,
 }
 
+/// Bodies that never move against each other, within one sphere.
+#[derive(Clone, Debug)]
+pub(crate) struct RigidGroup {
+    /// Places in the list of bodies, ascending.
+    pub(crate) members: Vec<usize>,
+    /// The link in whose frame the sphere's centre is told.
+    link: usize,
+    centre: DVec3,
+    pub(crate) radius: f64,
+    /// The joints that move it, base to link.
+    pub(crate) path: Vec<PathJoint>,
+}
+
 /// A joint that moves a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PathJoint {
@@ -37,7 +50,7 @@ pub(crate) struct PathJoint {
     reach: f64,
 }
 
-/// Upper bounds of how far a motion carries a body, up to each joint of its path: entry k sums over the first k joints.
+/// Upper bounds of how far a motion carries a group, up to each joint of its path: entry k sums over the first k joints.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Carried {
     /// Σ |Δ| · reach, metres, wherever the arm is.
@@ -72,16 +85,55 @@ impl MovingBody {
         Frame::new(base_from_link[self.link] * self.link_from_body)
     }
 
-    /// Number of joints that move this body and the other alike.
-    pub(crate) fn n_common(&self, other: &Self) -> usize {
-        let pairs = self.path.iter().zip(&other.path);
-        pairs.take_while(|(a, b)| a.joint == b.joint).count()
-    }
-
     /// Whether the two never move against each other.
     pub(crate) fn is_fixed_to(&self, other: &Self) -> bool {
-        let common = self.n_common(other);
+        let common = n_common(&self.path, &other.path);
         common == self.path.len() && common == other.path.len()
+    }
+}
+
+impl RigidGroup {
+    /// Sorts bodies into groups, in the order of their first members.
+    pub(crate) fn of_bodies(arm: &Arm, bodies: &[MovingBody]) -> Vec<Self> {
+        let mut members: Vec<Vec<usize>> = Vec::new();
+        for (i, body) in bodies.iter().enumerate() {
+            match members.iter_mut().find(|group| bodies[group[0]].is_fixed_to(body)) {
+                Some(group) => group.push(i),
+                None => members.push(vec![i]),
+            }
+        }
+        let mut poses = Vec::new();
+        arm.link_poses(&vec![0.0; arm.n_joints()], &mut poses);
+        members.into_iter().map(|members| Self::new(arm, bodies, members, &poses)).collect()
+    }
+
+    fn new(arm: &Arm, bodies: &[MovingBody], members: Vec<usize>, poses: &[Pose]) -> Self {
+        let link = bodies[members[0]].link;
+        let ball = |&i: &usize| {
+            let at = poses[link].inv_mul(&(poses[bodies[i].link] * bodies[i].link_from_body));
+            (at * bodies[i].body.centre(), bodies[i].body.radius())
+        };
+        let balls: Vec<(DVec3, f64)> = members.iter().map(ball).collect();
+        let (low, high) = balls
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &(centre, radius)| {
+                (low.min(centre - radius), high.max(centre + radius))
+            });
+        let centre = if let [only] = balls[..] { only.0 } else { low.midpoint(high) };
+        let reach = balls.iter().map(|ball| ball.0.distance(centre) + ball.1);
+        let radius = reach.fold(0.0, f64::max);
+        let path = path(arm, link, centre, radius);
+        Self { members, link, centre, radius, path }
+    }
+
+    /// Where the centre of the group's sphere is.
+    pub(crate) fn centre(&self, base_from_link: &[Pose]) -> DVec3 {
+        base_from_link[self.link] * self.centre
+    }
+
+    /// Number of joints that move this group and the other alike.
+    pub(crate) fn n_common(&self, other: &Self) -> usize {
+        n_common(&self.path, &other.path)
     }
 
     /// Sums for a motion in which each joint value changes by `travel`.
@@ -103,15 +155,14 @@ impl MovingBody {
         }
     }
 
-    /// Sums at one state of the arm.
+    /// Sums at one state of the arm; `centre` is that of the group's sphere.
     pub(crate) fn set_state(
         &self,
         travel: &[f64],
         base_from_link: &[Pose],
-        at: &Frame,
+        centre: DVec3,
         carried: &mut Carried,
     ) {
-        let centre = at.point(self.body.centre());
         carried.here.clear();
         carried.here.push(0.0);
         let mut sum = 0.0;
@@ -120,12 +171,16 @@ impl MovingBody {
             let pose = &base_from_link[joint.child];
             let arm_length = joint.axis.map_or(1.0, |axis| {
                 let from_axis = (centre - pose.translation).cross(pose.rotation * axis);
-                from_axis.length() + self.body.radius()
+                from_axis.length() + self.radius
             });
             sum += way * arm_length;
             carried.here.push(sum);
         }
     }
+}
+
+fn n_common(a: &[PathJoint], b: &[PathJoint]) -> usize {
+    a.iter().zip(b).take_while(|(a, b)| a.joint == b.joint).count()
 }
 
 impl Carried {

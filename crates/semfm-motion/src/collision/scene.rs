@@ -183,6 +183,17 @@ fn invalid(name: &str, expected: &str, found: String) -> Error {
 }
 
 impl Obstacle {
+    /// A lower bound of the distance of a point.
+    pub(crate) fn bound_distance(&self, p: DVec3) -> f64 {
+        let at = &self.base_from_obstacle;
+        match &self.shape {
+            Shape::Primitive(convex) => convex.point_distance(at.inverse_point(p)).unwrap_or(0.0),
+            Shape::HalfSpace => (p - at.pose.translation).dot(at.turn.z_axis),
+            Shape::Body(body) => p.distance(at.point(body.centre())) - body.radius(),
+            Shape::Surface(surface) => surface.bound_distance(at.inverse_point(p)),
+        }
+    }
+
     /// A lower bound of the distance of a body at `body_at`, exact where it is small; `most` where it is that or more,
     /// 0 where they meet.
     pub(crate) fn gap(&self, body: &CollisionBody, body_at: &Frame, most: f64) -> f64 {
@@ -229,7 +240,28 @@ fn primitive_gap(
     body_at: &Frame,
     most: f64,
 ) -> f64 {
-    let to = |p: DVec3| convex.point_distance(p).unwrap_or(0.0);
+    // The formula is chosen once, not for each sphere.
+    match convex.core {
+        Core::Cuboid { half } => {
+            let to = move |p: DVec3| (p.abs() - half).max(DVec3::ZERO).length();
+            primitive_gap_by(to, convex, at, body, body_at, most)
+        }
+        _ => {
+            let to = |p: DVec3| convex.point_distance(p).unwrap_or(0.0);
+            primitive_gap_by(to, convex, at, body, body_at, most)
+        }
+    }
+}
+
+/// The same; `to` is the distance from a point in the frame of the obstacle.
+fn primitive_gap_by(
+    to: impl Fn(DVec3) -> f64,
+    convex: &Convex,
+    at: &Frame,
+    body: &CollisionBody,
+    body_at: &Frame,
+    most: f64,
+) -> f64 {
     let centre = at.inverse_point(body_at.point(body.centre()));
     if to(centre) - body.radius() >= most {
         return most;

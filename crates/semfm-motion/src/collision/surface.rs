@@ -49,12 +49,17 @@ impl Surface {
         Self { items, places: points.to_vec(), tree, is_closed: false }
     }
 
+    /// A lower bound of the distance from a point of this frame.
+    pub(crate) fn bound_distance(&self, p: DVec3) -> f64 {
+        let root = self.tree.root_aabb();
+        box_distance(root.mins, root.maxs, p)
+    }
+
     /// A lower bound of the distance between a body and this, exact where it is small; `most` where it is that or
     /// more, 0 where they meet.
     pub(crate) fn gap(&self, body: &CollisionBody, body_at: &Frame, at: &Frame, most: f64) -> f64 {
         let centre = at.inverse_point(body_at.point(body.centre()));
-        let root = self.tree.root_aabb();
-        if box_distance(root.mins, root.maxs, centre) - body.radius() >= most {
+        if self.bound_distance(centre) - body.radius() >= most {
             return most;
         }
         let mut least = most;
