@@ -66,6 +66,7 @@ mod object_size;
 mod pipeline;
 mod planned_motion;
 mod pose_dependence;
+pub mod upright;
 pub mod weight_colors;
 
 pub use error::{Error, Result};

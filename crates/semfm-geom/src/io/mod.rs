@@ -42,7 +42,7 @@ pub use self::appearance::{Appearance, Material};
 pub use self::atomic::{replace_atomically, write_atomically};
 pub use self::contents::foreign_kind;
 pub use self::format_error::FormatError;
-pub use self::gltf::write_glb;
+pub use self::gltf::{GlbNode, write_glb};
 pub use self::image::{Texture, Wrap};
 use self::input::Input;
 pub use self::input::{read_at_most, read_file};
@@ -54,7 +54,7 @@ pub use self::staged_folder::{StagedFolder, shown_path};
 pub use self::target::{check_output, is_stdout};
 pub use self::temporary::TEMPORARY_PREFIX;
 pub use self::vertex_attributes::VertexAttributes;
-pub use self::write::{write_mesh, write_mesh_with_attributes};
+pub use self::write::{write_mesh, write_mesh_in_node, write_mesh_with_attributes};
 use crate::math::DVec3;
 use crate::{Error, Mesh, Result};
 

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use super::gltf::write_node;
 use super::vertex_attributes::refused;
-use super::{MeshFormat, VertexAttributes, refuse_input, write_atomically};
+use super::{GlbNode, MeshFormat, VertexAttributes, refuse_input, write_atomically};
 use crate::{Mesh, Result};
 
 /// Writes a mesh in the format that the extension names, one of [`MeshFormat::writable_names`].
@@ -45,6 +46,24 @@ pub fn write_mesh_with_attributes(
     }
     refuse_input(path)?;
     write_atomically(path, |out| (writer.write)(out, mesh, attributes))
+}
+
+/// Writes a GLB whose mesh stands in a node of the scene: viewers show it turned, and its coordinates in
+/// the file are those of the mesh.
+///
+/// # Errors
+/// As [`write_mesh_with_attributes`].
+pub fn write_mesh_in_node(
+    path: impl AsRef<Path>,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+    node: &GlbNode<'_>,
+) -> Result<()> {
+    let path = path.as_ref();
+    attributes.check(mesh)?;
+    check_single_precision(mesh)?;
+    refuse_input(path)?;
+    write_atomically(path, |out| write_node(out, mesh, attributes, Some(node)))
 }
 
 /// Refuses coordinates beyond the largest number of 32 bits.
@@ -111,6 +130,21 @@ mod tests {
         assert!(
             (0..4).all(|face| mesh.corners(face) == pyramid().corners(face).map(|p| narrow(&p)))
         );
+    }
+
+    #[test]
+    fn a_node_turns_the_mesh_for_readers_of_scenes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        // z becomes y, y becomes −z.
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let node = GlbNode { name: "scene_from_mesh", rotation: [-half, 0.0, 0.0, half] };
+        write_mesh_in_node(&path, &pyramid(), &VertexAttributes::default(), &node).unwrap();
+        let found = read_mesh(&path).unwrap().mesh;
+        assert_eq!(found.faces(), pyramid().faces());
+        for (found, p) in found.vertices().iter().zip(pyramid().vertices()) {
+            assert!((*found - DVec3::new(p.x, p.z, -p.y)).length() < 1e-3 * p.length().max(1.0));
+        }
     }
 
     #[test]

@@ -4,12 +4,15 @@
 use std::path::{Path, PathBuf};
 
 use semfm_fmap::{Anchor, PreparedObject};
-use semfm_geom::io::{StagedFolder, VertexAttributes, write_mesh_with_attributes};
+use semfm_geom::io::{
+    GlbNode, StagedFolder, VertexAttributes, write_mesh_in_node, write_mesh_with_attributes,
+};
 use semfm_geom::{Mesh, Task};
 
 use super::point_map::{FORMAT as POINT_MAP_FORMAT, PointMapFile};
 use super::transfer_report::{Provenance, TransferReportFile};
 use super::transferred_region::TransferredRegionFile;
+use crate::upright::upright;
 use crate::weight_colors::{color_bytes, weight_colors};
 use crate::{Prepared, Region, Result, Transfer};
 
@@ -121,6 +124,9 @@ pub const FILES: &[&str] = &[
     "grasps.png",
 ];
 
+/// Name of the node in `target.glb` that turns the mesh as read to stand upright, y up.
+const UPRIGHT_NODE: &str = "upright_from_target";
+
 /// Writes a transfer into `folder`, which is made if it is not there: `region.json`, `report.json`,
 /// `point_map.json`, `source.ply`, `target.ply` and `target.glb`. The folder has all of them or, where
 /// something fails, what it had before. What an earlier transfer left besides is
@@ -177,7 +183,7 @@ fn data_files(folder: &Path, result: &TransferResult<'_>, task: &Task) -> Result
     point_map_file(result, &result.anchor_ranks(task)?).write(&point_map)?;
     write_weighted(&source_ply, source, result.region.weights())?;
     write_weighted(&target_ply, target, result.transfer.weights())?;
-    write_weighted(&target_glb, target, result.transfer.weights())
+    write_upright(&target_glb, target, result.transfer.weights())
 }
 
 fn point_map_file(result: &TransferResult<'_>, ranks: &AnchorRanks) -> PointMapFile {
@@ -206,13 +212,25 @@ fn rounded(weight: f64) -> f64 {
 
 /// A mesh as read with a weight per vertex, as property and as colour.
 fn write_weighted(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
-    let colors: Vec<[u8; 4]> = weight_colors(weights)
-        .into_iter()
-        .map(|color| {
-            let [r, g, b] = color_bytes(color);
-            [r, g, b, u8::MAX]
-        })
-        .collect();
+    let colors = bytes_of(weights);
     let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
     Ok(write_mesh_with_attributes(path, mesh, &attributes)?)
+}
+
+/// The same as a GLB in whose scene the object stands upright; its coordinates stay as read.
+fn write_upright(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
+    let colors = bytes_of(weights);
+    let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
+    let rotation = upright(mesh)?.y_up_from_mesh().to_array();
+    let node = GlbNode { name: UPRIGHT_NODE, rotation };
+    Ok(write_mesh_in_node(path, mesh, &attributes, &node)?)
+}
+
+/// Colours of weights, RGBA in sRGB.
+fn bytes_of(weights: &[f64]) -> Vec<[u8; 4]> {
+    let opaque = |color| {
+        let [r, g, b] = color_bytes(color);
+        [r, g, b, u8::MAX]
+    };
+    weight_colors(weights).into_iter().map(opaque).collect()
 }

@@ -15,7 +15,8 @@ mod scene;
 mod skin;
 mod write;
 
-pub use self::write::write_glb;
+pub(super) use self::write::write_node;
+pub use self::write::{GlbNode, write_glb};
 
 use self::accessor::Accessors;
 use self::buffers::Buffers;

@@ -16,10 +16,29 @@ const FLOAT: u32 = 5126;
 const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_INT: u32 = 5125;
 
+/// How the mesh of a GLB stands in its scene; the coordinates in the file stay those of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GlbNode<'a> {
+    /// Name of the node, which viewers list.
+    pub name: &'a str,
+    /// Unit quaternion x, y, z, w: scene from mesh. y of a glTF scene points up.
+    pub rotation: [f64; 4],
+}
+
 pub(super) fn write(
     out: &mut dyn Write,
     mesh: &Mesh,
     attributes: &VertexAttributes<'_>,
+) -> Result<()> {
+    write_node(out, mesh, attributes, None)
+}
+
+/// As [`write`], the mesh in a node that turns it.
+pub(in super::super) fn write_node(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    attributes: &VertexAttributes<'_>,
+    node: Option<&GlbNode<'_>>,
 ) -> Result<()> {
     let n = mesh.n_vertices();
     let mut arrays = Arrays::default();
@@ -47,7 +66,13 @@ pub(super) fn write(
     let indices = arrays.add(4 * n_indices, index);
     let json = json!({
         "asset": {"version": "2.0", "generator": "SemFM"},
-        "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [match node {
+            None => json!({"mesh": 0}),
+            Some(GlbNode { name, rotation }) => {
+                json!({"mesh": 0, "name": name, "rotation": rotation})
+            }
+        }],
         "meshes": [{"primitives": [{"attributes": accessors, "indices": indices}]}],
         "accessors": arrays.accessors, "bufferViews": arrays.views,
         "buffers": [{"byteLength": arrays.n_bytes}],
