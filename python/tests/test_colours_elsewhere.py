@@ -38,11 +38,28 @@ def wanted(folder: Path, name: str):
     return points, np.array(faces), weights, colors
 
 
+def only_geometry(loaded):
+    """The mesh of a file, which may hold it in a scene, in coordinates as stored."""
+    if not hasattr(loaded, "geometry"):
+        return loaded
+    (mesh,) = loaded.geometry.values()
+    return mesh
+
+
+def upright_from_target(folder: Path) -> np.ndarray:
+    """The matrix (4 × 4) of the node that turns the target."""
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.load(folder / "transfer" / "target.glb", process=False)
+    matrix, geometry = scene.graph.get("upright_from_target")
+    assert geometry in scene.geometry
+    return matrix
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_trimesh_sees_every_vertex_in_its_colour(folder, name):
     trimesh = pytest.importorskip("trimesh")
     points, faces, weights, colors = wanted(folder, name)
-    mesh = trimesh.load(folder / "transfer" / name, process=False, force="mesh")
+    mesh = only_geometry(trimesh.load(folder / "transfer" / name, process=False))
     np.testing.assert_allclose(mesh.vertices, points, atol=1e-6)
     np.testing.assert_array_equal(mesh.faces, faces)
     assert mesh.visual.kind == "vertex"
@@ -54,6 +71,19 @@ def test_trimesh_sees_every_vertex_in_its_colour(folder, name):
     else:
         found = mesh.vertex_attributes["_WEIGHT"]
     np.testing.assert_allclose(np.ravel(found), weights, atol=1e-4)
+
+
+def test_a_node_of_the_glb_stands_the_target_upright(folder):
+    trimesh = pytest.importorskip("trimesh")
+    points, faces, _, _ = wanted(folder, "target.glb")
+    matrix = upright_from_target(folder)
+    turn, shift = matrix[:3, :3], matrix[:3, 3]
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-6)
+    assert np.linalg.det(turn) > 0 and (shift == 0).all()
+    # Seen as a scene, vertices keep their order.
+    seen = trimesh.load(folder / "transfer" / "target.glb", process=False).to_geometry()
+    np.testing.assert_allclose(seen.vertices, points @ turn.T, atol=1e-6)
+    np.testing.assert_array_equal(seen.faces, faces)
 
 
 def test_the_region_is_where_the_colour_is_nearer_to_red(folder):
@@ -78,7 +108,9 @@ def test_open3d_shows_the_colours(folder, name):
     found, seen = np.asarray(mesh.vertices), 255 * np.asarray(mesh.vertex_colors)
     assert len(found) == len(points) and len(mesh.triangles) == len(faces)
     if name.endswith("glb"):
-        # Open3D reads glTF through assimp, which puts vertices in the order of the triangles.
+        # Open3D reads glTF through assimp, which applies the node and puts vertices in the order of
+        # the triangles.
+        points = points @ upright_from_target(folder)[:3, :3].T
         order = np.array([np.abs(points - p).sum(1).argmin() for p in found])
         assert len(np.unique(order)) == len(points)
         points, colors = points[order], colors[order]

@@ -22,6 +22,12 @@ fn public_types_are_send_and_sync() {
     is_send_and_sync::<WantedViews>();
 }
 
+#[cfg(any(feature = "onnx", feature = "siglip"))]
+#[test]
+fn pretrained_encoders_are_send_and_sync() {
+    is_send_and_sync::<semfm_encoder::PretrainedEncoder>();
+}
+
 #[cfg(feature = "mcap")]
 #[test]
 fn the_program_is_send_and_sync() {
