@@ -11,7 +11,9 @@ use semfm::files;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{read_mesh, read_mesh_or_points, read_points};
 use semfm::grasp::{GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with};
-use semfm::robot::{Gripper, GripperSettings, JointLimitsFile, MeshPaths, RobotDescription, Srdf};
+use semfm::robot::{
+    Arm, ArmSettings, Gripper, GripperSettings, JointLimitsFile, MeshPaths, RobotDescription, Srdf,
+};
 use semfm::views::mcap::{EmbeddingsFile, ViewsFile, inspect, read_view};
 use semfm::{Mesh, Task};
 use semfm_eval::{AnnotatedMesh, MapResults, Results};
