@@ -127,6 +127,15 @@ def test_the_shell_gives_the_same_solutions(urdf, robot, capfd):
     assert told.out == "" and "no solution in 51 tries" in told.err
 
 
+def test_the_shell_tells_joints_and_limits(urdf, capfd):
+    assert _semfm.run_cli(["info", str(urdf), "--json"]) == 0
+    arm = json.loads(capfd.readouterr().out)["arm"]
+    assert (arm["base"], arm["tip"], len(arm["joints"])) == ("base", "flange", 6)
+    assert arm["joints"][0]["upper"] == 2.9 and any("assumed" in note for note in arm["assumed"])
+    assert _semfm.run_cli(["info", str(urdf)]) == 0
+    assert "revolute, -2.9 to 2.9; velocity 2, acceleration 1" in capfd.readouterr().out
+
+
 def random_positions(robot, generator):
     low, high = np.clip(robot.limits, -2 * np.pi, 2 * np.pi).T
     return generator.uniform(low, high)
