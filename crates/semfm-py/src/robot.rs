@@ -13,10 +13,7 @@ use crate::arrays_in::{self, Axis};
 use crate::arrays_out;
 use crate::errors;
 use crate::gripper::matrix;
-use crate::interruptible::{guard, run};
-
-/// Tries of inverse kinematics that end before anybody could wish to interrupt them.
-const MOST_QUICK_TRIES: usize = 1_000;
+use crate::interruptible::run;
 
 /// Names of preferences, in the order in which messages tell them.
 const PREFERENCES: [(&str, Preference); 4] = [
