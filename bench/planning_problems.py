@@ -1,22 +1,24 @@
-"""Planning problems of MotionBenchMaker as JSON, and what an independent checker says of their states.
+"""Planning problems of MotionBenchMaker as JSON, and what an independent checker says of them.
 
-``pip install numpy pyyaml pin`` (pinocchio with coal), then::
+``pip install numpy pyyaml pin`` (pinocchio with coal), then for both robots::
 
     python bench/planning_problems.py unpack shared/data/planning/motion_bench_maker CACHE
-    cargo run --release -p semfm --example check_problems CACHE/panda > CACHE/panda/ours.jsonl     # and ur5
+    cargo run --release -p semfm-eval --example check_problems CACHE/panda > CACHE/panda/ours.jsonl
     python bench/planning_problems.py judge CACHE/panda CACHE/ur5
     python bench/planning_problems.py compare CACHE/panda CACHE/ur5
 
-``unpack`` writes for each robot a folder with ``robot.urdf``, its meshes, ``robot.srdf`` and ``problems.json``::
+``unpack`` writes for each robot a folder with ``robot.urdf``, its meshes, ``robot.srdf`` and
+``problems.json``::
 
     {"robot": "panda", "tip": "panda_link8", "joints": [...], "notes": [...],
-     "problems": [{"name": "box_panda/0001", "start": [...], "goal": [...], "scene": {"format": "semfm.scene/1", ...}}]}
+     "problems": [{"name": "box_panda/0001", "start": [...], "goal": [...],
+                   "scene": {"format": "semfm.scene/1", ...}}]}
 
-Positions are in the order of ``joints``, scenes in the frame of the robot's root, which is where the files have it: the
-base of the UR5 stands .9144 m above that and is turned. ``judge`` asks coal, on the meshes as they are, which starts and
-goals are free, and which states halfway between them, many of which are not; ``compare`` prints a table and every state on
-which the two differ. Pairs of links follow the SRDF in both; links
-that no joint moves are held against nothing that stands still.
+Positions are in the order of ``joints``, scenes in the frame of the robot's root, which is where
+the files have it: the base of the UR5 stands .9144 m above that and is turned. ``judge`` asks coal, on
+the meshes as they are, which starts and goals are free, and which states halfway between them, many
+of which are not; ``compare`` prints a table and every state on which the two differ. Pairs of links
+follow the SRDF in both; links that no joint moves are held against nothing that stands still.
 """
 
 from __future__ import annotations
@@ -33,14 +35,14 @@ import yaml
 
 #: The link that the SRDF's group of each robot ends in.
 TIPS = {"panda": "panda_link8", "ur5": "tool0"}
-#: The UR5's force sensor names a mesh that is not part of the data: a cylinder of the maker's size stands for it (Robotiq
-#: FT 300: 75 mm across, 37.5 mm high).
+#: The UR5's force sensor names a mesh that is not part of the data: a cylinder of the maker's size
+#: stands for it (Robotiq FT 300: 75 mm across, 37.5 mm high).
 SENSOR = '<cylinder radius="0.0375" length="0.0375"/>'
 SENSOR_ORIGIN = '<origin rpy="0 0 0" xyz="0 0 0.01875"/>'
 
 
-def unpack(data: Path, cache: Path) -> None:
-    """Writes the folder of each robot."""
+def unpack(data: Path, cache: Path, every: int = 1) -> None:
+    """Writes the folder of each robot, with each ``every``-th problem."""
     for robot in TIPS:
         source, folder = data / robot, cache / robot
         folder.mkdir(parents=True, exist_ok=True)
@@ -51,21 +53,31 @@ def unpack(data: Path, cache: Path) -> None:
         notes = write_urdf(source / f"{robot}.urdf", folder)
         shutil.copyfile(source / f"{robot}.srdf", folder / "robot.srdf")
         joints = arm_joints(folder / "robot.urdf")
-        problems = list(read_problems(source / "problems.tar.bz2", joints))
-        content = {"robot": robot, "tip": TIPS[robot], "joints": joints, "notes": notes, "problems": problems}
+        problems = list(read_problems(source / "problems.tar.bz2", joints, every))
+        content = {
+            "robot": robot,
+            "tip": TIPS[robot],
+            "joints": joints,
+            "notes": notes,
+            "problems": problems,
+        }
         (folder / "problems.json").write_text(json.dumps(content))
         print(f"{folder}: {len(problems)} problems; {'; '.join(notes)}")
 
 
 def write_urdf(source: Path, folder: Path) -> list[str]:
-    """The description with meshes named relative to it, without visuals, and with what the data lacks put right."""
+    """The description with meshes named relative to it, without visuals, and what the data lacks
+    put right."""
     text = source.read_text()
     notes = []
     text = re.sub(r"<visual>.*?</visual>", "", text, flags=re.DOTALL).replace("package://", "")
     if "_fine.STL" in text:
         text = text.replace("_fine.STL", "_coarse.STL")
-        notes.append("the gripper's meshes are the coarse ones: the fine ones that are named are not there")
-    sensor = r'<origin[^>]*/>\s*<geometry>\s*<mesh filename="meshes/robotiq_fts300.stl">\s*</mesh>\s*</geometry>'
+        notes.append(
+            "the gripper's meshes are the coarse ones: the fine ones that are named are not there"
+        )
+    mesh = r'<mesh filename="meshes/robotiq_fts300.stl">\s*</mesh>'
+    sensor = rf"<origin[^>]*/>\s*<geometry>\s*{mesh}\s*</geometry>"
     text, n = re.subn(sensor, f"{SENSOR_ORIGIN}<geometry>{SENSOR}</geometry>", text)
     if n:
         notes.append("a cylinder stands for the force sensor, whose mesh is not there")
@@ -82,7 +94,7 @@ def arm_joints(urdf: Path) -> list[str]:
     return re.findall(r'<joint name="([^"]*)" type="revolute"', text)
 
 
-def read_problems(archive: Path, joints: list[str]):
+def read_problems(archive: Path, joints: list[str], every: int):
     """Each problem with its scene, sorted by name."""
     texts = {}
     with tarfile.open(archive) as tar:
@@ -92,7 +104,7 @@ def read_problems(archive: Path, joints: list[str]):
                 group, kind, number = match.groups()
                 texts[f"{group}/{number}", kind] = tar.extractfile(member).read()
     load = lambda text: yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # noqa: E731
-    for name in sorted({name for name, _ in texts}):
+    for name in sorted({name for name, _ in texts})[::every]:
         request, scene = (load(texts[name, kind]) for kind in ("request", "scene"))
         state = request["start_state"]["joint_state"]
         start = dict(zip(state["name"], state["position"]))
@@ -110,7 +122,7 @@ def scene_file(name: str, scene: dict) -> dict:
     """A PlanningScene as ``semfm.scene/1``. A box has [x, y, z], a cylinder [height, radius]."""
     file = {"format": "semfm.scene/1", "boxes": [], "cylinders": []}
     for obstacle in scene["world"]["collision_objects"]:
-        shapes = zip(obstacle["primitives"], obstacle["primitive_poses"], strict=True)
+        shapes = zip(obstacle["primitives"], obstacle["primitive_poses"])  # noqa: B905
         for i, (shape, pose) in enumerate(shapes):
             placed = {
                 "name": obstacle["id"] if i == 0 else f"{obstacle['id']} {i}",
@@ -138,7 +150,9 @@ class IndependentChecker:
         urdf = str(folder / "robot.urdf")
         self.model = pinocchio.buildModelFromUrdf(urdf)
         if list(self.model.names)[1:] != joints:
-            raise SystemExit(f"{urdf}: expected joints {joints}, found {list(self.model.names)[1:]}")
+            raise SystemExit(
+                f"{urdf}: expected joints {joints}, found {list(self.model.names)[1:]}"
+            )
         self.links = pinocchio.buildGeomFromUrdf(
             self.model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(folder)]
         )
@@ -147,7 +161,8 @@ class IndependentChecker:
         self.data = self.model.createData()
 
     def checks(self, scene: dict, first_only: bool = False):
-        """Returns the contacts of joint values in a scene, each as two names; at most one with `first_only`."""
+        """Returns the contacts of joint values in a scene, each as two names; at most one with
+        ``first_only``."""
         pin, coal = self.pin, self.coal
         geometry = self.links.copy()
         n_links = geometry.ngeoms
@@ -167,9 +182,14 @@ class IndependentChecker:
         geometry_data = pin.GeometryData(geometry)
 
         def contacts(q: list[float]) -> list[tuple[str, str]]:
-            pin.computeCollisions(self.model, self.data, geometry, geometry_data, np.array(q), first_only)
+            pin.computeCollisions(
+                self.model, self.data, geometry, geometry_data, np.array(q), first_only
+            )
             return [
-                tuple(re.sub(r"_\d+$", "", geometry.geometryObjects[i].name) for i in (pair.first, pair.second))
+                tuple(
+                    re.sub(r"_\d+$", "", geometry.geometryObjects[i].name)
+                    for i in (pair.first, pair.second)
+                )
                 for pair, result in zip(geometry.collisionPairs, geometry_data.collisionResults)
                 if result.isCollision()
             ]
@@ -186,9 +206,18 @@ def judge(folders: list[Path]) -> None:
             for problem in content["problems"]:
                 contacts = checker.checks(problem["scene"])
                 middle = [(a + b) / 2 for a, b in zip(problem["start"], problem["goal"])]
-                for state, q in (("start", problem["start"]), ("goal", problem["goal"]), ("middle", middle)):
+                for state, q in (
+                    ("start", problem["start"]),
+                    ("goal", problem["goal"]),
+                    ("middle", middle),
+                ):
                     found = contacts(q)
-                    line = {"problem": problem["name"], "state": state, "free": not found, "contacts": found}
+                    line = {
+                        "problem": problem["name"],
+                        "state": state,
+                        "free": not found,
+                        "contacts": found,
+                    }
                     lines.write(json.dumps(line) + "\n")
 
 
@@ -205,7 +234,9 @@ def compare(folders: list[Path]) -> None:
                 pair = ours[problem["name"], state], theirs[problem["name"], state]
                 answer[state] = tuple(one["free"] for one in pair)
                 if pair[0]["free"] != pair[1]["free"]:
-                    different.append((problem["name"], state, *(one["contacts"] or "free" for one in pair)))
+                    different.append(
+                        (problem["name"], state, *(one["contacts"] or "free" for one in pair))
+                    )
             groups.setdefault(problem["name"].split("/")[0], []).append(answer)
         rows += [*groups.items(), (f"**{content['robot']}, all**", sum(groups.values(), []))]
     print(
@@ -215,7 +246,8 @@ def compare(folders: list[Path]) -> None:
     print("| --- " * 11 + "|")
     for group, found in rows:
         starts, goals, middles = (
-            [sum(one[state][who] for one in found) for who in (0, 1)] for state in ("start", "goal", "middle")
+            [sum(one[state][who] for one in found) for who in (0, 1)]
+            for state in ("start", "goal", "middle")
         )
         valid = [sum(one["start"][who] and one["goal"][who] for one in found) for who in (0, 1)]
         agreed = sum(one[state][0] == one[state][1] for one in found for state in one)
@@ -232,22 +264,24 @@ def answers(path: Path) -> dict:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     command = commands.add_parser("unpack")
     command.add_argument("data", type=Path)
     command.add_argument("cache", type=Path)
+    command.add_argument("--every", type=int, default=1, help="only each N-th problem")
     for name in ("judge", "compare"):
         command = commands.add_parser(name)
         command.add_argument("folders", type=Path, nargs="+")
     arguments = parser.parse_args()
-    match arguments.command:
-        case "unpack":
-            unpack(arguments.data, arguments.cache)
-        case "judge":
-            judge(arguments.folders)
-        case "compare":
-            compare(arguments.folders)
+    if arguments.command == "unpack":
+        unpack(arguments.data, arguments.cache, arguments.every)
+    elif arguments.command == "judge":
+        judge(arguments.folders)
+    else:
+        compare(arguments.folders)
 
 
 if __name__ == "__main__":

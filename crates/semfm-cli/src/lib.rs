@@ -15,8 +15,8 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, ik, info, region,
-    show, transfer, views,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, ik, info, plan,
+    region, show, transfer, views,
 };
 use options::Common;
 pub use process::own_process;
@@ -47,6 +47,7 @@ enum Command {
     Eval(Box<eval::EvalCommand>),
     EvalMaps(eval_maps::EvalMapsCommand),
     Ik(Box<ik::IkCommand>),
+    Plan(Box<plan::PlanCommand>),
     Info(info::InfoCommand),
     Completions(completions::CompletionsCommand),
 }
@@ -99,6 +100,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Command::Eval(command) => command.run(&common),
         Command::EvalMaps(command) => command.run(&common),
         Command::Ik(command) => command.run(&common),
+        Command::Plan(command) => command.run(&common),
         Command::Info(command) => command.run(&common),
         Command::Completions(command) => command.run(),
     };

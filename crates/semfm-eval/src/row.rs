@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use semfm::Verdict;
-use semfm::fmap::{AnchorReport, Evidence};
 use semfm::fmap::metrics::{area_iou, iou};
+use semfm::fmap::{AnchorReport, Evidence};
 use semfm::{Region, Transfer};
 use serde::{Deserialize, Serialize};
 

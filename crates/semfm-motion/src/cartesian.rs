@@ -74,12 +74,14 @@ impl Residual {
 }
 
 /// Where a line could not be followed any further.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LineFault {
     /// Metres along the line that could be followed.
     pub at: f64,
     /// What is left to the line where the next, shortest step fails.
     pub residual: Residual,
+    /// Joint values up to there.
+    pub q: Vec<f64>,
 }
 
 /// An arm as far as lines need it.
@@ -113,7 +115,7 @@ pub(crate) fn follow_line(
                 step = (2.0 * step).min(longest);
             }
             Err(residual) if step <= shortest => {
-                return Err(LineFault { at: share * length, residual });
+                return Err(LineFault { at: share * length, residual, q });
             }
             Err(_) => step = (step / 2.0).max(shortest),
         }

@@ -7,15 +7,15 @@ use semfm_geom::Task;
 use semfm_robot::{Arm, IkSettings, InverseKinematics, Preference};
 
 use crate::cartesian::{LineArm, LineFault, Residual, StraightLine, follow_line};
-use crate::motion_request::{GraspMotion, StartContact};
+use crate::motion_request::{GraspMotion, NearestMiss, StartContact};
 use crate::planning::joint_space::between;
-use crate::reach::{Candidate, Reached, reach};
+use crate::reach::{BestTry, Candidate, Reached, reach};
 use crate::step_checks::{HandBodies, StepChecks};
-use crate::timed_motion::{MotionCurves, timed_motion};
+use crate::timed_motion::{MotionCurves, TimedMotion, timed_motion};
 use crate::{
-    BlendSettings, CollisionChecker, CollisionModel, Curve, Ending, Error, Gate, GraspOutcome,
-    JointRange, JointSpace, MotionAnswer, MotionRequest, Obstruction, Planned, Pose, Result, blend,
-    plan_path, shorten,
+    BlendSettings, CollisionChecker, CollisionModel, Contact, Curve, Ending, Error, Gate,
+    GraspOutcome, JointRange, JointSpace, MotionAnswer, MotionRequest, Obstruction, Planned, Pose,
+    Result, TargetGrasp, blend, plan_path, shorten,
 };
 
 /// Farthest that corners between the steps of a straight line are cut, radians: with an arm of a metre the tip leaves
@@ -24,9 +24,6 @@ const LINE_TUBE: f64 = 1e-3;
 
 /// States of a motion that was refused, at which the contact to report is looked for.
 const N_LOOKS: usize = 64;
-
-/// A gate that a way to take a grasp did not pass, and why.
-type Stop = (Gate, Obstruction);
 
 /// Plans the motions of one arm; made once, asked often.
 #[derive(Clone, Debug)]
@@ -89,23 +86,21 @@ impl MotionPlanner {
     pub fn plan(&self, request: &MotionRequest, task: &Task) -> Result<MotionAnswer> {
         let search = Search::new(self, request)?;
         let settings = &request.settings;
-        let kinematics = InverseKinematics::new(
-            self.arm().clone(),
-            IkSettings {
-                seed: settings.seed,
-                restarts: settings.restarts,
-                solutions: settings.solutions,
-                ..Default::default()
-            },
-        )?;
+        let ik_settings = IkSettings {
+            seed: settings.seed,
+            restarts: settings.restarts,
+            solutions: settings.solutions,
+            ..Default::default()
+        };
+        let kinematics = InverseKinematics::new(self.arm().clone(), ik_settings)?;
         let is_symmetric = request.hand.is_symmetric;
         let reached = reach(&kinematics, &request.grasps, is_symmetric, &request.start, task)?;
-        let mut answer = MotionAnswer { motion: None, outcomes: Vec::new(), start_contact: None };
+        let mut answer = MotionAnswer::default();
         let mut searches = 0;
         for (rank, reached) in reached.iter().enumerate() {
             task.step("plan", rank, request.grasps.len())?;
             let is_over = answer.motion.is_some() || searches == settings.searches;
-            let ending = if is_over && reached.obstruction.is_none() {
+            let ending = if is_over && !reached.candidates.is_empty() {
                 Ending::NotTried
             } else {
                 match search.try_grasp(reached, &mut searches, &mut answer.start_contact)? {
@@ -113,7 +108,11 @@ impl MotionPlanner {
                         answer.motion = Some(motion);
                         Ending::Planned
                     }
-                    Err((gate, obstruction)) => Ending::Stopped { gate, obstruction },
+                    Err(stop) => {
+                        let (gate, obstruction) = (stop.gate, stop.obstruction.clone());
+                        keep_miss(&mut answer.nearest_miss, reached.grasp, stop);
+                        Ending::Stopped { gate, obstruction }
+                    }
                 }
             };
             let (grasp, n_solutions) = (reached.grasp, reached.candidates.len());
@@ -141,6 +140,18 @@ fn finger_links(arm: &Arm) -> Vec<&str> {
     let links = robot.links.iter().zip(is_finger);
     links.filter(|(_, is_finger)| *is_finger).map(|(link, _)| link.name.as_str()).collect()
 }
+
+/// A gate that a way to take a grasp did not pass.
+struct Stop {
+    gate: Gate,
+    obstruction: Obstruction,
+    /// Joint values where it ends.
+    q: Vec<f64>,
+    target: TargetGrasp,
+}
+
+/// What a step of a way gives.
+type Passed<T> = std::result::Result<T, Stop>;
 
 /// One request under way.
 struct Search<'a> {
@@ -191,10 +202,7 @@ impl<'a> Search<'a> {
         reached: &Reached,
         searches: &mut usize,
         start_contact: &mut Option<StartContact>,
-    ) -> Result<std::result::Result<GraspMotion, Stop>> {
-        if let (true, Some(obstruction)) = (reached.candidates.is_empty(), &reached.obstruction) {
-            return Ok(Err((Gate::Reach, obstruction.clone())));
-        }
+    ) -> Result<Passed<GraspMotion>> {
         let mut ways = Vec::new();
         let mut farthest: Option<Stop> = None;
         for candidate in &reached.candidates {
@@ -209,78 +217,83 @@ impl<'a> Search<'a> {
                 Err(stop) => note(&mut farthest, stop),
             }
         }
+        if let Some(BestTry { target, q, obstruction }) = reached.best_try.clone() {
+            note(&mut farthest, Stop { gate: Gate::Reach, obstruction, q, target });
+        }
         Ok(Err(farthest.unwrap_or_else(|| {
             let what = "inverse kinematics gave neither joint values nor a best try".into();
-            (Gate::Reach, Obstruction::Other { what })
+            let target = self.request.grasps[reached.grasp].clone();
+            let obstruction = Obstruction::Other { what };
+            Stop { gate: Gate::Reach, obstruction, q: self.request.start.clone(), target }
         })))
     }
 
     /// A way to take a grasp through all gates that do not depend on the start.
-    fn way(&self, candidate: &'a Candidate) -> Result<std::result::Result<Way<'a>, Stop>> {
+    fn way<'b>(&self, candidate: &'b Candidate) -> Result<Passed<Way<'b>>> {
         let Candidate { target, q, .. } = candidate;
         let settings = &self.request.settings;
         let checks = StepChecks::new(&self.planner.model, self.request, &self.hand, target, q)?;
+        let stop = |gate, obstruction, q: &[f64]| {
+            Ok(Err(Stop { gate, obstruction, q: q.to_vec(), target: target.clone() }))
+        };
         if let Some(contact) = checks.approach.first_contact(q) {
-            return Ok(Err((Gate::Grasp, Obstruction::contact(contact))));
+            return stop(Gate::Grasp, Obstruction::contact(contact), q);
         }
         // Backwards: the grasp is what must be met.
         let at_grasp = target.base_from_tip();
         let before = target.base_from_tip_before(settings.approach);
         let back = StraightLine { from: at_grasp, to: before };
-        let mut approach = match self.line(&back, q, &checks.approach, Gate::Approach) {
+        let mut approach = match self.line(&back, q, &checks.approach) {
             Ok(waypoints) => waypoints,
-            Err(stop) => return Ok(Err(stop)),
+            Err((obstruction, q)) => return stop(Gate::Approach, obstruction, &q),
         };
         approach.reverse();
         if let Some(contact) = checks.free.first_contact(&approach[0]) {
-            return Ok(Err((Gate::PreGrasp, Obstruction::contact(contact))));
+            return stop(Gate::PreGrasp, Obstruction::contact(contact), &approach[0]);
         }
         for closing in &checks.closing {
             if let Some(contact) = closing.first_contact(q) {
-                return Ok(Err((Gate::Close, Obstruction::contact(contact))));
+                return stop(Gate::Close, Obstruction::contact(contact), q);
             }
         }
         let above = Pose::from_translation(settings.lift) * at_grasp;
         let up = StraightLine { from: at_grasp, to: above };
-        let lift = match self.line(&up, q, &checks.lift, Gate::Lift) {
+        let lift = match self.line(&up, q, &checks.lift) {
             Ok(waypoints) => waypoints,
-            Err(stop) => return Ok(Err(stop)),
+            Err((obstruction, q)) => return stop(Gate::Lift, obstruction, &q),
         };
         let last = lift.last().unwrap_or(q);
         if let Some(contact) = checks.lifted.first_contact(last) {
-            return Ok(Err((Gate::Lift, Obstruction::contact(contact))));
+            return stop(Gate::Lift, Obstruction::contact(contact), last);
         }
         Ok(Ok(Way { candidate, checks, approach, lift }))
     }
 
-    /// Joint values along a straight line on which nothing touches.
+    /// Joint values along a straight line on which nothing touches; else why not, and joint values where it ends.
     fn line(
         &self,
         line: &StraightLine,
         start: &[f64],
         checker: &CollisionChecker,
-        gate: Gate,
-    ) -> std::result::Result<Vec<Vec<f64>>, Stop> {
+    ) -> std::result::Result<Vec<Vec<f64>>, (Obstruction, Vec<f64>)> {
         let length = line.length();
-        let waypoints =
-            follow_line(&Nearby(&self.nearby), line, start, &self.request.settings.line).map_err(
-                |LineFault { at, residual: Residual { position, rotation } }| {
-                    (gate, Obstruction::Line { at, length, position, rotation })
-                },
-            )?;
+        let arm = Nearby(&self.nearby);
+        let followed = follow_line(&arm, line, start, &self.request.settings.line);
+        let waypoints = followed.map_err(|LineFault { at, residual, q }| {
+            let Residual { position, rotation } = residual;
+            (Obstruction::Line { at, length, position, rotation }, q)
+        })?;
         for pair in waypoints.windows(2) {
             if checker.motion_is_free(&pair[0], &pair[1]) {
                 continue;
             }
-            let contact = contact_between(checker, &pair[0], &pair[1]);
-            let Some((q, contact)) = contact else {
+            let Some((q, contact)) = contact_between(checker, &pair[0], &pair[1]) else {
                 let what = "something comes nearer than the contact distance on the line".into();
-                return Err((gate, Obstruction::Other { what }));
+                return Err((Obstruction::Other { what }, pair[0].clone()));
             };
-            let at =
-                self.planner.arm().base_from_tip(&q).translation.distance(line.from.translation);
-            let (a, b, depth) = (contact.a, contact.b, contact.depth);
-            return Err((gate, Obstruction::ContactOnLine { at, length, a, b, depth }));
+            let at = arm.tip(&q).translation.distance(line.from.translation);
+            let Contact { a, b, depth } = contact;
+            return Err((Obstruction::ContactOnLine { at, length, a, b, depth }, q));
         }
         Ok(waypoints)
     }
@@ -292,72 +305,72 @@ impl<'a> Search<'a> {
         ways: &[Way<'_>],
         searches: &mut usize,
         start_contact: &mut Option<StartContact>,
-    ) -> Result<std::result::Result<GraspMotion, Stop>> {
+    ) -> Result<Passed<GraspMotion>> {
         let (request, space) = (self.request, &self.planner.space);
+        let stop = |gate, obstruction, target: &TargetGrasp| {
+            let (q, target) = (request.start.clone(), target.clone());
+            Ok(Err(Stop { gate, obstruction, q, target }))
+        };
         // Both turns of the hand are as wide, so the first way's checks speak for the start and for all pre-grasps.
-        let free = &ways[0].checks.free;
+        let (free, first) = (&ways[0].checks.free, &ways[0].candidate.target);
         if let Some(contact) = free.first_contact(&request.start) {
             if start_contact.is_none() {
                 let nearest_free = free.nearest_free(&request.start, request.settings.seed);
                 *start_contact = Some(StartContact { contact: contact.clone(), nearest_free });
             }
-            return Ok(Err((Gate::Path, Obstruction::contact(contact))));
+            return stop(Gate::Path, Obstruction::contact(contact), first);
         }
         *searches += 1;
         let goals: Vec<Vec<f64>> = ways.iter().map(|way| way.approach[0].clone()).collect();
-        let planned = plan_path(space, free, &request.start, &goals, &request.settings.plan())?;
-        let path = match planned {
+        let path = match plan_path(space, free, &request.start, &goals, &request.settings.plan())? {
             Planned::Path(path) => path,
             Planned::NotFound { iterations, .. } => {
-                return Ok(Err((Gate::Path, Obstruction::NoPath { iterations })));
+                return stop(Gate::Path, Obstruction::NoPath { iterations }, first);
             }
             Planned::StartNotFree | Planned::NoGoalFree => {
                 let what = "start or pre-grasps are not free".into();
-                return Ok(Err((Gate::Path, Obstruction::Other { what })));
+                return stop(Gate::Path, Obstruction::Other { what }, first);
             }
         };
         let way = &ways[path.goal];
         let shorter = shorten(free, &path.waypoints, &request.settings.shorten());
-        let tube = BlendSettings { tube: request.settings.tube };
-        let line_tube = BlendSettings { tube: LINE_TUBE };
         // Continuous joints may arrive some turns away: the straight lines go on from there.
         let arrival = shorter.last().unwrap_or(&request.start);
         let offset: Vec<f64> = arrival.iter().zip(&way.approach[0]).map(|(a, b)| a - b).collect();
         let curves = MotionCurves {
-            to_pre_grasp: blend(free, &shorter, &tube)?,
-            approach: moved_curve(&way.checks.approach, &way.approach, &offset, &line_tube)?,
-            lift: moved_curve(&way.checks.lift, &way.lift, &offset, &line_tube)?,
+            to_pre_grasp: blend(free, &shorter, &BlendSettings { tube: request.settings.tube })?,
+            approach: line_curve(&way.checks.approach, &way.approach, &offset)?,
+            lift: line_curve(&way.checks.lift, &way.lift, &offset)?,
         };
         let target = &way.candidate.target;
-        let motion =
-            timed_motion(space, self.planner.arm(), &curves, target, &way.checks, request)?;
-        Ok(motion.map(|timed| GraspMotion {
-            grasp,
-            target: target.clone(),
-            trajectory: timed.trajectory,
-            n_replayed: timed.n_replayed,
-        }))
+        match timed_motion(space, self.planner.arm(), &curves, target, &way.checks, request)? {
+            Ok(TimedMotion { trajectory, n_replayed }) => {
+                Ok(Ok(GraspMotion { grasp, target: target.clone(), trajectory, n_replayed }))
+            }
+            Err(obstruction) => stop(Gate::Replay, obstruction, target),
+        }
     }
 }
 
-/// A curve through the waypoints of a line, each joint moved by `offset`.
-fn moved_curve(
-    checker: &CollisionChecker,
-    waypoints: &[Vec<f64>],
-    offset: &[f64],
-    settings: &BlendSettings,
-) -> Result<Curve> {
-    let moved: Vec<Vec<f64>> = waypoints
-        .iter()
-        .map(|q| q.iter().zip(offset).map(|(q, offset)| q + offset).collect())
-        .collect();
-    blend(checker, &moved, settings)
+/// A curve through the waypoints of a straight line, each joint moved by `offset`.
+fn line_curve(checker: &CollisionChecker, waypoints: &[Vec<f64>], offset: &[f64]) -> Result<Curve> {
+    let moved = |q: &Vec<f64>| q.iter().zip(offset).map(|(q, offset)| q + offset).collect();
+    let moved: Vec<Vec<f64>> = waypoints.iter().map(moved).collect();
+    blend(checker, &moved, &BlendSettings { tube: LINE_TUBE })
 }
 
 /// Keeps the stop of the way that came farther.
 fn note(farthest: &mut Option<Stop>, stop: Stop) {
-    if farthest.as_ref().is_none_or(|(gate, _)| stop.0 > *gate) {
+    if farthest.as_ref().is_none_or(|known| stop.gate > known.gate) {
         *farthest = Some(stop);
+    }
+}
+
+/// Keeps the way that came farthest of all grasps.
+fn keep_miss(nearest: &mut Option<NearestMiss>, grasp: usize, stop: Stop) {
+    if nearest.as_ref().is_none_or(|known| stop.gate > known.gate) {
+        let Stop { gate, obstruction, q, target } = stop;
+        *nearest = Some(NearestMiss { grasp, target, gate, obstruction, positions: q });
     }
 }
 
@@ -366,7 +379,7 @@ fn contact_between(
     checker: &CollisionChecker,
     from: &[f64],
     to: &[f64],
-) -> Option<(Vec<f64>, crate::Contact)> {
+) -> Option<(Vec<f64>, Contact)> {
     (0..=N_LOOKS).find_map(|i| {
         let q = between(from, to, i as f64 / N_LOOKS as f64);
         let contact = checker.first_contact(&q)?;

@@ -5,7 +5,9 @@ use semfm_geom::math::DVec3;
 use crate::cartesian::LineSettings;
 use crate::gates::{GateCount, GraspOutcome, gate_table};
 use crate::planning::{BlendSettings, Contact, PlanSettings, ShortenSettings};
-use crate::{CollisionBody, Error, Hand, Pose, Result, Scene, TargetGrasp, Trajectory};
+use crate::{
+    CollisionBody, Error, Gate, Hand, Obstruction, Pose, Result, Scene, TargetGrasp, Trajectory,
+};
 
 /// A motion that is wanted: take the object by one of the grasps and lift it. Everything stands in the frame of the
 /// arm's base, metres.
@@ -143,7 +145,7 @@ impl MotionSettings {
 const MAX_LINE: f64 = 2.0;
 
 /// What the planner found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct MotionAnswer {
     /// The motion, where there is one.
     pub motion: Option<GraspMotion>,
@@ -151,6 +153,23 @@ pub struct MotionAnswer {
     pub outcomes: Vec<GraspOutcome>,
     /// Where the start itself touches something.
     pub start_contact: Option<StartContact>,
+    /// Of the ways that were stopped the one that came farthest, the first of those in rank.
+    pub nearest_miss: Option<NearestMiss>,
+}
+
+/// A way to take a grasp that was stopped.
+#[derive(Clone, Debug)]
+pub struct NearestMiss {
+    /// Which grasp: its place in the request, from 0.
+    pub grasp: usize,
+    /// The grasp, perhaps turned half way round its approach axis.
+    pub target: TargetGrasp,
+    /// The gate that was not passed.
+    pub gate: Gate,
+    /// Why.
+    pub obstruction: Obstruction,
+    /// Joint values where it ends: those that touch, or the best try at the grasp.
+    pub positions: Vec<f64>,
 }
 
 /// A motion that carries out one of the grasps.

@@ -1,14 +1,13 @@
 //! Which joint values reach the grasps, and which of them are best.
 
-use nalgebra::DMatrix;
 use semfm_geom::Task;
 use semfm_robot::{Arm, InverseKinematics};
 
 use crate::{Obstruction, Result, TargetGrasp};
 
-/// Distance of a joint from its nearest limit at which the quality of joint values is half of what it is far away,
-/// radians or metres. A tenth of a radian is what a straight way of 10 cm asks of a wrist.
-const NEAR_LIMIT: f64 = 0.1;
+/// Share of half its range from a limit at which a joint makes joint values half as good as they are in the middle: a
+/// straight way of 10 cm asks about as much of a wrist.
+const NEAR_LIMIT: f64 = 0.05;
 
 /// A joint this near to a limit stands at it, radians or metres.
 const AT_LIMIT: f64 = 1e-6;
@@ -31,8 +30,19 @@ pub(crate) struct Reached {
     pub grasp: usize,
     /// Ways to take it, best first.
     pub candidates: Vec<Candidate>,
-    /// Where there is none, by how much the best try missed.
-    pub obstruction: Option<Obstruction>,
+    /// Where there is none, the best try.
+    pub best_try: Option<BestTry>,
+}
+
+/// The try that came closest to a grasp that cannot be reached.
+#[derive(Clone, Debug)]
+pub(crate) struct BestTry {
+    /// The grasp with its turn.
+    pub target: TargetGrasp,
+    /// Joint values.
+    pub q: Vec<f64>,
+    /// By how much they miss.
+    pub obstruction: Obstruction,
 }
 
 /// Ways to take each grasp; grasps in the order of their best way, those that cannot be reached at the end.
@@ -59,7 +69,7 @@ fn reach_one(
     is_symmetric: bool,
     near: &[f64],
 ) -> Result<Reached> {
-    let mut reached = Reached { grasp, candidates: Vec::new(), obstruction: None };
+    let mut reached = Reached { grasp, candidates: Vec::new(), best_try: None };
     let turned = is_symmetric.then(|| target.turned());
     let mut least_error = f64::INFINITY;
     for target in std::iter::once(target).chain(&turned) {
@@ -74,11 +84,13 @@ fn reach_one(
         let error = closest.position_error.hypot(closest.rotation_error);
         if error < least_error {
             least_error = error;
-            reached.obstruction = Some(Obstruction::Unreachable {
+            let obstruction = Obstruction::Unreachable {
                 position: closest.position_error,
                 rotation: closest.rotation_error,
                 at_limits: joints_at_limits(kinematics.arm(), &closest.positions),
-            });
+            };
+            let (target, q) = (target.clone(), closest.positions);
+            reached.best_try = Some(BestTry { target, q, obstruction });
         }
     }
     Ok(reached)
@@ -86,45 +98,27 @@ fn reach_one(
 
 /// Gives each way its quality and sorts.
 ///
-/// > quality = score · m / (m + 0.1) · √(w / w_max)
+/// > quality = score · m / (m + 0.05) · √(w / w_max)
 ///
-/// with m the distance of the joint that is nearest to a limit, and w Yoshikawa's manipulability √det(J Jᵀ)
-/// (Manipulability of Robotic Mechanisms, IJRR 1985), w_max the greatest of all ways of all grasps: it has no unit of
-/// its own that two arms would share.
+/// with m the share of its half range that the joint nearest to a limit stands from it ([`Arm::limit_margin`]), w
+/// Yoshikawa's manipulability ([`Arm::manipulability`]), and w_max the greatest of all ways of all grasps: w has no unit
+/// that two arms would share.
 fn rank(arm: &Arm, reached: &mut [Reached]) {
     let manipulabilities: Vec<Vec<f64>> = reached
         .iter()
-        .map(|reached| reached.candidates.iter().map(|way| manipulability(arm, &way.q)).collect())
+        .map(|reached| reached.candidates.iter().map(|way| arm.manipulability(&way.q)).collect())
         .collect();
     let most = manipulabilities.iter().flatten().copied().fold(f64::MIN_POSITIVE, f64::max);
     for (reached, manipulabilities) in reached.iter_mut().zip(manipulabilities) {
         for (way, manipulability) in reached.candidates.iter_mut().zip(manipulabilities) {
-            let margin = limit_margin(arm, &way.q);
-            let margin_term = if margin.is_finite() { margin / (margin + NEAR_LIMIT) } else { 1.0 };
-            way.quality *= margin_term * (manipulability / most).sqrt();
+            let margin = arm.limit_margin(&way.q).max(0.0);
+            way.quality *= margin / (margin + NEAR_LIMIT) * (manipulability / most).sqrt();
         }
         // Stable: among equals the one nearest to the start comes first.
         reached.candidates.sort_by(|a, b| b.quality.total_cmp(&a.quality));
     }
     let best = |reached: &Reached| reached.candidates.first().map_or(-1.0, |way| way.quality);
     reached.sort_by(|a, b| best(b).total_cmp(&best(a)));
-}
-
-/// Distance of the joint that is nearest to a limit, radians or metres; infinite where no joint has one.
-fn limit_margin(arm: &Arm, q: &[f64]) -> f64 {
-    let margins =
-        arm.joints().iter().zip(q).map(|(joint, q)| (q - joint.lower).min(joint.upper - q));
-    margins.fold(f64::INFINITY, f64::min).max(0.0)
-}
-
-/// √det(J Jᵀ); of arms with less than six joints √det(Jᵀ J).
-fn manipulability(arm: &Arm, q: &[f64]) -> f64 {
-    let n = arm.n_joints();
-    let mut numbers = vec![0.0; 6 * n];
-    arm.jacobian(q, &mut numbers);
-    let jacobian = DMatrix::from_row_slice(6, n, &numbers); // (6 × n)
-    let square = if n < 6 { jacobian.tr_mul(&jacobian) } else { &jacobian * jacobian.transpose() };
-    square.determinant().max(0.0).sqrt()
 }
 
 /// Names of the joints that stand at a limit.

@@ -9,8 +9,8 @@ use crate::timing::{
     check_trajectory, retime,
 };
 use crate::{
-    CollisionChecker, Curve, Gate, JointSpace, Obstruction, Result, Segment, SegmentKind,
-    TargetGrasp, Trajectory, TrajectoryPoint,
+    CollisionChecker, Curve, JointSpace, Obstruction, Result, Segment, SegmentKind, TargetGrasp,
+    Trajectory, TrajectoryPoint,
 };
 
 /// The curves of a motion, each beginning where the one before ends.
@@ -36,7 +36,7 @@ pub(crate) fn timed_motion(
     target: &TargetGrasp,
     checks: &StepChecks,
     request: &MotionRequest,
-) -> Result<std::result::Result<TimedMotion, (Gate, Obstruction)>> {
+) -> Result<std::result::Result<TimedMotion, Obstruction>> {
     let settings = &request.settings;
     let limits = limits_of(arm)?;
     let (free, line) = (limits.at_speed(settings.speed)?, limits.at_speed(settings.line_speed)?);
@@ -64,7 +64,7 @@ pub(crate) fn timed_motion(
         for checker in checkers(checks, segment.kind) {
             let found = check_trajectory(space, checker, &limits, &segment.points, &replay)?;
             if let Some(violation) = found {
-                return Ok(Err((Gate::Replay, obstruction(violation))));
+                return Ok(Err(obstruction(violation)));
             }
         }
     }

@@ -7,7 +7,9 @@ use semfm::encoder::rendered_views::Coloring;
 use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, open_encoder};
 use semfm::geom::{SemanticCloud as Cloud, ShapeCache};
 use semfm::object_encoder::ObjectEncoder;
-use semfm::{EncoderRecord, FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap};
+use semfm::{
+    EncoderRecord, FeatureSource, PipelineSettings, PreparationReport, Prepared, Task, fmap,
+};
 use semfm_views::LiftReport;
 use semfm_views::mcap::EmbeddingsFile;
 
@@ -148,8 +150,9 @@ pub fn _restore_prepared(
     let cloud = cloud.map(|cloud| Arc::clone(&cloud.get().inner));
     let object = run(py, None, move |task| {
         Ok(match cloud {
-            Some(cloud) => fmap::PreparedObject::new(shape, cloud, task)?
-                .with_confidence_weights(weights),
+            Some(cloud) => {
+                fmap::PreparedObject::new(shape, cloud, task)?.with_confidence_weights(weights)
+            }
             None => fmap::PreparedObject::without_features(shape, task)?,
         })
     })?;

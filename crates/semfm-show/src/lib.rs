@@ -23,7 +23,7 @@ mod surface;
 mod transfer_files;
 
 pub use error::{Error, Result};
-pub use motion::{PLAN_FILES, write_animated_glb, write_plan_folder};
+pub use motion::{PLAN_FILES, write_animated_glb, write_plan, write_plan_folder};
 pub use page::{
     Fact, Group, Hands, Layer, LegendEntry, Motion, Panel, Picture, VertexColors, groups_of_paths,
     write_page,

@@ -57,6 +57,7 @@ pub mod demonstration;
 mod encoded_objects;
 mod error;
 pub mod files;
+mod grasp_plan;
 mod grasp_request;
 mod grasp_result;
 mod motion_scene;
@@ -66,6 +67,7 @@ mod object_size;
 mod pipeline;
 mod planned_motion;
 mod pose_dependence;
+mod robot_arm;
 pub mod upright;
 pub mod weight_colors;
 
@@ -75,6 +77,7 @@ pub use fmap::{
 };
 pub use geom::{Mesh, Task};
 pub use grasp::find_grasps;
+pub use grasp_plan::{GraspPlan, PlanObject, PlanRequest, plan};
 pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, POINT_MARGIN, Table};
 pub use grasp_result::{AnswerFrame, GraspResult};
 pub use motion_scene::{
@@ -88,3 +91,4 @@ pub use pipeline::{
 };
 pub use planned_motion::PlannedMotion;
 pub use pose_dependence::shares_of_poses;
+pub use robot_arm::RobotArm;

@@ -101,6 +101,7 @@ impl DemoCommand {
             },
             files: TransferFiles::All,
             grasps: Some(grasps),
+            motion: None,
         };
         let folder = self.output.join("transfer");
         // A demonstration shows where the time goes.

@@ -78,7 +78,7 @@ pub struct GraspOptions {
     /// Grasp at a pose whose verdict is `refuse`, too
     #[arg(long, requires = "aligned", help_heading = "Metres")]
     use_refused: bool,
-    /// Folder of a package that the gripper's URDF names (`package://NAME/…`)
+    /// Folder of a package that a URDF names (`package://NAME/…`)
     #[arg(long, value_name = "NAME=FOLDER", value_parser = parse_package, help_heading = "Gripper")]
     package: Vec<(String, PathBuf)>,
     /// What stands around the object: meshes and point clouds, in the frame of the answer, metres
@@ -218,6 +218,11 @@ impl GraspOptions {
             clearance: limits.clearance,
             pad_in_region: limits.pad_in_region,
         }
+    }
+
+    /// Folders of packages that URDFs name.
+    pub fn packages(&self) -> &[(String, PathBuf)] {
+        &self.package
     }
 
     /// The files it reads.

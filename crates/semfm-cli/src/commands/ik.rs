@@ -52,19 +52,19 @@ pub struct IkCommand {
 
 /// The files of an arm.
 #[derive(Debug, Args)]
-struct ArmOptions {
+pub struct ArmOptions {
     /// SRDF: the chain that is meant as the arm, named states
     #[arg(long, value_name = "FILE")]
-    srdf: Option<PathBuf>,
+    pub srdf: Option<PathBuf>,
     /// Joint limits (MoveIt's joint_limits.yaml)
     #[arg(long, value_name = "FILE")]
-    limits: Option<PathBuf>,
+    pub limits: Option<PathBuf>,
     /// The link in whose frame the pose is told; by default the SRDF's, or the root
     #[arg(long, value_name = "LINK")]
-    base: Option<String>,
+    pub base: Option<String>,
     /// The link that is moved; by default the SRDF's, or the end of the one chain of joints
     #[arg(long, value_name = "LINK")]
-    tip: Option<String>,
+    pub tip: Option<String>,
 }
 
 /// [`Preference`] by name.
@@ -80,11 +80,29 @@ enum PreferenceName {
     Manipulability,
 }
 
+impl ArmOptions {
+    /// The options of the arm that `urdf` describes.
+    pub fn files(&self, urdf: &Path) -> ArmFiles {
+        let Self { srdf, limits, base, tip } = self;
+        ArmFiles {
+            urdf: urdf.into(),
+            srdf: srdf.clone(),
+            limits: limits.clone(),
+            base: base.clone(),
+            tip: tip.clone(),
+            fixed: Vec::new(),
+        }
+    }
+
+    /// The files that it reads.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.srdf.iter().chain(&self.limits).map(PathBuf::as_path)
+    }
+}
+
 impl IkCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let ArmOptions { srdf, limits, base, tip } = self.arm;
-        let files = ArmFiles { urdf: self.robot, srdf, limits, base, tip, fixed: Vec::new() };
-        let opened = files.open()?;
+        let opened = self.arm.files(&self.robot).open()?;
         let pose = parse_pose(&self.pose).context("--pose")?;
         let near = near(&opened, self.near.as_deref()).context("--near")?;
         let settings = IkSettings {
@@ -115,8 +133,8 @@ impl IkCommand {
     }
 }
 
-/// Where the search begins.
-fn near(opened: &OpenedArm, text: Option<&str>) -> Result<Vec<f64>> {
+/// Joint values between commas, or a state of the SRDF; without text zero, or the limit next to it.
+pub fn near(opened: &OpenedArm, text: Option<&str>) -> Result<Vec<f64>> {
     let zero = |joint: &ArmJoint| 0.0_f64.clamp(joint.lower, joint.upper);
     let Some(text) = text else {
         return Ok(opened.arm.joints().iter().map(zero).collect());
@@ -132,7 +150,7 @@ fn near(opened: &OpenedArm, text: Option<&str>) -> Result<Vec<f64>> {
 }
 
 /// A pose from numbers between commas, or from a file.
-fn parse_pose(text: &str) -> Result<Pose> {
+pub fn parse_pose(text: &str) -> Result<Pose> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     let Some(numbers) = numbers else {
         let path = Path::new(text);

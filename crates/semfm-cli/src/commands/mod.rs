@@ -10,6 +10,8 @@ pub mod eval_maps;
 pub mod grasp;
 pub mod ik;
 pub mod info;
+mod motion_options;
+pub mod plan;
 pub mod region;
 mod report_options;
 pub mod show;

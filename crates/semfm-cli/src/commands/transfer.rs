@@ -15,14 +15,15 @@ use semfm::views::{self, mcap::EmbeddingsFile};
 use semfm::{
     FeatureSource, Mesh, Method, PipelineSettings, Prepared, Rule, Task, prepare, transfer,
 };
-use semfm_show::{TRANSFER_FILES, TransferFiles};
+use semfm_show::{PLAN_FILES, TRANSFER_FILES, TransferFiles};
 
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
 use super::grasp::{GraspOptions, gripper_help};
+use super::motion_options::MotionOptions;
 use super::region::grown;
 use super::size::print_size;
-use super::transfer_output::TransferOutput;
+use super::transfer_output::{ArmMotion, PLAN, TransferOutput};
 use crate::console;
 use crate::options::Common;
 use crate::output::{check_folder, check_folder_again};
@@ -37,8 +38,11 @@ use crate::output::{check_folder, check_folder_again};
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --encoder google/siglip2-base-patch16-224\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out \\\n    \
-    --source-embeddings mug.emb.mcap --target-embeddings kettle.emb.mcap\n\n\
-    Exit code 0: an answer to use or to check. 1: verdict `refuse` (every file is written all the same). 2: bad input.")]
+    --source-embeddings mug.emb.mcap --target-embeddings kettle.emb.mcap\n  \
+    semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --gripper franka --metres \\\n    \
+    --robot panda.urdf --srdf panda.srdf --base-from-object 0.5,0,0,0,0,0\n\n\
+    Exit code 0: an answer to use or to check. 1: verdict `refuse`, no grasp, or none that the arm can carry out (every \
+    file is written all the same). 2: bad input.")]
 pub struct TransferCommand {
     /// The demonstrated object's mesh
     source: PathBuf,
@@ -68,6 +72,14 @@ pub struct TransferCommand {
     gripper: Option<String>,
     #[command(flatten)]
     grasps: GraspOptions,
+    /// Go on to the motion of this arm (URDF); its folder is `plan` in that of the results
+    #[arg(long, value_name = "URDF", requires = "gripper", help_heading = "Arm")]
+    robot: Option<PathBuf>,
+    /// What stands around the arm, in the frame of its base, metres: scene.json, meshes and point clouds
+    #[arg(long, value_name = "FILE", requires = "robot", help_heading = "Scene")]
+    robot_scene: Vec<PathBuf>,
+    #[command(flatten)]
+    motion: MotionOptions,
 }
 
 #[derive(Debug, Args)]
@@ -155,6 +167,9 @@ struct Pair<T> {
 impl TransferCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         check_folder(&self.output, TRANSFER_FILES, &self.inputs())?;
+        if self.robot.is_some() {
+            check_folder(&self.output.join(PLAN), PLAN_FILES, &self.inputs())?;
+        }
         let task = console::progress(common.quiet);
         let settings = self.matching.settings(self.features.features);
         let files = Pair { source: read_mesh(&self.source)?, target: read_mesh(&self.target)? };
@@ -170,7 +185,11 @@ impl TransferCommand {
             }
             None => None,
         };
+        let motion = self.prepare_motion()?;
         check_folder_again(&self.output, TRANSFER_FILES)?;
+        if let Some(arm) = motion.as_ref().filter(|_| !common.quiet) {
+            arm.motion.print_notes();
+        }
         if let Some(problem) = grasps.as_ref().filter(|_| !common.quiet) {
             print_size(&problem.size());
         }
@@ -194,8 +213,17 @@ impl TransferCommand {
                 (None, false) => TransferFiles::All,
             },
             grasps,
+            motion,
         };
         output.write(&self.output, &task, common)
+    }
+
+    /// The arm, where one is given.
+    fn prepare_motion(&self) -> Result<Option<ArmMotion>> {
+        let Some(robot) = &self.robot else { return Ok(None) };
+        let (packages, seed) = (self.grasps.packages(), self.matching.seed);
+        let motion = self.motion.prepare(robot, packages, &self.robot_scene, seed)?;
+        Ok(Some(ArmMotion { motion, target: self.target.clone() }))
     }
 
     /// The files that it reads; the encoder and the gripper may be files, too.
@@ -214,6 +242,8 @@ impl TransferCommand {
             .map(PathBuf::as_path)
             .chain(named.into_iter().flatten().map(Path::new))
             .chain(self.grasps.files())
+            .chain(self.robot.iter().chain(&self.robot_scene).map(PathBuf::as_path))
+            .chain(self.motion.inputs())
             .collect()
     }
 

@@ -1,16 +1,17 @@
 //! What `transfer` and `demo` write and print of a finished transfer.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
 use semfm::demonstration::is_one_sided;
-use semfm::files::{Provenance, TransferResult, put_transfer, stages_ms};
+use semfm::files::{GraspsFile, Provenance, TransferResult, put_transfer, stages_ms};
 use semfm::fmap::Stages;
 use semfm::geom::io::StagedFolder;
 use semfm::grasp::Grasps;
-use semfm::{GraspProblem, Prepared, Region, Task, Transfer, Verdict};
-use semfm_show::{TransferFiles, write_transfer};
+use semfm::{GraspPlan, GraspProblem, PlanObject, Prepared, Region, Task, Transfer, Verdict};
+use semfm_show::{TransferFiles, write_plan, write_transfer};
 use serde_json::{Value, json};
 
 use super::Outcome;
@@ -18,6 +19,7 @@ use super::grasp::{
     draw_grasps, grasps_file_in_region, print_grasps, summary as grasps_summary,
     warn_of_dependent_grasps,
 };
+use super::motion_options::{PreparedMotion, print_plan, summary as plan_summary};
 use crate::console;
 use crate::options::Common;
 
@@ -32,7 +34,19 @@ pub struct TransferOutput<'a> {
     pub files: TransferFiles,
     /// Grasps in the transferred region, where a gripper was given.
     pub grasps: Option<GraspProblem>,
+    /// The arm that carries one of them out, with the target's mesh file, where a robot was given.
+    pub motion: Option<ArmMotion>,
 }
+
+/// An arm for the grasps of a transfer.
+pub struct ArmMotion {
+    pub motion: PreparedMotion,
+    /// The file of the target's mesh.
+    pub target: PathBuf,
+}
+
+/// The folder of the plan in that of the transfer.
+pub const PLAN: &str = "plan";
 
 impl TransferOutput<'_> {
     /// Writes every file, prints the answer, and says how the run ended. A refused region is not
@@ -44,23 +58,35 @@ impl TransferOutput<'_> {
         write_transfer(staged.path(), &self.result(), self.files, task)?;
         let write_ms = start.elapsed().as_secs_f64() * 1e3;
         let refused = self.transfer.verdict == Verdict::Refuse;
-        let mut grasps = None;
+        let (mut grasps, mut plan) = (None, None);
         if let Some(problem) = self.grasps.as_ref().filter(|_| !refused) {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
             let [file, picture] = GRASPS.map(|name| staged.path().join(name));
-            grasps_file_in_region(problem, weights, &found)?.write(&file)?;
+            let grasps_file = grasps_file_in_region(problem, weights, &found)?;
+            grasps_file.write(&file)?;
+            if let Some(arm) = self.motion.as_ref().filter(|_| !found.grasps.is_empty()) {
+                plan = Some((arm, self.plan(arm, grasps_file, task)?));
+            }
             warn_of_dependent_grasps(problem, weights, &found)?;
             if self.files == TransferFiles::All {
                 draw_grasps(&picture, problem, weights, &found, task)?;
             }
             grasps = Some(found);
         }
-        let files = put_transfer(staged)?;
+        let mut files = put_transfer(staged)?;
+        if let Some((arm, plan)) = &plan {
+            files.extend(write_plan(&folder.join(PLAN), &arm.motion.arm, plan, task)?);
+        }
+        let plan = plan.map(|(_, plan)| plan);
         let mut stages = stages_ms(self.source, self.target, self.transfer);
         stages.push("write", write_ms);
         if common.json {
-            console::data(self.summary(&stages, &files, grasps.as_ref()));
+            let mut summary = self.summary(&stages, &files, grasps.as_ref());
+            if let Some(plan) = &plan {
+                summary["plan"] = plan_summary(plan, &[]);
+            }
+            console::data(summary);
         } else {
             self.print(&stages, common);
             if let Some(found) = &grasps {
@@ -73,11 +99,22 @@ impl TransferOutput<'_> {
                     );
                 }
             }
+            if let Some(plan) = &plan {
+                print_plan(plan, common);
+            }
             console::data("wrote");
             files.iter().for_each(|file| console::data(format_args!("  {}", file.display())));
         }
-        let without = grasps.is_some_and(|found| found.grasps.is_empty());
+        let without = grasps.is_some_and(|found| found.grasps.is_empty())
+            || plan.is_some_and(|plan| plan.answer.motion.is_none());
         Ok(if refused || without { Outcome::NoAnswer } else { Outcome::Done })
+    }
+
+    /// The motion to one of the grasps.
+    fn plan(&self, arm: &ArmMotion, grasps: GraspsFile, task: &Task) -> Result<GraspPlan> {
+        let mesh = Arc::new(self.result().target_mesh().clone());
+        let object = PlanObject { mesh, file: arm.target.clone() };
+        arm.motion.plan(grasps, Some(object), task)
     }
 
     fn result(&self) -> TransferResult<'_> {

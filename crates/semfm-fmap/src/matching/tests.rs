@@ -216,7 +216,10 @@ fn a_second_opinion_is_computed_where_it_is_needed_or_asked_for() {
         if info.has_map {
             continue;
         }
-        assert_eq!(alone.confidence, alone.report.evidence.probability(&ConfidenceWeights::default()));
+        assert_eq!(
+            alone.confidence,
+            alone.report.evidence.probability(&ConfidenceWeights::default())
+        );
         let asked = TransferSettings { second_opinion: true, ..settings };
         let both = transfer(&source, &target, &region, &asked, &task).unwrap();
         assert_eq!(both.region, alone.region, "{method}: the answer is the same");

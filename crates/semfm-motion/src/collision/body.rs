@@ -176,7 +176,7 @@ impl Frame {
     }
 
     /// Points of `other`, a frame beside this one, as points of this one.
-    pub(crate) fn from_other(&self, other: &Self) -> Relative {
+    pub(crate) fn relative(&self, other: &Self) -> Relative {
         let back = self.turn.transpose();
         let translation = back * (other.pose.translation - self.pose.translation);
         Relative { turn: back * other.turn, translation }
@@ -209,7 +209,7 @@ pub(crate) fn body_gap(
     if apart - a.radius() - b.radius() >= most {
         return most;
     }
-    let a_from_b = a_at.from_other(b_at);
+    let a_from_b = a_at.relative(b_at);
     let mut least = most;
     for piece_b in b.pieces() {
         let bound = piece_b.spheres.bound();

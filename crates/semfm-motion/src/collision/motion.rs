@@ -5,7 +5,7 @@ use super::moving_body::Carried;
 use crate::planning::{Contact, Validity};
 
 /// Distances are looked at as far as this, metres: what is farther away is not worth the look. For the motions of
-/// `check_problems` (crates/semfm/examples) .05 takes a quarter longer, and .2 as long.
+/// `check_problems` (crates/semfm-eval/examples) .05 takes a quarter longer, and .2 as long.
 const LOOK: f64 = 0.1;
 
 impl CollisionChecker {

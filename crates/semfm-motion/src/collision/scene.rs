@@ -266,7 +266,7 @@ fn primitive_gap_by(
     if to(centre) - body.radius() >= most {
         return most;
     }
-    let here = at.from_other(body_at);
+    let here = at.relative(body_at);
     let mut least = most;
     for piece in body.pieces() {
         let by_spheres = piece.spheres.least_gap(least, |centre| to(here.point(centre)));

@@ -63,7 +63,7 @@ impl Surface {
             return most;
         }
         let mut least = most;
-        let here = at.from_other(body_at);
+        let here = at.relative(body_at);
         for piece in body.pieces() {
             let by_spheres = piece.spheres.least_gap(least, |centre| {
                 self.point_distance(here.point(centre), least + piece.spheres.bound().radius)

@@ -159,7 +159,7 @@ fn corner(
     // The middle is reach · turn / 4 away from the corner.
     let mut reach = room.min(4.0 * tube / greatest);
     for _ in 0..=HALVINGS {
-        if !(reach > 0.0) {
+        if reach.is_nan() || reach <= 0.0 {
             return None;
         }
         let piece = Piece {

@@ -43,8 +43,8 @@ impl Boxes {
         for (index, obstacle) in self.boxes.iter().enumerate() {
             let mut outside = 0.0;
             let mut inside = f64::NEG_INFINITY;
-            for joint in 0..q.len() {
-                let mut value = q[joint];
+            for (joint, &value) in q.iter().enumerate() {
+                let mut value = value;
                 if self.continuous[joint] {
                     value -= std::f64::consts::TAU * (value / std::f64::consts::TAU).round();
                 }

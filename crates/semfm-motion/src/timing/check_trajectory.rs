@@ -119,7 +119,7 @@ pub fn check_trajectory(
         return Ok(Some(violation));
     }
     for pair in points.windows(2) {
-        if !(pair[1].time > pair[0].time) {
+        if pair[0].time.partial_cmp(&pair[1].time) != Some(std::cmp::Ordering::Less) {
             let kind = ViolationKind::TimeStands { before: pair[0].time };
             return Ok(Some(Violation { time: pair[1].time, kind }));
         }

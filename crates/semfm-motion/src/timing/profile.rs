@@ -287,7 +287,7 @@ fn greatest_x(span: &Span, bound: f64, next: f64) -> f64 {
         // least₀ + k x = most₀ + m x
         let crossing =
             (range.most_line[0] - range.least_line[0]) / (range.least_line[1] - range.most_line[1]);
-        if !(crossing < x) {
+        if crossing.is_nan() || crossing >= x {
             // Rounding: the lines are as good as one.
             return x * (1.0 - ROUNDING);
         }

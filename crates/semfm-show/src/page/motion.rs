@@ -6,6 +6,7 @@ use semfm::files::read_motion;
 use semfm::geom::math::{DAffine3, DVec3, bounds};
 use semfm::motion::SegmentKind;
 use semfm::robot::{JointKind, Pose};
+use semfm::views::{RigSettings, camera_towards};
 use semfm::{Mesh, MotionScene, PlannedMotion, Task};
 use serde::Serialize;
 
@@ -14,7 +15,7 @@ use super::group::{Fact, Group, Layer, Panel, VIEWPOINT_SIDE, VertexColors};
 use crate::Result;
 use crate::colors::{SERIES, color_bytes, hex};
 use crate::motion::{Body, BodyKind, FrameTracks, MotionBodies, affine_of, continuous};
-use crate::pictures::{WeightedMesh, viewpoints_around};
+use crate::pictures::{Viewpoints, WeightedMesh, lowered, viewpoints_around};
 use crate::surface::Surface;
 
 /// Steps in which numbers are written: a hundredth of a millimetre, a millionth of a quaternion's unit, of a radian and
@@ -25,6 +26,11 @@ const JOINT_STEP: f64 = 1e-6;
 /// Length of the axes at the base, metres, and their radius as a share of it.
 const AXIS: f64 = 0.12;
 const AXIS_RADIUS: f64 = 0.03;
+/// Of the lines of joints: the six of the table of colours and a grey, since most arms have seven.
+const LINES: [[u8; 3]; 7] = {
+    let [a, b, c, d, e, f] = SERIES;
+    [a, b, c, d, e, f, [125, 125, 125]]
+};
 /// Red, green and blue for x, y and z.
 const AXES: [[u8; 3]; 3] = [[200, 60, 50], [60, 150, 70], [60, 100, 200]];
 
@@ -81,11 +87,7 @@ fn facts(motion: &PlannedMotion, bodies: &MotionBodies) -> Vec<Fact> {
 }
 
 /// From where the object at the grasp is seen best, or the arm where there is none.
-fn viewpoint(
-    motion: &PlannedMotion,
-    bodies: &MotionBodies,
-    task: &Task,
-) -> Result<crate::pictures::Viewpoints> {
+fn viewpoint(motion: &PlannedMotion, bodies: &MotionBodies, task: &Task) -> Result<Viewpoints> {
     let grasp =
         motion.trajectory.segment(SegmentKind::Approach).or(motion.trajectory.segments.last());
     let time = grasp.and_then(|segment| segment.points.last()).map_or(0.0, |point| point.time);
@@ -101,7 +103,10 @@ fn viewpoint(
     weights.resize(surface.vertices.len(), 0.0);
     let mesh = Mesh::new(surface.vertices, surface.faces)?;
     let all = WeightedMesh { mesh: &mesh, weights: &weights };
-    viewpoints_around(DVec3::Z, all, VIEWPOINT_SIDE, task)
+    let found = viewpoints_around(DVec3::Z, all, VIEWPOINT_SIDE, task)?;
+    let eye = lowered(-found.best.camera_from_world().matrix3.row(2));
+    let settings = RigSettings { size: VIEWPOINT_SIDE, ..Default::default() };
+    Ok(Viewpoints { best: camera_towards(&mesh, eye, DVec3::Z, &settings)?, ..found })
 }
 
 /// The axes of the base's frame, with their colours.
@@ -254,7 +259,7 @@ fn segments(motion: &PlannedMotion) -> Vec<SegmentData> {
 
 fn shown_name(kind: SegmentKind) -> &'static str {
     match kind {
-        SegmentKind::ToPreGrasp => "to the grasp",
+        SegmentKind::ToPreGrasp => "to pre-grasp",
         SegmentKind::Approach => "approach",
         SegmentKind::Close => "close",
         SegmentKind::Lift => "lift",
@@ -304,8 +309,8 @@ impl JointData {
         Self {
             name: name.clone(),
             unit: if is_slide { "m" } else { "rad" },
-            color: hex(SERIES[j % SERIES.len()]),
-            dashed: j >= SERIES.len(),
+            color: hex(LINES[j % LINES.len()]),
+            dashed: j >= LINES.len(),
             range: joint.and_then(|joint| joint.limits.position),
             fastest: joint.and_then(|joint| joint.limits.velocity),
             positions: encode_numbers(positions),

@@ -23,7 +23,7 @@ pub use viewpoints::{Viewpoints, viewpoints};
 pub(crate) use grasp_picture::{
     ARROW, ARROW_GAP, ARROW_RADIUS, N_SHOWN, OPACITY, TABLE_REACH, ball_radius,
 };
-pub(crate) use motion_picture::write_motion_picture_of;
+pub(crate) use motion_picture::{lowered, write_motion_picture_of};
 pub(crate) use pair_rotation::WeightedMesh;
 pub(crate) use semfm::upright::upright;
 pub(crate) use transfer_figure::ObjectFigure;

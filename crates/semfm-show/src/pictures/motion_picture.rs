@@ -19,6 +19,8 @@ use crate::colors::{APPROACH, COLLIDING, HandColors, OBJECT, OBSTACLE, TABLE, li
 use crate::motion::{BodyKind, MotionBodies, affine_of};
 use crate::surface::Surface;
 
+/// Side of the pictures of a miss: what failed takes a long line above them.
+const MISS_SIDE: u32 = 600;
 /// Length of the arrow to where the hand should be, its gap from there, and its radius as a share of the length.
 const ARROW: f64 = 0.12;
 const ARROW_GAP: f64 = 0.02;
@@ -69,7 +71,7 @@ pub(crate) fn write_motion_picture_of(
     let all = Mesh::new(all.vertices, all.faces)?;
     let mut pictures = Vec::with_capacity(painted.len());
     for scene in &painted {
-        pictures.push(scene.picture(&all, towards_eye, task)?);
+        pictures.push(scene.picture(&all, towards_eye, PICTURE_SIDE, task)?);
     }
     let columns: Vec<&str> = moments.iter().map(|moment| moment.name).collect();
     let rows = [Row { title: title(motion), pictures: &pictures }];
@@ -109,7 +111,7 @@ pub fn write_miss_picture(
     let all = Mesh::new(drawn.framed.vertices.clone(), drawn.framed.faces.clone())?;
     let mut pictures = Vec::with_capacity(2);
     for direction in directions {
-        pictures.push(drawn.picture(&all, direction, task)?);
+        pictures.push(drawn.picture(&all, direction, MISS_SIDE, task)?);
     }
     let mut legend = legend(&bodies);
     if let Some([a, b]) = &miss.pair {
@@ -118,6 +120,15 @@ pub fn write_miss_picture(
     legend.extend(miss.goal.map(|_| Entry::Swatch(APPROACH, "where the hand should be".into())));
     let rows = [Row { title: miss.title.clone(), pictures: &pictures }];
     Sheet { columns: &[], rows: &rows, legend: &legend }.write(path)
+}
+
+/// A direction towards the eye that looks down a little, as people look at a robot: from 15° to 35° above.
+pub(crate) fn lowered(towards_eye: DVec3) -> DVec3 {
+    let [low, high] = [15f64, 35.0].map(|degrees| degrees.to_radians().tan());
+    let along = towards_eye.with_z(0.0);
+    let along = along.try_normalize().unwrap_or(-DVec3::Y);
+    let slope = towards_eye.z / towards_eye.with_z(0.0).length().max(f64::MIN_POSITIVE);
+    (along + slope.clamp(low, high) * DVec3::Z).normalize()
 }
 
 /// A moment of a motion that is worth a picture.
@@ -225,12 +236,12 @@ impl Scene {
         }
         let all = WeightedMesh { mesh: &mesh, weights: &weights };
         let found = viewpoints_around(DVec3::Z, all, PICTURE_SIDE, task)?;
-        Ok([found.best, found.other].map(|camera| -camera.camera_from_world().matrix3.row(2)))
+        Ok([found.best, found.other].map(|c| lowered(-c.camera_from_world().matrix3.row(2))))
     }
 
     /// From a direction, so that `all` fits.
-    fn picture(&self, all: &Mesh, towards_eye: DVec3, task: &Task) -> Result<View> {
-        let settings = RigSettings { size: PICTURE_SIDE, ..Default::default() };
+    fn picture(&self, all: &Mesh, towards_eye: DVec3, side: u32, task: &Task) -> Result<View> {
+        let settings = RigSettings { size: side, ..Default::default() };
         let camera = camera_towards(all, towards_eye, DVec3::Z, &settings)?;
         self.painted.rendered(camera, 0.0, task)
     }

@@ -135,8 +135,9 @@ impl Sheet<'_> {
             if layout.strip > 0 {
                 draw_rule(canvas, top, layout.width);
                 let baseline = top as f32 + 30.0;
-                Text { text: &row.title, left: MARGIN, baseline, size: TITLE, color: INK }
-                    .draw(canvas);
+                let room = layout.width as f32 - 2.0 * MARGIN;
+                let size = TITLE * (room / stroke_font::width(&row.title, TITLE)).min(1.0);
+                Text { text: &row.title, left: MARGIN, baseline, size, color: INK }.draw(canvas);
             }
             top += layout.strip;
             for (column, view) in row.pictures.iter().enumerate() {

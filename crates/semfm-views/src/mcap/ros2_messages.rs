@@ -151,7 +151,7 @@ impl Ros2Message {
             waiting.extend(part.parts.iter().rev().copied());
         }
         let (name, encoding) = (definition.name.to_owned(), "ros2msg".to_owned());
-        Schema { name, encoding, data: text.into_bytes().into() }
+        Schema { name, encoding, data: text.into_bytes() }
     }
 }
 

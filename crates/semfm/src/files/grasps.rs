@@ -5,6 +5,7 @@ use std::path::Path;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::{Shape, TypedShape};
+use semfm_align::Sim3;
 use semfm_geom::io::{FormatError, read_json};
 use semfm_geom::{Mesh, MeshIdentity};
 use semfm_grasp::Grasp;
@@ -14,9 +15,9 @@ use serde_json::Value;
 
 use super::trajectory::FingerRecord;
 use super::{MatrixRows, write_json};
-use crate::Result;
 use crate::grasp_result::{AnswerFrame, GraspResult, position_and_rotation};
 use crate::motion_scene::FingerJoint;
+use crate::{Error, Result};
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.grasps/1";
@@ -223,13 +224,43 @@ impl GraspsFile {
     /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format,
     /// [`Error::Format`](crate::Error::Format) for another mesh or a scale that is not positive.
     pub fn read(path: &Path, mesh: &Mesh) -> Result<Self> {
-        let file: Self = read_json(path)?;
+        let file = Self::read_alone(path)?;
         file.mesh.check(mesh).map_err(|error| error.in_file(path))?;
+        Ok(file)
+    }
+
+    /// Reads grasps of a mesh that is not at hand.
+    ///
+    /// # Errors
+    /// As [`GraspsFile::read`], but for the mesh.
+    pub fn read_alone(path: &Path) -> Result<Self> {
+        let file: Self = read_json(path)?;
+        if file.format != FORMAT {
+            return Err(FormatError::new(path, "format", FORMAT, file.format).into());
+        }
         if !(file.object_scale > 0.0 && file.object_scale.is_finite()) {
             let found = file.object_scale.to_string();
             return Err(FormatError::new(path, "object_scale", "a positive number", found).into());
         }
         Ok(file)
+    }
+}
+
+impl GraspsFile {
+    /// Where the object stood before the camera.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the grasps were not found before a camera, or the pose is none.
+    pub fn camera_pose(&self) -> Result<Pose> {
+        let expected = "the pose of the object before the camera (grasp … --aligned)";
+        let rows = self.camera_from_object.ok_or_else(|| {
+            let found = "none: tell where the object stands with base_from_object";
+            Error::invalid("camera_from_object of the grasps", expected, found)
+        })?;
+        let invalid = |error: semfm_align::Error| {
+            Error::invalid("camera_from_object of the grasps", expected, error.to_string())
+        };
+        Ok(Sim3::from_rows(rows).map_err(invalid)?.rigid())
     }
 }
 

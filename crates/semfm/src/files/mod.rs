@@ -10,6 +10,7 @@
 //! | `aligned.json`, the pose of an object before a camera | `semfm.aligned/1` | [`AlignedFile`] |
 //! | what stands around an arm | `semfm.scene/1` | [`SceneFile`] |
 //! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
+//! | `plan.json` | `semfm.plan/1` | [`PlanFile`] |
 //! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
 //!
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
@@ -31,6 +32,7 @@ mod isaac_grasps;
 mod mask;
 mod obstacle;
 mod picture;
+mod plan;
 mod point_map;
 mod region;
 mod rigid_pose;
@@ -66,6 +68,9 @@ pub use intrinsics::read_intrinsics;
 pub use isaac_grasps::write_isaac_grasps;
 pub use mask::{MaskedPicture, read_mask};
 pub use obstacle::read_obstacle;
+pub use plan::{
+    FORMAT as PLAN_FORMAT, PlanFile, PlanSettingsRecord, SegmentSeconds, StartContactRecord,
+};
 pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
 pub use rigid_pose::read_rigid_pose;
@@ -74,8 +79,8 @@ pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
 pub use scene::{
-    BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord, SceneContents,
-    SceneFile, SphereRecord, TablePlaneRecord, read_scene,
+    BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord,
+    SceneContents, SceneFile, SphereRecord, TablePlaneRecord, read_scene,
 };
 pub use stored_transfer::StoredTransfer;
 pub use trajectory::{

@@ -118,7 +118,8 @@ mod tests {
     fn faults_are_named_by_their_place() {
         let joints = ["a".to_owned()];
         check_segments(Path::new("t.json"), &joints, &sound()).unwrap();
-        let spoil: [(&str, fn(&mut Vec<Segment>)); 10] = [
+        type Spoil = fn(&mut Vec<Segment>);
+        let spoil: [(&str, Spoil); 10] = [
             ("segments", |s| s.clear()),
             ("segments[1].points", |s| s[1].points.truncate(1)),
             ("segments[0].points[1].time", |s| s[0].points[1].time = 0.0),

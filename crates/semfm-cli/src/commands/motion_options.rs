@@ -1,0 +1,276 @@
+//! The options of a motion, wherever the grasps come from, and what is printed of a plan.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use semfm::files::{
+    GraspsFile, PlanFile, SceneContents, read_obstacle, read_rigid_pose, read_scene,
+};
+use semfm::geom::math::DVec3;
+use semfm::motion::{CollisionSettings, MotionSettings, Pose, Scene};
+use semfm::{
+    GraspPlan, MotionObstacle, Obstacle, ObstacleShape, POINT_MARGIN, PlanObject, PlanRequest,
+    RobotArm, Task, plan,
+};
+use serde_json::{Value, json};
+
+use super::ik::{ArmOptions, near, parse_pose};
+use crate::console;
+use crate::options::Common;
+
+/// How an arm is to move.
+#[derive(Debug, Args)]
+pub struct MotionOptions {
+    #[command(flatten, next_help_heading = "Arm")]
+    arm: ArmOptions,
+    /// Where the TCP of the closed hand is in the frame of --tip; by default --tip is the flange that the gripper's
+    /// `flange_from_tcp` starts from. X,Y,Z and QX,QY,QZ,QW or ROLL,PITCH,YAW, or a JSON file
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Arm")]
+    tip_from_tcp: Option<String>,
+    /// Joint values at the start, base to tip, or a state of the SRDF; by default its state `ready` or `home`
+    #[arg(long, value_name = "Q1,…|NAME", allow_hyphen_values = true, help_heading = "Arm")]
+    start: Option<String>,
+    /// Where the object, in metres, stands in the frame of the arm's base
+    #[arg(
+        long,
+        value_name = "POSE|FILE",
+        allow_hyphen_values = true,
+        conflicts_with = "base_from_camera",
+        help_heading = "Frames"
+    )]
+    base_from_object: Option<String>,
+    /// Where the camera that the grasps were found with stands in the frame of the arm's base
+    #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Frames")]
+    base_from_camera: Option<String>,
+    /// Leave out the table that the grasps were found with
+    #[arg(long, help_heading = "Scene")]
+    no_table: bool,
+    /// Length of the straight way to the grasp, metres
+    #[arg(long, default_value_t = MotionSettings::default().approach, value_name = "METRES", help_heading = "Motion")]
+    approach_length: f64,
+    /// Height of the straight way up with the object, metres along z of the arm's base
+    #[arg(long, default_value_t = MotionSettings::default().lift.z, value_name = "METRES", help_heading = "Motion")]
+    lift_height: f64,
+    /// Share of the joints' velocity limits that is used; accelerations follow with its square
+    #[arg(long, default_value_t = MotionSettings::default().speed, value_name = "SHARE", help_heading = "Motion")]
+    speed: f64,
+    /// The same on the straight ways
+    #[arg(long, default_value_t = MotionSettings::default().line_speed, value_name = "SHARE", help_heading = "Motion")]
+    line_speed: f64,
+    /// Most iterations of each search for a path
+    #[arg(long, default_value_t = MotionSettings::default().iterations, value_name = "N", help_heading = "Motion")]
+    iterations: usize,
+    /// Grasps for which a path is searched at most
+    #[arg(long, default_value_t = MotionSettings::default().searches, value_name = "N", help_heading = "Motion")]
+    searches: usize,
+}
+
+/// Where the object stands.
+#[derive(Clone, Copy, Debug)]
+enum ObjectPlace {
+    /// In the frame of the arm's base.
+    Object(Pose),
+    /// Before a camera that stands there.
+    Camera(Pose),
+}
+
+/// Options that were read, with the files that they name.
+#[derive(Clone, Debug)]
+pub struct PreparedMotion {
+    pub arm: RobotArm,
+    place: ObjectPlace,
+    tip_from_tcp: Option<Pose>,
+    start: Vec<f64>,
+    scene: SceneContents,
+    with_table: bool,
+    settings: MotionSettings,
+}
+
+impl MotionOptions {
+    /// The files that it reads; poses may be files, too.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let poses = [&self.tip_from_tcp, &self.base_from_object, &self.base_from_camera];
+        self.arm.inputs().chain(poses.into_iter().flatten().map(Path::new))
+    }
+
+    /// Reads all that a motion of the robot needs but the grasps.
+    pub fn prepare(
+        &self,
+        robot: &Path,
+        packages: &[(String, PathBuf)],
+        scene: &[PathBuf],
+        seed: u64,
+    ) -> Result<PreparedMotion> {
+        let place = match (&self.base_from_object, &self.base_from_camera) {
+            (Some(text), _) => ObjectPlace::Object(pose("base_from_object", text)?),
+            (None, Some(text)) => ObjectPlace::Camera(pose("base_from_camera", text)?),
+            (None, None) => bail!(
+                "where does the object stand? expected --base-from-object, or --base-from-camera with grasps in a \
+                 camera's frame, found neither"
+            ),
+        };
+        let packages = packages.iter().cloned().collect();
+        let arm = RobotArm::open(&self.arm.files(robot), &packages, &CollisionSettings::default())?;
+        let start = match &self.start {
+            Some(text) => near(arm.opened(), Some(text)).context("--start")?,
+            None => arm.ready_state().context("--start")?,
+        };
+        let tip_from_tcp = self.tip_from_tcp.as_ref().map(|text| pose("tip_from_tcp", text));
+        Ok(PreparedMotion {
+            place,
+            tip_from_tcp: tip_from_tcp.transpose()?,
+            start,
+            scene: read_surroundings(scene)?,
+            with_table: !self.no_table,
+            settings: MotionSettings {
+                seed,
+                approach: self.approach_length,
+                lift: DVec3::Z * self.lift_height,
+                speed: self.speed,
+                line_speed: self.line_speed,
+                iterations: self.iterations,
+                searches: self.searches,
+                ..Default::default()
+            },
+            arm,
+        })
+    }
+}
+
+impl PreparedMotion {
+    /// Says what was found or assumed.
+    pub fn print_notes(&self) {
+        self.arm.notes().iter().for_each(|note| console::message(format_args!("note: {note}")));
+    }
+
+    /// With grasps that are there.
+    pub fn plan(
+        &self,
+        grasps: GraspsFile,
+        object: Option<PlanObject>,
+        task: &Task,
+    ) -> Result<GraspPlan> {
+        let base_from_object = match self.place {
+            ObjectPlace::Object(base_from_object) => base_from_object,
+            ObjectPlace::Camera(base_from_camera) => base_from_camera * grasps.camera_pose()?,
+        };
+        let request = PlanRequest {
+            grasps,
+            object,
+            base_from_object,
+            tip_from_tcp: self.tip_from_tcp,
+            start: self.start.clone(),
+            scene: self.scene.clone(),
+            with_table: self.with_table,
+            settings: self.settings.clone(),
+        };
+        Ok(plan(&self.arm, &request, task)?)
+    }
+}
+
+/// A pose from numbers, or from a file that has it bare or in the field `name`.
+fn pose(name: &str, text: &str) -> Result<Pose> {
+    let option = || format!("--{}", name.replace('_', "-"));
+    let path = Path::new(text);
+    if path.exists() {
+        return read_rigid_pose(path, name).with_context(option);
+    }
+    parse_pose(text).with_context(option)
+}
+
+/// One scene.json at most, then meshes and clouds by the names of their files.
+fn read_surroundings(files: &[PathBuf]) -> Result<SceneContents> {
+    let is_scene =
+        |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let mut scenes = files.iter().filter(is_scene);
+    let mut contents = match scenes.next() {
+        Some(path) => read_scene(path)?,
+        None => SceneContents { scene: Scene::new(), obstacles: Vec::new() },
+    };
+    if let Some(second) = scenes.next() {
+        bail!("{}: expected one scene.json at most, found a second one", second.display());
+    }
+    for path in files.iter().filter(|path| !is_scene(path)) {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let (at, scene) = (Pose::IDENTITY, contents.scene);
+        let (scene, shape) = match read_obstacle(path)? {
+            Obstacle::Mesh(mesh) => {
+                let scene = scene.with_mesh(&name, &mesh, 1.0, at);
+                (scene, ObstacleShape::Mesh(std::sync::Arc::new(mesh)))
+            }
+            Obstacle::Points(points) => {
+                (scene.with_cloud(&name, &points, POINT_MARGIN, at), ObstacleShape::Points(points))
+            }
+        };
+        contents.scene = scene.with_context(|| path.display().to_string())?;
+        contents.obstacles.push(MotionObstacle { name, base_from_obstacle: at, shape });
+    }
+    Ok(contents)
+}
+
+/// The plan in short, for `--json`.
+pub fn summary(plan: &GraspPlan, files: &[PathBuf]) -> Value {
+    let PlanFile { grasp, segments, gates, start_contact, notes, .. } = PlanFile::new(plan);
+    json!({
+        "grasp": grasp,
+        "duration": plan.answer.motion.as_ref().map(|motion| motion.trajectory.duration()),
+        "segments": segments,
+        "gates": gates,
+        "start_contact": start_contact,
+        "notes": notes,
+        "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+    })
+}
+
+/// The motion on stdout; the gates as a table, on stderr beside a motion that was asked for with `--verbose`.
+pub fn print_plan(plan: &GraspPlan, common: &Common) {
+    let answer = &plan.answer;
+    let n = answer.outcomes.len();
+    if !common.quiet {
+        plan.notes.iter().for_each(|note| console::message(format_args!("note: {note}")));
+    }
+    match &answer.motion {
+        Some(motion) => {
+            let seconds: Vec<String> = PlanFile::new(plan)
+                .segments
+                .iter()
+                .map(|segment| format!("{} {:.2} s", segment.kind.name(), segment.seconds))
+                .collect();
+            console::data(format_args!(
+                "motion      grasp {} of {n} in {:.2} s: {}",
+                motion.grasp,
+                motion.trajectory.duration(),
+                seconds.join(", ")
+            ));
+            console::data(format_args!("replayed    {} states, none refused", motion.n_replayed));
+        }
+        None => console::data(format_args!("motion      none of {n} grasps can be carried out")),
+    }
+    if answer.motion.is_some() && !common.verbose {
+        return;
+    }
+    for row in answer.gates() {
+        console::message(format_args!(
+            "{:8}  {:10} grasp {}: {}",
+            row.n, row.gate, row.grasp, row.obstruction
+        ));
+    }
+    if answer.motion.is_some() {
+        return;
+    }
+    if let Some(start) = &answer.start_contact {
+        let free = start.nearest_free.as_ref().map_or_else(String::new, |q| {
+            let words: Vec<String> = q.iter().map(|q| format!("{q:.4}")).collect();
+            format!("; the nearest free start that was found: --start {}", words.join(","))
+        });
+        console::message(format_args!(
+            "the start is in collision: {} is {:.1} mm inside {}{free}",
+            start.contact.a,
+            1e3 * start.contact.depth,
+            start.contact.b
+        ));
+    } else if let Some(miss) = &answer.nearest_miss {
+        console::message(format_args!("what would change it: {}", miss.gate.advice()));
+    }
+}

@@ -1,0 +1,90 @@
+//! An arm from its files, ready to plan with.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use semfm_motion::{CollisionModel, CollisionSettings, MotionPlanner};
+use semfm_robot::{Arm, ArmFiles, MeshPaths, OpenedArm};
+
+use crate::{Error, Result};
+
+/// Names of states in which arms stand ready, in the order in which they are looked for.
+const READY: [&str; 3] = ["ready", "home", "up"];
+
+/// An arm with its collision model: read once, planned with often.
+#[derive(Clone, Debug)]
+pub struct RobotArm {
+    urdf: PathBuf,
+    packages: BTreeMap<String, PathBuf>,
+    opened: OpenedArm,
+    planner: MotionPlanner,
+    notes: Vec<String>,
+}
+
+impl RobotArm {
+    /// Reads the files of an arm and makes its collision model. `packages` maps the names of `package://NAME/…`.
+    ///
+    /// # Errors
+    /// [`Error::Robot`] for files that are not what they should be, links that are not there, joints whose limits are
+    /// crossed, a base that floats; [`Error::Motion`] where the collision model cannot be made.
+    pub fn open(
+        files: &ArmFiles,
+        packages: &BTreeMap<String, PathBuf>,
+        collision: &CollisionSettings,
+    ) -> Result<Self> {
+        let opened = files.open()?;
+        let paths = MeshPaths::new(&files.urdf, packages);
+        let model =
+            CollisionModel::new(opened.arm.clone(), &paths, opened.srdf.as_ref(), collision)?;
+        let mut notes = opened.notes.clone();
+        notes.extend(model.notes().iter().cloned());
+        let planner = MotionPlanner::new(Arc::new(model))?;
+        notes.extend(planner.notes().iter().cloned());
+        let (urdf, packages) = (files.urdf.clone(), packages.clone());
+        Ok(Self { urdf, packages, opened, planner, notes })
+    }
+
+    /// The chain of joints.
+    pub fn arm(&self) -> &Arc<Arm> {
+        &self.opened.arm
+    }
+
+    /// The arm with what was read beside it.
+    pub fn opened(&self) -> &OpenedArm {
+        &self.opened
+    }
+
+    /// The planner of this arm.
+    pub fn planner(&self) -> &MotionPlanner {
+        &self.planner
+    }
+
+    /// The file of the description.
+    pub fn urdf(&self) -> &Path {
+        &self.urdf
+    }
+
+    /// Folders of the packages in `package://NAME/…`.
+    pub fn packages(&self) -> &BTreeMap<String, PathBuf> {
+        &self.packages
+    }
+
+    /// What was found or assumed, in words.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Joint values of the state in which the arm stands ready by its SRDF: `ready`, `home` or `up`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where it tells none.
+    pub fn ready_state(&self) -> Result<Vec<f64>> {
+        let names: Vec<&str> =
+            self.arm().joints().iter().map(|joint| joint.name.as_str()).collect();
+        READY.iter().find_map(|name| self.opened.named_state(name).ok()).ok_or_else(|| {
+            let expected = format!("joint values of {}", names.join(", "));
+            Error::invalid("start", expected, "none, and no SRDF with a state `ready` or `home`")
+        })
+    }
+}
