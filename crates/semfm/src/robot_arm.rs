@@ -27,7 +27,8 @@ impl RobotArm {
     ///
     /// # Errors
     /// [`Error::Robot`] for files that are not what they should be, links that are not there, joints whose limits are
-    /// crossed, a base that floats; [`Error::Motion`] where the collision model cannot be made.
+    /// crossed, a base that floats; [`Error::Motion`] where the collision model cannot be made;
+    /// [`Error::Invalid`] where a mesh of a link is missing: nothing would keep that link from touching something.
     pub fn open(
         files: &ArmFiles,
         packages: &BTreeMap<String, PathBuf>,
@@ -37,6 +38,11 @@ impl RobotArm {
         let paths = MeshPaths::new(&files.urdf, packages);
         let model =
             CollisionModel::new(opened.arm.clone(), &paths, opened.srdf.as_ref(), collision)?;
+        if let Some(first) = model.missing().first() {
+            let expected = "every mesh, so that no link moves unchecked: map its package (--package NAME=FOLDER)";
+            let found = format!("{} that are missing, first {first}", model.missing().len());
+            return Err(Error::invalid("collision meshes of the robot", expected, found));
+        }
         let mut notes = opened.notes.clone();
         notes.extend(model.notes().iter().cloned());
         let planner = MotionPlanner::new(Arc::new(model))?;

@@ -24,8 +24,8 @@ use crate::options::Common;
 pub struct MotionOptions {
     #[command(flatten, next_help_heading = "Arm")]
     arm: ArmOptions,
-    /// Where the TCP of the closed hand is in the frame of --tip; by default --tip is the flange that the gripper's
-    /// `flange_from_tcp` starts from. X,Y,Z and QX,QY,QZ,QW or ROLL,PITCH,YAW, or a JSON file
+    /// Where the TCP of the closed hand is in the frame of --tip; by default --tip, which must then be given, is the flange that
+    /// the gripper's `flange_from_tcp` starts from. X,Y,Z and QX,QY,QZ,QW or ROLL,PITCH,YAW, or a JSON file
     #[arg(long, value_name = "POSE|FILE", allow_hyphen_values = true, help_heading = "Arm")]
     tip_from_tcp: Option<String>,
     /// Joint values at the start, base to tip, or a state of the SRDF; by default its state `ready` or `home`
@@ -110,6 +110,13 @@ impl MotionOptions {
                  camera's frame, found neither"
             ),
         };
+        if self.arm.tip.is_none() && self.tip_from_tcp.is_none() {
+            bail!(
+                "where is the hand mounted? expected --tip, the link that the gripper's flange sits on \
+                 (`semfm-cli info {}` names the links), or --tip-from-tcp, found neither",
+                robot.display()
+            );
+        }
         let packages = packages.iter().cloned().collect();
         let arm = RobotArm::open(&self.arm.files(robot), &packages, &CollisionSettings::default())?;
         let start = match &self.start {

@@ -38,6 +38,7 @@ pub struct CollisionModel {
     pairs: Vec<[usize; 2]>,
     skipped: Vec<SkippedPair>,
     notes: Vec<String>,
+    missing: Vec<String>,
     settings: CollisionSettings,
 }
 
@@ -64,10 +65,12 @@ impl CollisionModel {
                 found: settings.contact.to_string(),
             });
         }
-        let (mut bodies, mut notes) = (Vec::new(), Vec::new());
+        let (mut bodies, mut notes, mut missing) = (Vec::new(), Vec::new(), Vec::new());
         for (index, link) in arm.robot().links.iter().enumerate() {
             let shape = LinkShape::new(link, paths)?;
             add_notes(&link.name, &shape, link.collisions.is_empty(), &mut notes);
+            missing
+                .extend(shape.missing.iter().map(|mesh| format!("link `{}`: {mesh}", link.name)));
             if !shape.pieces.is_empty() {
                 let body = CollisionBody::from_link(&shape)?;
                 bodies.push(MovingBody::new(&arm, link.name.clone(), index, Pose::IDENTITY, body));
@@ -80,7 +83,8 @@ impl CollisionModel {
                 Pairs::by_samples(&arm, &bodies, contact, n_samples, seed)
             }
         };
-        Ok(Self { arm, bodies, pairs: checked, skipped, notes, settings: settings.clone() })
+        let settings = settings.clone();
+        Ok(Self { arm, bodies, pairs: checked, skipped, notes, missing, settings })
     }
 
     /// The same links, moved by another arm of the same robot: other fixed positions, another tip. Pairs stay as they
@@ -145,6 +149,11 @@ impl CollisionModel {
     /// The links that have a shape, by name, with their bodies.
     pub fn bodies(&self) -> impl ExactSizeIterator<Item = (&str, &CollisionBody)> {
         self.bodies.iter().map(|body| (body.name.as_str(), &body.body))
+    }
+
+    /// Meshes of links that are not there, so that these links are not checked, or only in part: each with its link and why.
+    pub fn missing(&self) -> &[String] {
+        &self.missing
     }
 
     /// How collisions are checked.
