@@ -13,7 +13,7 @@ impl CollisionChecker {
     /// has unrolled continuous joints), both ends included.
     ///
     /// The way is cut in halves until all of it is covered: where the arm is free at a state, so is the part of the way
-    /// around it on which no gap can close ([`Approach`](super::moving_body::Approach)). While this says yes, nothing
+    /// around it on which no gap can close (`Approach`). While this says yes, nothing
     /// comes nearer than half the contact distance at any time, and nothing is nearer than all of it at the states that
     /// were looked at.
     pub fn motion_is_free(&self, from: &[f64], to: &[f64]) -> bool {
