@@ -3,7 +3,7 @@
 ``pip install numpy pyyaml pin ompl==2.0.1 toppra``, then::
 
     python bench/planning_problems.py unpack shared/data/planning/motion_bench_maker CACHE
-    cargo run --release -p semfm --example plan_problems CACHE/panda CACHE/panda/plans.jsonl          # and ur5
+    cargo run --release -p semfm-eval --example plan_problems CACHE/panda CACHE/panda/plans.jsonl          # and ur5
     python bench/planning.py summary CACHE/panda/plans.jsonl CACHE/ur5/plans.jsonl
     python bench/planning.py toppra CACHE/panda/plans.jsonl CACHE/ur5/plans.jsonl
     python bench/planning.py replay CACHE/panda CACHE/panda/plans.jsonl --every 7
