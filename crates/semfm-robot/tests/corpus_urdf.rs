@@ -1,19 +1,12 @@
 //! Every URDF of the shared corpus: the verdict of its manifest, with the reason that it names.
-#![allow(clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
+mod shared_data;
+
+use std::path::Path;
 
 use semfm_robot::{MeshPaths, MeshPlace, RobotDescription};
 
-fn shared(what: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
-    if folder.exists() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
-    None
-}
+use shared_data::shared;
 
 #[test]
 fn every_description_gets_its_verdict_and_the_reason_for_it() {

@@ -1,8 +1,9 @@
 //! Inverse kinematics of published arms: random reachable poses are reached, on every branch.
-#![allow(clippy::print_stderr)]
+
+mod shared_data;
 
 use std::f64::consts::TAU;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
@@ -10,6 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use semfm_robot::{
     Arm, ArmSettings, IkSettings, InverseKinematics, Pose, Preference, RobotDescription,
 };
+
+use shared_data::shared;
 
 /// Random poses for each arm; `bench/ik.py` tries 1,000.
 const N_POSES: usize = 200;
@@ -21,16 +24,6 @@ const ARMS: [(&str, &str); 4] = [
     ("robots/ur5e/urdf/ur5e_local.urdf", "tool0"),
     ("arms/roboplan/kinova_robot_model/kinova_robotiq.urdf", "end_effector_link"),
 ];
-
-fn shared(what: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
-    if folder.exists() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
-    None
-}
 
 fn arm(file: &Path, tip: &str) -> Arc<Arm> {
     let robot = Arc::new(RobotDescription::read(file).unwrap().tree().unwrap());

@@ -1,19 +1,10 @@
 //! Published arms: what is found in their descriptions, SRDF files and joint limits.
-#![allow(clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
+mod shared_data;
 
 use semfm_robot::{ArmFiles, JointKind, JointLimitsFile};
 
-fn shared(what: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
-    if folder.exists() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
-    None
-}
+use shared_data::shared;
 
 struct Published {
     urdf: &'static str,

@@ -1,7 +1,6 @@
 //! Published grippers: what is found in their descriptions, beside their makers' figures and ours.
-#![allow(clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
+mod shared_data;
 
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::Pose;
@@ -10,15 +9,7 @@ use parry3d_f64::shape::Cuboid;
 use semfm_geom::math::DVec3;
 use semfm_robot::{Gripper, GripperSettings, PosedPart, Role};
 
-fn shared(what: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("SEMFM_SHARED").map_or(beside, PathBuf::from).join(what);
-    if folder.exists() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: no shared data at {}; set SEMFM_SHARED", folder.display());
-    None
-}
+use shared_data::shared;
 
 struct Published {
     file: &'static str,
