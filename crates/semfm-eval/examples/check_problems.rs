@@ -3,48 +3,23 @@
 //! `check_problems FOLDER` reads what `bench/planning_problems.py unpack` wrote and prints one line of JSON a state:
 //! `{"problem": …, "state": "start", "free": …, "contacts": [[a, b, depth], …]}`. Times go to stderr.
 
+mod problems;
+
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use semfm::files::SceneFile;
-use semfm::motion::{CollisionChecker, CollisionModel, CollisionSettings};
-use semfm::robot::{Arm, ArmSettings, MeshPaths, RobotDescription, Srdf};
-use serde::Deserialize;
-
-#[derive(Deserialize)]
-struct Problems {
-    tip: String,
-    joints: Vec<String>,
-    problems: Vec<Problem>,
-}
-
-#[derive(Deserialize)]
-struct Problem {
-    name: String,
-    start: Vec<f64>,
-    goal: Vec<f64>,
-    scene: SceneFile,
-}
+use problems::{ProblemRobot, Problems};
+use semfm::motion::{CollisionChecker, CollisionSettings};
 
 #[allow(clippy::print_stdout, clippy::print_stderr)] // The answers are what this program is for.
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("the folder of a robot is missing")?);
-    let path = folder.join("problems.json");
-    let content: Problems = serde_json::from_slice(&std::fs::read(&path)?)?;
-    let urdf = folder.join("robot.urdf");
-    let robot = Arc::new(RobotDescription::read(&urdf)?.tree()?);
-    let srdf = Srdf::read(folder.join("robot.srdf"), &robot)?;
-    let settings = ArmSettings { tip: Some(content.tip), ..Default::default() };
-    let arm = Arc::new(Arm::new(robot, &settings)?);
-    let names: Vec<&str> = arm.joints().iter().map(|joint| joint.name.as_str()).collect();
-    if names != content.joints {
-        return Err(format!("expected joints {:?}, found {names:?}", content.joints).into());
-    }
-    let paths = MeshPaths::new(&urdf, &Default::default());
+    let content = Problems::read(&folder)?;
+    let robot = ProblemRobot::read(&folder, &content)?;
     let begun = Instant::now();
-    let model = CollisionModel::new(arm, &paths, Some(&srdf), &CollisionSettings::default())?;
+    let model = robot.model(CollisionSettings::default().contact)?;
     eprintln!(
         "model: {:.2} s, {} pairs",
         begun.elapsed().as_secs_f64(),
@@ -57,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let model = Arc::new(model);
     let mut times = Times::default();
     for problem in &content.problems {
-        let scene = problem.scene.contents(&path)?.scene;
+        let scene = problem.scene.contents(&Problems::path(&folder))?.scene;
         let checker = CollisionChecker::new(model.clone(), scene)?;
         let halves = problem.start.iter().zip(&problem.goal);
         let middle: Vec<f64> = halves.map(|(a, b)| (a + b) / 2.0).collect();

@@ -3,38 +3,24 @@
 //! `plan_problems FOLDER OUT [--every N] [--seed S]` reads what `bench/planning_problems.py unpack` wrote and writes one line
 //! of JSON a problem to OUT, for `bench/planning.py`. What was counted goes to stderr.
 
+mod problems;
+
 use std::error::Error;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use semfm::files::SceneFile;
+use problems::{Problem, ProblemRobot, Problems};
 use semfm::motion::{
     BlendSettings, CheckSettings, CollisionChecker, CollisionModel, CollisionSettings, Curve,
     JointMotionLimit, JointRange, JointSpace, MotionLimits, PlanSettings, Planned, RetimeSettings,
     Retimed, ShortenSettings, blend, check_trajectory, path_length, plan_path, retime, shorten,
 };
-use semfm::robot::{Arm, ArmSettings, MeshPaths, RobotDescription, Srdf};
-use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// Distance that plans keep from obstacles, metres; where the start or the goal is nearer, they keep the checker's own.
 const MARGIN: f64 = 2e-3;
-
-#[derive(Deserialize)]
-struct Problems {
-    tip: String,
-    problems: Vec<Problem>,
-}
-
-#[derive(Deserialize)]
-struct Problem {
-    name: String,
-    start: Vec<f64>,
-    goal: Vec<f64>,
-    scene: SceneFile,
-}
 
 struct Arguments {
     folder: PathBuf,
@@ -70,11 +56,8 @@ struct Planner {
 }
 
 impl Planner {
-    fn new(folder: &Path, tip: String, seed: u64) -> Result<Self, Box<dyn Error>> {
-        let urdf = folder.join("robot.urdf");
-        let robot = Arc::new(RobotDescription::read(&urdf)?.tree()?);
-        let srdf = Srdf::read(folder.join("robot.srdf"), &robot)?;
-        let arm = Arc::new(Arm::new(robot, &ArmSettings { tip: Some(tip), ..Default::default() })?);
+    fn new(robot: &ProblemRobot, seed: u64) -> Result<Self, Box<dyn Error>> {
+        let arm = &robot.arm;
         let range = |joint: &semfm::robot::ArmJoint| JointRange {
             name: joint.name.clone(),
             lower: joint.lower,
@@ -86,11 +69,7 @@ impl Planner {
             acceleration: joint.acceleration,
             jerk: joint.jerk,
         };
-        let paths = MeshPaths::new(&urdf, &Default::default());
-        let model = |contact: f64| {
-            let settings = CollisionSettings { contact, ..Default::default() };
-            CollisionModel::new(arm.clone(), &paths, Some(&srdf), &settings).map(Arc::new)
-        };
+        let model = |contact: f64| robot.model(contact).map(Arc::new);
         Ok(Self {
             space: JointSpace::new(arm.joints().iter().map(range).collect())?,
             limits: MotionLimits::new(arm.joints().iter().map(limit).collect())?,
@@ -187,9 +166,10 @@ fn trajectory_json(timed: &Retimed) -> Value {
 #[allow(clippy::print_stderr)] // The answers are what this program is for.
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = arguments()?;
-    let path = arguments.folder.join("problems.json");
-    let content: Problems = serde_json::from_slice(&std::fs::read(&path)?)?;
-    let planner = Planner::new(&arguments.folder, content.tip, arguments.seed)?;
+    let path = Problems::path(&arguments.folder);
+    let content = Problems::read(&arguments.folder)?;
+    let robot = ProblemRobot::read(&arguments.folder, &content)?;
+    let planner = Planner::new(&robot, arguments.seed)?;
     let mut out = BufWriter::new(std::fs::File::create(&arguments.out)?);
     let limits: Vec<[f64; 2]> =
         planner.limits.joints().iter().map(|joint| [joint.velocity, joint.acceleration]).collect();
