@@ -175,8 +175,7 @@ impl Encoder for NetEncoder {
         task: &Task,
     ) -> Result<Vec<EncodedViews>> {
         semfm_geom::keep_faer_sequential();
-        let quarters = Turned::quarters_of(rolls)
-            .ok_or_else(|| Error::invalid("rolls", "1, 2 or 4", rolls.to_string()))?;
+        let quarters = Turned::quarters_of(rolls)?;
         let views: Vec<&View> = objects.iter().flat_map(|object| &object.views).collect();
         views.iter().try_for_each(|view| self.check(view))?;
         let done = AtomicUsize::new(0);

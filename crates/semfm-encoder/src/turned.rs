@@ -2,6 +2,8 @@
 
 use semfm_geom::Pinhole;
 
+use crate::{Error, Result};
+
 /// A square or oblong array (height × width) whose places may be read as if it were turned by
 /// quarters, counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,13 +16,16 @@ pub(crate) struct Turned {
 }
 
 impl Turned {
-    /// The quarters that a number of rolls stands for: 1, 2 or 4.
-    pub fn quarters_of(rolls: u32) -> Option<&'static [u32]> {
+    /// The quarters that a number of rolls stands for.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for other numbers than 1, 2 and 4.
+    pub fn quarters_of(rolls: u32) -> Result<&'static [u32]> {
         match rolls {
-            1 => Some(&[0]),
-            2 => Some(&[0, 2]),
-            4 => Some(&[0, 1, 2, 3]),
-            _ => None,
+            1 => Ok(&[0]),
+            2 => Ok(&[0, 2]),
+            4 => Ok(&[0, 1, 2, 3]),
+            _ => Err(Error::invalid("rolls", "1, 2 or 4", rolls.to_string())),
         }
     }
 

@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::SharedShape;
-use semfm_align::Sim3;
 use semfm_geom::math::{DQuat, DVec3};
 use semfm_geom::{Mesh, Task};
 use semfm_motion::{
@@ -20,6 +19,7 @@ use semfm_motion::{
 };
 use semfm_robot::Role;
 
+use crate::files::rigid_pose::{WRITTEN_SCALE_TOLERANCE, rigid_pose};
 use crate::files::{GraspRecord, GraspsFile, MatrixRows, PartRecord, SceneContents, TableRecord};
 use crate::{
     Error, FingerJoint, MotionObject, MotionObstacle, MotionRobot, MotionScene, MountedHand,
@@ -28,9 +28,6 @@ use crate::{
 
 /// The name of the table that grasps were found with.
 const TABLE: &str = "table";
-
-/// Farthest from 1 that the scale of a pose may be.
-const SCALE_TOLERANCE: f64 = 1e-6;
 
 /// What an arm is to grasp, and how.
 #[derive(Clone, Debug)]
@@ -263,10 +260,5 @@ fn poses(what: &str, rows: &[MatrixRows]) -> Result<Vec<Pose>> {
 /// A rotation and a translation.
 fn pose(what: &str, rows: MatrixRows) -> Result<Pose> {
     let expected = "rows of a rotation and a translation";
-    let motion =
-        Sim3::from_rows(rows).map_err(|error| Error::invalid(what, expected, error.to_string()))?;
-    if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {
-        return Err(Error::invalid(what, expected, format!("a scale of {}", motion.scale)));
-    }
-    Ok(motion.rigid())
+    rigid_pose(rows, WRITTEN_SCALE_TOLERANCE).map_err(|found| Error::invalid(what, expected, found))
 }

@@ -74,8 +74,7 @@ impl Encoder for PretrainedEncoder {
         task: &Task,
     ) -> Result<Vec<EncodedViews>> {
         semfm_geom::keep_faer_sequential();
-        let quarters = Turned::quarters_of(rolls)
-            .ok_or_else(|| Error::invalid("rolls", "1, 2 or 4", rolls.to_string()))?;
+        let quarters = Turned::quarters_of(rolls)?;
         let views: Vec<&View> = objects.iter().flat_map(|object| &object.views).collect();
         let threads = if self.threads == 0 { rayon::current_num_threads() } else { self.threads };
         let mut embedded =

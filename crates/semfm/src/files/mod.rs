@@ -35,7 +35,7 @@ mod picture;
 mod plan;
 mod point_map;
 mod region;
-mod rigid_pose;
+pub(crate) mod rigid_pose;
 #[cfg(feature = "mcap")]
 mod ros2_grasps;
 #[cfg(feature = "mcap")]

@@ -13,6 +13,8 @@ use crate::Result;
 
 /// Farthest from 1 that the scale of a pose may be: calibrations round their numbers.
 const SCALE_TOLERANCE: f64 = 1e-4;
+/// The same of a pose that this program wrote.
+pub(crate) const WRITTEN_SCALE_TOLERANCE: f64 = 1e-6;
 
 /// Reads a rigid pose: a bare 4 × 4 matrix, rows first, or an object with it in the field `name` (such as
 /// `base_from_camera`).
@@ -30,11 +32,15 @@ pub fn read_rigid_pose(path: &Path, name: &str) -> Result<Pose> {
     let rows = MatrixRows::deserialize(rows)
         .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
     let expected = "rows of a rotation and a translation in metres";
-    let motion = Sim3::from_rows(rows)
-        .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
-    if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {
-        let found = format!("a scale of {}", motion.scale);
-        return Err(FormatError::new(path, place, expected, found).into());
+    let pose = rigid_pose(rows, SCALE_TOLERANCE);
+    Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
+}
+
+/// The rotation and translation of a matrix whose scale is within `tolerance` of 1; else what was found, in words.
+pub(crate) fn rigid_pose(rows: MatrixRows, tolerance: f64) -> std::result::Result<Pose, String> {
+    let motion = Sim3::from_rows(rows).map_err(|error| error.to_string())?;
+    if (motion.scale - 1.0).abs() > tolerance {
+        return Err(format!("a scale of {}", motion.scale));
     }
     Ok(motion.rigid())
 }

@@ -5,7 +5,6 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
-use semfm_align::Sim3;
 use semfm_geom::io::{FormatError, read_file, read_json, read_mesh};
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, MeshHash, MeshIdentity};
@@ -14,6 +13,7 @@ use semfm_robot::{Geometry, Robot, RobotDescription};
 use serde::{Deserialize, Serialize};
 
 use super::grasps::{PartRecord, rows};
+use super::rigid_pose::{WRITTEN_SCALE_TOLERANCE, rigid_pose};
 use super::trajectory_check::check_segments;
 use super::{MatrixRows, write_json};
 use crate::{
@@ -23,8 +23,6 @@ use crate::{
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.trajectory/1";
-/// Farthest from 1 that the scale of a pose may be.
-const SCALE_TOLERANCE: f64 = 1e-6;
 
 /// A motion as its file has it. Poses are 4 × 4 matrices, rows first, in the frame of the arm's base link; lengths are
 /// metres, angles radians, times seconds. The robot's description and the object's mesh are named with their hashes,
@@ -456,13 +454,8 @@ fn check_finite(path: &Path, place: &str, numbers: &[f64]) -> Result<()> {
 /// A rotation and a translation.
 fn pose(path: &Path, place: &str, rows: MatrixRows) -> Result<Pose> {
     let expected = "rows of a rotation and a translation";
-    let motion = Sim3::from_rows(rows)
-        .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
-    if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {
-        let found = format!("a scale of {}", motion.scale);
-        return Err(FormatError::new(path, place, expected, found).into());
-    }
-    Ok(motion.rigid())
+    let pose = rigid_pose(rows, WRITTEN_SCALE_TOLERANCE);
+    Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
 }
 
 fn hash_of(bytes: &[u8]) -> MeshHash {
