@@ -26,7 +26,7 @@ pub enum Error {
     },
     /// There is no graphics driver that could render.
     #[error(
-        "no graphics adapter: expected a Vulkan, Metal, DirectX 12 or GL driver, found none ({reason})"
+        "no graphics adapter: expected a Vulkan, Metal or DirectX 12 driver, found none ({reason})"
     )]
     NoGpu {
         /// What the search reported.

@@ -39,11 +39,8 @@ impl Device {
     /// # Errors
     /// [`Error::NoGpu`] without a driver, [`Error::Gpu`] where it does not open.
     pub fn open(limits: &DriverLimits) -> Result<Self> {
-        // GL comes last: its loader writes to the terminal where there is no display.
-        let adapter = adapter(wgpu::Backends::PRIMARY, limits).or_else(|reason| {
-            adapter(wgpu::Backends::GL, limits)
-                .map_err(|_| Error::NoGpu { reason: reason.to_string() })
-        })?;
+        let adapter =
+            adapter(limits).map_err(|reason| Error::NoGpu { reason: reason.to_string() })?;
         let own = adapter.limits();
         let mut required = wgpu::Limits::downlevel_webgl2_defaults().using_resolution(own.clone());
         required.max_texture_dimension_2d =
@@ -122,13 +119,10 @@ impl Drop for Device {
     }
 }
 
-/// The fastest adapter behind some interfaces.
-fn adapter(
-    backends: wgpu::Backends,
-    limits: &DriverLimits,
-) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
+/// The fastest adapter there is.
+fn adapter(limits: &DriverLimits) -> std::result::Result<wgpu::Adapter, wgpu::RequestAdapterError> {
     let description = wgpu::InstanceDescriptor {
-        backends,
+        backends: wgpu::Backends::PRIMARY,
         memory_budget_thresholds: wgpu::MemoryBudgetThresholds {
             for_resource_creation: Some(limits.memory_percent),
             for_device_loss: None,
