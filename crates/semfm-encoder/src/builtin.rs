@@ -39,6 +39,7 @@ pub static BUILTIN_ENCODERS: [BuiltinEncoder; 1] = [BuiltinEncoder {
         ambiguity: -0.76,
         margin: 4.37,
         round_trip: 3.43,
+        likeness: None,
     },
     encoder: OnceLock::new(),
 }];

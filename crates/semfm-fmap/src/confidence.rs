@@ -1,7 +1,8 @@
 //! How far to trust a transfer.
 //!
 //! The confidence of an answer is the probability that its vertex IoU reaches one half, given that
-//! the two objects are of one kind. For `fused` it is a logistic function of three numbers that
+//! the two objects are of one kind, times the probability that they are ([`likeness`](crate::likeness)), where the
+//! encoder's scale of likeness is known. For `fused` it is a logistic function of three numbers that
 //! the answer itself yields ([`Evidence`]); for `semfm`, `anchored` and `wks` it is one of the
 //! **agreement** of their region with a second opinion formed in another way, the transport between the
 //! clouds. `nearest` and `sinkhorn` get the second opinion, a whole map of `fused`, and with it that
@@ -63,6 +64,10 @@ pub struct Evidence {
     /// IoU, by mass on the source's points, of the region with what comes back from the answer:
     /// by transport, or by the nearest points where no transport was computed (`nearest`).
     pub round_trip: f64,
+    /// How alike the two objects are as a whole ([`likeness`](crate::likeness)); none for objects without
+    /// features.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub likeness: Option<f64>,
 }
 
 /// An answer on both clouds, as its evidence is read off it.
@@ -91,11 +96,12 @@ impl Evidence {
             ambiguity: ambiguity(answer.votes, answer.areas),
             margin: margin(joint, answer.region, answer.answer, answer.target_masses),
             round_trip: overlap(answer.region, answer.back, answer.source_masses),
+            likeness: None,
         }
     }
 
-    /// The probability that IoU ≥ .5, for an answer of `fused`: a logistic function of the three numbers
-    /// whose coefficients belong to the features.
+    /// The probability that IoU ≥ .5, given that the objects are of one kind, for an answer of `fused`: a logistic
+    /// function of the first three numbers whose coefficients belong to the features.
     pub fn probability(&self, weights: &ConfidenceWeights) -> f64 {
         weights.probability(self.ambiguity, self.margin, self.round_trip)
     }
@@ -148,6 +154,7 @@ fn ids_where(mask: &[bool], wanted: bool) -> Vec<u32> {
 /// Squared distance of each query to the nearest of the points, rows in one space.
 fn squares_to_nearest(queries: &Mat<f64>, points: &Mat<f64>) -> Vec<f64> {
     let nearest = nearest_rows(queries.as_ref(), points.as_ref());
+    let nearest = nearest.expect("features of a cloud are finite, and there is a point inside and one outside");
     let rows = nearest.iter().enumerate();
     rows.map(|(q, &p)| square(queries.row(q), points.row(p as usize))).collect()
 }
@@ -173,7 +180,7 @@ mod tests {
     #[test]
     fn better_evidence_is_more_probable_and_none_is_refused() {
         let weights = ConfidenceWeights::default();
-        let sure = Evidence { ambiguity: 0.05, margin: 0.4, round_trip: 0.9 };
+        let sure = Evidence { ambiguity: 0.05, margin: 0.4, round_trip: 0.9, likeness: None };
         assert_eq!(verdict(sure.probability(&weights)), Verdict::Accept);
         for worse in [
             Evidence { ambiguity: 1.0, ..sure },
@@ -182,7 +189,7 @@ mod tests {
         ] {
             assert!(worse.probability(&weights) < sure.probability(&weights));
         }
-        let lost = Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0 };
+        let lost = Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0, likeness: None };
         assert_eq!(verdict(lost.probability(&weights)), Verdict::Refuse);
         assert!(probability_by_agreement(0.9) > 0.9 && probability_by_agreement(0.2) < 0.5);
     }

@@ -155,14 +155,15 @@ impl Matching {
         let other = self.other_rule(&voted.inside)?;
         let other_iou = other.as_ref().map(|other| overlap(&answer, &mask(other), areas));
         let region = onto_original(target, &voted.votes)?;
-        let evidence = self.evidence(&voted, &answer);
+        let evidence = Evidence { likeness: self.likeness()?, ..self.evidence(&voted, &answer) };
+        let one_kind = evidence.likeness.and_then(|likeness| self.one_kind(likeness));
         let confidence = match (self.settings.method.info().confidence, agreement) {
             _ if region.is_empty() => 0.0,
             (ConfidenceRule::Agreement, Some(agreement)) => probability_by_agreement(agreement),
             _ => self.probability(&evidence),
         };
         let most = if self.source().has_features() { 1.0 } else { MOST_WITHOUT_FEATURES };
-        let confidence = confidence.min(most);
+        let confidence = confidence.min(most) * one_kind.unwrap_or(1.0);
         Ok(Transfer {
             region,
             confidence,
@@ -175,6 +176,7 @@ impl Matching {
                 stages_ms: Stages::default(),
                 agreement,
                 evidence,
+                one_kind,
                 source_area_share: area_share(&voted.inside, &source.basis().mass),
                 target_area_share: area_share(&answer, areas),
                 anchors: Vec::new(),
@@ -267,6 +269,23 @@ impl Matching {
         of(self.source()).min(of(self.target()))
     }
 
+    /// How alike the objects are as a whole; none for objects without features.
+    fn likeness(&self) -> Result<Option<f64>> {
+        let (source, target) = (self.source(), self.target());
+        if !source.has_features() {
+            return Ok(None);
+        }
+        source.plain_features().likeness(target.plain_features()).map(Some)
+    }
+
+    /// The probability that the objects are of one kind, where the scale of likeness is known of either object's
+    /// features: where they differ, the more cautious one.
+    fn one_kind(&self, likeness: f64) -> Option<f64> {
+        let scales = [self.source(), self.target()].map(|object| object.confidence_weights().likeness);
+        let known = scales.into_iter().flatten();
+        known.map(|scale| scale.probability_of_one_kind(likeness)).reduce(f64::min)
+    }
+
     /// The votes under the other rule, where both maps are at hand (`semfm`).
     fn other_rule(&self, inside: &[bool]) -> Result<Option<Vec<f64>>> {
         if self.settings.method != Method::Semfm {
@@ -286,7 +305,7 @@ fn at_vertices(vertex_of_point: &[u32], inside: &[bool]) -> Vec<bool> {
 
 /// Weights on the working vertices as a region of the original mesh. A mix of weights inside [0, 1]
 /// leaves it by a rounding error at most.
-fn onto_original(shape: &Shape, weights: &[f64]) -> Result<Region> {
+pub(crate) fn onto_original(shape: &Shape, weights: &[f64]) -> Result<Region> {
     let weights = shape.onto_original(weights);
     Region::from_weights(weights.into_iter().map(|w| w.clamp(0.0, 1.0)).collect())
 }

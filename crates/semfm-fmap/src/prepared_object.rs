@@ -11,6 +11,7 @@ use semfm_geom::{ConfidenceWeights, PointIndex, SemanticCloud, Shape, Task};
 
 use crate::clusters::{ClusterSettings, Clusters, spectral_clusters};
 use crate::features::CentredFeatures;
+use crate::likeness::PlainFeatures;
 use crate::neighbour_graph::NeighbourGraph;
 use crate::{Error, Result};
 
@@ -71,6 +72,7 @@ struct Derived {
     mix: VertexMix,
     masses: Vec<f64>,
     features: CentredFeatures,
+    plain: OnceLock<PlainFeatures>,
     samples: OnceLock<Vec<u32>>,
     graph: OnceLock<NeighbourGraph>,
     point_of_original_vertex: OnceLock<Vec<u32>>,
@@ -140,6 +142,7 @@ impl PreparedObject {
             mix,
             masses,
             features,
+            plain: OnceLock::new(),
             samples: OnceLock::new(),
             graph: OnceLock::new(),
             point_of_original_vertex: OnceLock::new(),
@@ -239,6 +242,11 @@ impl PreparedObject {
     /// Share of the area that is nearest to each cloud point (M), summing to 1.
     pub fn masses(&self) -> &[f64] {
         &self.derived.masses
+    }
+
+    /// The features of evenly spread points of the cloud as they are, of unit length.
+    pub fn plain_features(&self) -> &PlainFeatures {
+        self.derived.plain.get_or_init(|| PlainFeatures::new(&self.derived.cloud))
     }
 
     /// The features of the cloud's points, normalised and centred.

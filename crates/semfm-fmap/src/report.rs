@@ -4,7 +4,7 @@ use semfm_geom::math::DVec3;
 use semfm_geom::{PointIndex, Shape};
 use serde::{Deserialize, Serialize};
 
-use crate::confidence::Evidence;
+use crate::confidence::{CHECK, Evidence};
 use crate::fit::FitReport;
 use crate::methods::{ClusteredPair, Matched, Pair};
 use crate::metrics::{AnchorError, anchor_error, dirichlet_energy};
@@ -66,12 +66,16 @@ pub struct OtherRule {
 pub struct TransferReport {
     /// The settings, map sizes clipped to the bases.
     pub settings: TransferSettings,
-    /// Milliseconds by stage.
+    /// Milliseconds of wall time by stage.
     pub stages_ms: Stages,
     /// Agreement (IoU by area) of the method's region with the second opinion, where there is one.
     pub agreement: Option<f64>,
     /// What the answer says about itself: the confidence of `fused` follows from it.
     pub evidence: Evidence,
+    /// The probability that the objects are of one kind, where the encoder's scale of likeness is known. The
+    /// confidence is that of the answer times this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub one_kind: Option<f64>,
     /// Share of the source's area in the region.
     pub source_area_share: f64,
     /// Share of the target's area in the region.
@@ -87,6 +91,13 @@ pub struct TransferReport {
     pub transport: Option<TransportReport>,
     /// The other rule's answer, where the method computes both.
     pub other_rule: Option<OtherRule>,
+}
+
+impl TransferReport {
+    /// Whether the objects are more likely of different kinds than of one, as far as that is known.
+    pub fn is_not_alike(&self) -> bool {
+        self.one_kind.is_some_and(|probability| probability < CHECK)
+    }
 }
 
 impl TransportReport {
