@@ -7,6 +7,8 @@
 //! ([`Calibration`]); [`evaluate`] does the same in memory. [`table`] and [`report`] write them down,
 //! [`compare`] compares them with an older run, [`vlm`] adds the rows of a vision-language model.
 //!
+//! [`run_memory`] asks memories of several demonstrations for every object ([`semfm::memory`]), [`run_kinds`] whether
+//! objects of different kinds are told from those of one.
 //! [`run_maps`] is the other evaluation: point maps against true correspondences.
 
 mod bootstrap;
@@ -18,9 +20,12 @@ pub mod embeddings;
 mod error;
 mod evaluation;
 mod journal;
+mod kinds;
+mod memory;
 mod object;
 mod output_folder;
 mod prediction;
+mod prepared_objects;
 mod published;
 pub mod report;
 mod results;
@@ -43,6 +48,12 @@ pub use dataset::Dataset;
 pub use embeddings::EmbeddingSource;
 pub use error::{Error, Result};
 pub use journal::{RunIdentity, RunSettings};
+pub use kinds::{KINDS_FORMAT, KindResults, KindRow, KindSummary, run_kinds};
+pub use memory::{
+    MEMORY_FORMAT, MemoryEvalSettings, MemoryResults, MemoryRow, MemorySummary, ScoredAnswer,
+    run_memory,
+};
+pub use prepared_objects::PreparationSettings;
 pub use output_folder::OutputFolder;
 pub use report::ReportSettings;
 pub use results::{About, Results};

@@ -130,8 +130,10 @@ pub fn fuse(
         .iter()
         .zip(&shares)
         .zip(agreements)
-        .map(|((own, &share), agreement)| {
-            Trust { share, agreement, iou_with_fused: overlap(own, &inside, areas) }
+        .map(|((own, &share), agreement)| Trust {
+            share,
+            agreement,
+            iou_with_fused: overlap(own, &inside, areas),
         })
         .collect();
     let evidence = FusionEvidence {
@@ -167,7 +169,11 @@ impl FusionSettings {
     fn check(&self) -> Result<()> {
         let Self { sharpness, least_agreement, threshold, n_hypotheses } = *self;
         if !(sharpness.is_finite() && sharpness >= 0.0) {
-            return Error::out_of_range("sharpness of the fusion", "a number of at least 0", sharpness);
+            return Error::out_of_range(
+                "sharpness of the fusion",
+                "a number of at least 0",
+                sharpness,
+            );
         }
         if !(least_agreement > 0.0 && least_agreement.is_finite()) {
             let what = "least agreement of the fusion";

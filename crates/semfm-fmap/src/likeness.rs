@@ -90,8 +90,12 @@ mod tests {
     /// Points whose features are these vectors of two numbers.
     fn plain(features: &[[f32; 2]]) -> PlainFeatures {
         let n = features.len();
-        let cloud =
-            SemanticCloud::new(vec![DVec3::ZERO; n], features.as_flattened().to_vec(), 2, vec![1; n]);
+        let cloud = SemanticCloud::new(
+            vec![DVec3::ZERO; n],
+            features.as_flattened().to_vec(),
+            2,
+            vec![1; n],
+        );
         PlainFeatures::new(&cloud.unwrap())
     }
 

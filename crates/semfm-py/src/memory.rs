@@ -5,9 +5,11 @@ use std::sync::{Arc, PoisonError, RwLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use semfm::files::{MemoryReportFile, Provenance};
-use semfm::memory::{Demonstration, Memory as Demonstrations, MemorySettings, MemoryTransfer as Answer};
 use semfm::encoder::rendered_views::Coloring;
+use semfm::files::{MemoryReportFile, Provenance};
+use semfm::memory::{
+    Demonstration, Memory as Demonstrations, MemorySettings, MemoryTransfer as Answer,
+};
 use semfm::object_encoder::ObjectEncoder;
 use semfm::{PipelineSettings, Task};
 use semfm_show::{TransferFiles, write_memory_picture, write_memory_transfer};
@@ -56,12 +58,9 @@ impl Memory {
     }
 
     /// The encoder of this name, or the memory's own where none is given.
-    fn encoder(
-        &self,
-        py: Python<'_>,
-        name: Option<&str>,
-    ) -> PyResult<ObjectEncoder> {
-        let (own, settings) = self.read(|memory| (memory.encoder().cloned(), memory.settings().clone()));
+    fn encoder(&self, py: Python<'_>, name: Option<&str>) -> PyResult<ObjectEncoder> {
+        let (own, settings) =
+            self.read(|memory| (memory.encoder().cloned(), memory.settings().clone()));
         let rolls = own.as_ref().map(|own| own.rolls);
         let name = name.or(own.as_ref().map(|own| own.name.as_str()));
         let most_rolls = settings.transfer.method.info().features.rolls;
@@ -75,7 +74,8 @@ impl Memory {
     #[pyo3(signature = (folder, *, cache=None))]
     fn new(py: Python<'_>, folder: PathBuf, cache: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let settings = PipelineSettings { cache: cache_of(cache)?, ..PipelineSettings::default() };
-        let memory = guard(py, || Ok(Demonstrations::open_or_begin(folder)?.with_settings(settings)))?;
+        let memory =
+            guard(py, || Ok(Demonstrations::open_or_begin(folder)?.with_settings(settings)))?;
         Ok(Self { inner: Arc::new(RwLock::new(memory)) })
     }
 
@@ -229,7 +229,9 @@ impl Memory {
                 let object = GivenObject::of(target, "target")?;
                 check_shape_size(py, object.mesh.n_vertices(), &PipelineSettings::default().shape)?;
                 let given = match embeddings {
-                    Some(given) => Features::Given(embeddings_of(given, "embeddings", &object.mesh)?),
+                    Some(given) => {
+                        Features::Given(embeddings_of(given, "embeddings", &object.mesh)?)
+                    }
                     None => Features::Encoder(self.encoder(py, encoder)?),
                 };
                 Target::Raw(object, given)

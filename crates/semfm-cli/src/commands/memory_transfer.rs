@@ -45,10 +45,8 @@ impl MemoryQuestion<'_> {
         let target = encoded.prepare(file.mesh, &pipeline, &task).with_context(named)?;
         let answer = memory.transfer(&target, &self.settings, &task)?;
         let start = Instant::now();
-        let provenance = Provenance {
-            version: Some(env!("CARGO_PKG_VERSION").into()),
-            ..Provenance::default()
-        };
+        let provenance =
+            Provenance { version: Some(env!("CARGO_PKG_VERSION").into()), ..Provenance::default() };
         let staged = StagedFolder::new(folder)?;
         let report = MemoryReportFile::new(&memory, &target, &answer, provenance);
         write_memory_transfer(staged.path(), &target, &answer, &report, self.files, &task)?;
@@ -82,7 +80,10 @@ impl MemoryQuestion<'_> {
 fn print(answer: &MemoryTransfer, target: &Prepared, write_ms: f64, common: &Common) {
     let fused = &answer.fused;
     let (n, of) = (fused.region.vertices().len(), fused.region.n_vertices());
-    console::data(format_args!("verdict     {} (confidence {:.2})", fused.verdict, fused.confidence));
+    console::data(format_args!(
+        "verdict     {} (confidence {:.2})",
+        fused.verdict, fused.confidence
+    ));
     if let Some(why) = answer.doubt() {
         console::data(format_args!("why         {why}"));
     }

@@ -140,7 +140,9 @@ impl MemoryResults {
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let (json, table) = (folder.join(FILE), folder.join("memory.md"));
         write_json_pretty(&json, self)?;
-        semfm::geom::io::write_atomically(&table, |out| out.write_all(self.to_markdown().as_bytes()))?;
+        semfm::geom::io::write_atomically(&table, |out| {
+            out.write_all(self.to_markdown().as_bytes())
+        })?;
         Ok(vec![json, table])
     }
 

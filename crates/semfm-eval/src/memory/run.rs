@@ -4,22 +4,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use semfm::fmap::fusion::{Answer, FusionSettings, fuse};
-use semfm::fmap::likeness::PlainFeatures;
+use semfm::fmap::fusion::{Answer, fuse};
 use semfm::fmap::metrics::iou;
-use semfm::geom::{ShapeCache, ShapeSettings};
 use semfm::memory::{MemorySettings, shortlist};
-use semfm::{
-    FeatureSource, Matching, Method, PipelineSettings, Prepared, Region, Task, Transfer, prepare,
-};
+use semfm::{Matching, Task, Transfer};
 
 use super::draws::{Draw, draws};
 use super::results::{MEMORY_FORMAT, MemoryResults, MemoryRow, MemorySummary, ScoredAnswer};
 use crate::dataset::{Dataset, Group};
 use crate::embeddings::EmbeddingSource;
-use crate::object::{Attempt, attempt};
-use crate::row::Failure;
-use crate::workers::Workers;
+use crate::object::attempt;
+use crate::prepared_objects::{
+    PreparationSettings, PreparedEntries, PreparedEntry, half_of, members, prepared_entries,
+};
 use crate::{Error, Result};
 
 /// Which memories are asked, and how.
@@ -31,14 +28,8 @@ pub struct MemoryEvalSettings {
     pub n_distractors: usize,
     /// How a memory answers.
     pub memory: MemorySettings,
-    /// Seed of everything drawn by chance.
-    pub seed: u64,
-    /// How the machine is shared.
-    pub workers: Workers,
-    /// Working mesh, Laplacian and basis.
-    pub shape: ShapeSettings,
-    /// Where prepared shapes are kept.
-    pub cache: ShapeCache,
+    /// How objects are prepared and matched.
+    pub preparation: PreparationSettings,
 }
 
 impl Default for MemoryEvalSettings {
@@ -47,10 +38,7 @@ impl Default for MemoryEvalSettings {
             counts: vec![1, 2, 3, 5, 10],
             n_distractors: 0,
             memory: MemorySettings::default(),
-            seed: 0,
-            workers: Workers::new(0, 0),
-            shape: ShapeSettings::default(),
-            cache: ShapeCache::off(),
+            preparation: PreparationSettings::default(),
         }
     }
 }
@@ -68,21 +56,22 @@ pub fn run_memory(
 ) -> Result<MemoryResults> {
     if settings.counts.is_empty() || settings.counts.contains(&0) {
         let found = format!("{:?}", settings.counts);
-        return Err(Error::invalid("demonstrations", "at least one number, each at least 1", found));
+        return Err(Error::invalid(
+            "demonstrations",
+            "at least one number, each at least 1",
+            found,
+        ));
     }
-    let members: BTreeSet<usize> =
-        dataset.groups.iter().flat_map(|group| &group.pairs).flat_map(|pair| pair.both()).collect();
-    let members: Vec<usize> = members.into_iter().collect();
     let run = MemoryRun {
         dataset,
         settings,
         task,
         quiet: task.silent(),
         done: AtomicUsize::new(0),
-        total: 2 * members.len(),
+        total: 2 * members(dataset).len(),
     };
-    let objects = settings.workers.each(members.len(), |i| run.object(members[i], embeddings))?;
-    let objects: Objects = members.iter().copied().zip(objects).collect();
+    let preparation = &settings.preparation;
+    let objects = prepared_entries(dataset, embeddings, preparation, task, || run.step())?;
     let mut rows = Vec::new();
     for group in &dataset.groups {
         rows.extend(run.group(group, &objects)?);
@@ -93,20 +82,11 @@ pub fn run_memory(
         embeddings: embeddings.identity(dataset),
         n_distractors: settings.n_distractors,
         shortlist: settings.memory.shortlist,
-        seed: settings.seed,
+        seed: settings.preparation.seed,
         summaries: MemorySummary::all_of(&rows),
         rows,
     })
 }
-
-/// An object with its true region.
-struct MemoryObject {
-    prepared: Prepared,
-    truth: Region,
-}
-
-/// Objects by their places in the dataset.
-type Objects = BTreeMap<usize, Attempt<MemoryObject>>;
 
 struct MemoryRun<'a> {
     dataset: &'a Dataset,
@@ -121,35 +101,10 @@ struct MemoryRun<'a> {
 type Answers = BTreeMap<usize, (Transfer, f64)>;
 
 impl MemoryRun<'_> {
-    fn pipeline(&self) -> PipelineSettings {
-        PipelineSettings {
-            shape: self.settings.shape.clone(),
-            cache: self.settings.cache.clone(),
-            ..PipelineSettings::of(Method::Fused)
-        }
-        .with_seed(self.settings.seed)
-    }
-
-    fn object(&self, place: usize, embeddings: &EmbeddingSource) -> Result<Attempt<MemoryObject>> {
-        let entry = &self.dataset.objects[place];
-        let made = || {
-            let object = entry.load()?;
-            let rolls = Method::Fused.info().features.rolls;
-            let embedded = embeddings.views(entry, &object, rolls, &self.quiet)?;
-            let features =
-                FeatureSource::Embedded { views: &embedded.views, encoder: embedded.encoder };
-            let prepared = prepare(object.mesh().clone(), features, &self.pipeline(), &self.quiet)?;
-            Ok(MemoryObject { prepared, truth: object.truth })
-        };
-        let object = attempt("object", made())?;
-        self.step()?;
-        Ok(object)
-    }
-
-    fn group(&self, group: &Group, objects: &Objects) -> Result<Vec<MemoryRow>> {
+    fn group(&self, group: &Group, objects: &PreparedEntries) -> Result<Vec<MemoryRow>> {
         let targets: BTreeSet<usize> = group.pairs.iter().map(|pair| pair.target).collect();
         let targets: Vec<usize> = targets.into_iter().collect();
-        let rows = self.settings.workers.each(targets.len(), |i| {
+        let rows = self.settings.preparation.workers.each(targets.len(), |i| {
             let target = targets[i];
             let pool: Vec<usize> = group
                 .pairs
@@ -170,7 +125,7 @@ impl MemoryRun<'_> {
         group: &Group,
         target: usize,
         pool: &[usize],
-        objects: &Objects,
+        objects: &PreparedEntries,
     ) -> Result<Vec<MemoryRow>> {
         let entry = &self.dataset.objects[target];
         let others: Vec<usize> = objects
@@ -182,14 +137,14 @@ impl MemoryRun<'_> {
         let mut answers = Answers::new();
         let mut rows = Vec::new();
         for &n in &self.settings.counts {
-            let (strangers, seed) = (self.settings.n_distractors, self.settings.seed);
+            let (strangers, seed) = (self.settings.n_distractors, self.settings.preparation.seed);
             let drawn = draws(pool, n, &others, strangers, &entry.name, seed);
             for (number, draw) in drawn.into_iter().enumerate() {
                 let mut row = MemoryRow {
                     group: group.name.clone(),
                     category: entry.category.clone(),
                     target: entry.name.clone(),
-                    half: blake3::hash(entry.name.as_bytes()).as_bytes()[0] % 2,
+                    half: half_of(&entry.name),
                     n,
                     draw: number,
                     ..MemoryRow::default()
@@ -211,14 +166,14 @@ impl MemoryRun<'_> {
     /// Asks one memory and fills in the row.
     fn ask(
         &self,
-        target: &MemoryObject,
+        target: &PreparedEntry,
         draw: &Draw,
         pool: &[usize],
-        objects: &Objects,
+        objects: &PreparedEntries,
         answers: &mut Answers,
         row: &mut MemoryRow,
     ) -> Result<()> {
-        let demonstrations: Vec<(&str, &MemoryObject, usize)> = draw
+        let demonstrations: Vec<(&str, &PreparedEntry, usize)> = draw
             .iter()
             .filter_map(|&place| {
                 let object = objects.get(&place)?.as_ref().ok()?;
@@ -263,13 +218,17 @@ impl MemoryRun<'_> {
             Ok((answer, *is_of_kind))
         });
         let scores = scores.collect::<semfm::fmap::Result<Vec<_>>>()?;
-        let most = scores.iter().map(|(answer, _)| *answer).reduce(|best, next| {
-            if next.confidence > best.confidence { next } else { best }
-        });
+        let most = scores
+            .iter()
+            .map(|(answer, _)| *answer)
+            .reduce(|best, next| if next.confidence > best.confidence { next } else { best });
         row.chosen = most.unwrap_or_default();
         row.best_iou = scores.iter().map(|(answer, _)| answer.iou).fold(0.0, f64::max);
-        let of_kind: Vec<f64> =
-            scores.iter().filter(|(_, is_of_kind)| *is_of_kind).map(|(answer, _)| answer.iou).collect();
+        let of_kind: Vec<f64> = scores
+            .iter()
+            .filter(|(_, is_of_kind)| *is_of_kind)
+            .map(|(answer, _)| answer.iou)
+            .collect();
         if !of_kind.is_empty() {
             row.mean_iou = of_kind.iter().sum::<f64>() / of_kind.len() as f64;
         }
@@ -285,8 +244,8 @@ impl MemoryRun<'_> {
     /// One demonstration's answer and what it took, made once for all memories that hold it.
     fn answer(
         &self,
-        target: &MemoryObject,
-        source: &MemoryObject,
+        target: &PreparedEntry,
+        source: &PreparedEntry,
         place: usize,
         answers: &mut Answers,
     ) -> Result<(Transfer, f64)> {
@@ -295,7 +254,8 @@ impl MemoryRun<'_> {
         }
         let start = Instant::now();
         let (a, b) = (&source.prepared.object, &target.prepared.object);
-        let matching = Matching::new(a, b, &self.pipeline().transfer, &self.quiet)?;
+        let matching =
+            Matching::new(a, b, &self.settings.preparation.pipeline().transfer, &self.quiet)?;
         let transfer = matching.transfer(&source.truth)?;
         let made = (transfer, start.elapsed().as_secs_f64() * 1e3);
         answers.insert(place, made.clone());
@@ -308,6 +268,6 @@ impl MemoryRun<'_> {
     }
 }
 
-fn is_ready(objects: &Objects, place: usize) -> bool {
-    objects.get(&place).is_some_and(Result::is_ok)
+fn is_ready(objects: &PreparedEntries, place: usize) -> bool {
+    objects.get(&place).is_some_and(|object| object.is_ok())
 }

@@ -18,9 +18,21 @@ impl MemoryResults {
             self.n_distractors,
         );
         let names = [
-            "demonstrations", "targets", "of the kind, matched", "one", "chosen", "fused",
-            "fused, categories", "best", "below .3", "AUC", "calibration error", "accepted, of these right",
-            "chosen: AUC", "chosen: accepted, right", "answer, ms",
+            "demonstrations",
+            "targets",
+            "of the kind, matched",
+            "one",
+            "chosen",
+            "fused",
+            "fused, categories",
+            "best",
+            "below .3",
+            "AUC",
+            "calibration error",
+            "accepted, of these right",
+            "chosen: AUC",
+            "chosen: accepted, right",
+            "answer, ms",
         ];
         text += &header(names.map(str::to_owned));
         for summary in &self.summaries {
@@ -37,7 +49,10 @@ impl MemoryResults {
         }
         let mut text = format!("\n## Failures ({})\n\n", failed.len());
         for (row, failure) in failed {
-            text += &format!("- {} {}, {} demonstrations: {}\n", row.group, row.target, row.n, failure.text);
+            text += &format!(
+                "- {} {}, {} demonstrations: {}\n",
+                row.group, row.target, row.n, failure.text
+            );
         }
         text
     }

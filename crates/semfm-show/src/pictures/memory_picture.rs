@@ -43,8 +43,11 @@ pub fn write_memory_picture(
             voice.transfer.confidence
         ));
     }
-    let rows: Vec<Row<'_>> =
-        titles.into_iter().zip(&pictures).map(|(title, pictures)| Row { title, pictures }).collect();
+    let rows: Vec<Row<'_>> = titles
+        .into_iter()
+        .zip(&pictures)
+        .map(|(title, pictures)| Row { title, pictures })
+        .collect();
     let note = "above the fused answer; below each demonstration and what it says alone";
     let legend = [Entry::Weights, Entry::Note(note.into())];
     Sheet { columns: &[], rows: &rows, legend: &legend }.write(path)

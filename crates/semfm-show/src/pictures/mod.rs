@@ -4,6 +4,8 @@ mod canvas;
 mod feature_colors;
 mod features_picture;
 mod grasp_picture;
+#[cfg(feature = "mcap")]
+mod memory_picture;
 mod motion_picture;
 mod painted;
 mod pair_rotation;
@@ -15,6 +17,8 @@ mod transfer_picture;
 mod viewpoints;
 
 pub use grasp_picture::write_grasp_picture;
+#[cfg(feature = "mcap")]
+pub use memory_picture::write_memory_picture;
 pub use motion_picture::{NearMiss, write_miss_picture, write_motion_picture};
 pub use sheet::write_sheet;
 pub use transfer_figure::TransferFigure;

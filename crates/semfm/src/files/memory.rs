@@ -111,7 +111,12 @@ impl MemoryFile {
             return Err(FormatError::new(path, "format", FORMAT, format).into());
         }
         let file = Self::deserialize(&value).map_err(|error| {
-            FormatError::new(path, "memory", "entries with name, mesh and folder", error.to_string())
+            FormatError::new(
+                path,
+                "memory",
+                "entries with name, mesh and folder",
+                error.to_string(),
+            )
         })?;
         file.check(path)?;
         Ok(file)
@@ -139,7 +144,9 @@ impl MemoryFile {
             };
             if entry.descriptor.len() != dim {
                 let expected = format!("{dim} numbers, as many as a feature of the encoder has");
-                return Err(fault("descriptor", expected, entry.descriptor.len().to_string()).into());
+                return Err(
+                    fault("descriptor", expected, entry.descriptor.len().to_string()).into()
+                );
             }
         }
         Ok(())

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use semfm_fmap::fusion::Trust;
 use semfm_fmap::{Evidence, Stages};
-use semfm_geom::{Mesh, Verdict};
 use semfm_geom::io::{StagedFolder, read_json};
+use semfm_geom::{Mesh, Verdict};
 use serde::{Deserialize, Serialize};
 
 use super::memory::MemoryEncoder;
+use super::region::RegionFile;
 use super::transfer_folder::{put_transfer, write_upright, write_weighted};
 use super::transfer_report::{ObjectRecord, Provenance};
-use super::region::RegionFile;
 use super::transferred_region::{HypothesisRecord, TransferredRegionFile};
 use super::write_json;
 use crate::memory::{Memory, MemoryTransfer, Voice};

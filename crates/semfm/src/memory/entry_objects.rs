@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use semfm_geom::io::{FormatError, read_mesh};
 use semfm_geom::Task;
+use semfm_geom::io::{FormatError, read_mesh};
 
 use super::{EMBEDDINGS, MESH, REGION};
 use crate::files::{EntryRecord, read_embeddings, read_region};

@@ -59,7 +59,8 @@ impl Memory {
         let encoder = MemoryEncoder::of(&EncoderRecord::of_file(embeddings), embeddings.dim());
         self.check_encoder(&demonstration.name, Some(&encoder))?;
         self.check_new(demonstration, replace)?;
-        let prepared = prepare(mesh.clone(), FeatureSource::from(embeddings), &self.settings, task)?;
+        let prepared =
+            prepare(mesh.clone(), FeatureSource::from(embeddings), &self.settings, task)?;
         let plain = PlainFeatures::new(prepared.object.cloud());
         let entry = demonstration.record(plain.descriptor());
 
@@ -147,7 +148,11 @@ impl Memory {
         let name = &demonstration.name;
         if self.entry(name).is_some() {
             let expected = "a name that is not taken; --replace replaces the entry";
-            return Err(Error::invalid("name", expected, format!("{name:?}, which is there already")));
+            return Err(Error::invalid(
+                "name",
+                expected,
+                format!("{name:?}, which is there already"),
+            ));
         }
         let (hash, region_hash) = (demonstration.mesh.hash(), hash_of(demonstration.region));
         let mut entries = self.file.entries.iter();
@@ -167,9 +172,8 @@ impl Demonstration<'_> {
         let name = self.name.trim();
         let is_plain = !name.is_empty() && name == self.name && name.len() <= LONGEST_NAME;
         if !is_plain || name.chars().any(char::is_control) {
-            let expected = format!(
-                "1 to {LONGEST_NAME} bytes, printable, without spaces at its ends"
-            );
+            let expected =
+                format!("1 to {LONGEST_NAME} bytes, printable, without spaces at its ends");
             return Err(Error::invalid("name", expected, format!("{:?}", self.name)));
         }
         let n_vertices = self.mesh.n_vertices();

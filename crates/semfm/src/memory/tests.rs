@@ -141,7 +141,10 @@ fn what_is_there_already_is_refused_unless_it_is_replaced() {
         (a.demonstration("again"), "the mesh and region of \"a\""),
         (b.demonstration(" b"), "without spaces at its ends"),
         (b.demonstration(""), "printable"),
-        (Demonstration { region: &Region::from_mask(&[true; 3]), ..b.demonstration("b") }, "weights"),
+        (
+            Demonstration { region: &Region::from_mask(&[true; 3]), ..b.demonstration("b") },
+            "weights",
+        ),
         (Demonstration { embeddings: &a.embeddings, ..b.demonstration("b") }, "mesh"),
     ] {
         let error = memory.remember(&demonstration, false, &task).unwrap_err().to_string();

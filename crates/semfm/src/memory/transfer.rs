@@ -8,9 +8,9 @@ use semfm_fmap::fusion::{Answer, FusedAnswer, FusionSettings, Trust, fuse};
 use semfm_fmap::{Matching, Method, Stages};
 use semfm_geom::{Mesh, Task, Verdict};
 
+use super::Candidate;
 use super::Memory;
 use super::entry_objects::EntryObject;
-use super::Candidate;
 use crate::encoded_objects::milliseconds_since;
 use crate::files::{EntryRecord, MemoryEncoder};
 use crate::{Error, Prepared, Region, Result, Transfer};
@@ -110,13 +110,20 @@ impl Memory {
         book("objects");
         let transfers = objects.par_iter().map(|object| {
             let (source, target) = (&object.prepared.object, &target.object);
-            Ok(Matching::new(source, target, &self.settings().transfer, task)?.transfer(&object.region)?)
+            Ok(Matching::new(source, target, &self.settings().transfer, task)?
+                .transfer(&object.region)?)
         });
         let transfers = transfers.collect::<Result<Vec<_>>>()?;
         book("match");
-        let answers: Vec<Answer<'_>> = objects.iter().zip(&transfers).map(|(object, transfer)| {
-            Answer { source: &object.prepared.object, region: &object.region, transfer }
-        }).collect();
+        let answers: Vec<Answer<'_>> = objects
+            .iter()
+            .zip(&transfers)
+            .map(|(object, transfer)| Answer {
+                source: &object.prepared.object,
+                region: &object.region,
+                transfer,
+            })
+            .collect();
         let fused = fuse(&target.object, &answers, &settings.fusion)?;
         book("fuse");
         let said = chosen.into_iter().zip(objects).zip(transfers).zip(&fused.trusts);
@@ -157,7 +164,8 @@ impl Memory {
             kinds.sort_unstable();
             kinds.dedup();
             if !kinds.contains(&kind.as_str()) {
-                let known = if kinds.is_empty() { "none is named".into() } else { kinds.join(", ") };
+                let known =
+                    if kinds.is_empty() { "none is named".into() } else { kinds.join(", ") };
                 let expected = format!("a kind of {folder} ({known})");
                 return Err(Error::invalid("kind", expected, format!("{kind:?}")));
             }
@@ -177,7 +185,9 @@ impl MemoryTransfer {
         let unlike = self.voices.iter().all(|voice| voice.transfer.report.is_not_alike());
         Some(match self.voices.len() {
             _ if unlike => "not alike: no demonstration shows an object of this kind".into(),
-            _ if self.fused.region.is_empty() => "no place is enough like what was demonstrated".into(),
+            _ if self.fused.region.is_empty() => {
+                "no place is enough like what was demonstrated".into()
+            }
             n if n > 1 && self.fused.agreement < LITTLE_AGREEMENT => {
                 format!("the demonstrations disagree: {:.0} %", 100.0 * self.fused.agreement)
             }
