@@ -1,19 +1,21 @@
-"""Planning and timing of our arms beside OMPL, TOPP-RA's authors' package, and a replay by an independent checker.
+"""Planning and timing of our arms beside TOPP-RA's authors' package, and a replay by an independent checker.
 
-``pip install numpy pyyaml pin ompl==2.0.1 toppra``, then::
+``pip install numpy pyyaml pin toppra``, then, for a folder of built programs::
 
-    python bench/planning_problems.py unpack shared/data/planning/motion_bench_maker CACHE
-    cargo run --release -p semfm-eval --example plan_problems CACHE/panda CACHE/panda/plans.jsonl          # and ur5
+    cargo build --release -p semfm-eval --examples
+    python bench/planning.py run shared/data/planning/motion_bench_maker CACHE --bin target/release [--every 7]
+
+which unpacks the problems (``bench/planning_problems.py``), and does for both arms what can be asked for one by one::
+
+    target/release/examples/plan_problems CACHE/panda CACHE/panda/plans.jsonl          # and ur5
     python bench/planning.py summary CACHE/panda/plans.jsonl CACHE/ur5/plans.jsonl
     python bench/planning.py toppra CACHE/panda/plans.jsonl CACHE/ur5/plans.jsonl
     python bench/planning.py replay CACHE/panda CACHE/panda/plans.jsonl --every 7
-    python bench/planning.py ompl CACHE/panda CACHE/panda/plans.jsonl --every 35 --seeds 3
 
-``summary`` prints the table of what was solved, how fast and how long. ``toppra`` times the same curves with toppra (the
-same velocity and acceleration limits, constraints at both ends of each interval, 1 000 intervals, seidel). ``replay``
-evaluates the cubics between samples at every millisecond by itself: limits, and contacts by coal on the robot's meshes as
-they are. ``ompl`` plans the same problems by RRT-Connect and OMPL's simplification, states checked by coal, one process a
-seed (OMPL's random numbers are global). All of it runs on one thread.
+``summary`` prints the table of what was solved, how fast and how long, and which goals are met. ``toppra`` times the same
+curves with toppra (the same velocity and acceleration limits, constraints at both ends of each interval, 1 000 intervals,
+seidel). ``replay`` evaluates the cubics between samples at every millisecond by itself: limits, and contacts by coal on the
+robot's meshes as they are. All of it runs on one thread. Other planners: ``bench/planning_peers.py``.
 """
 
 from __future__ import annotations
@@ -30,15 +32,15 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from planning_problems import IndependentChecker
+from planning_problems import TIPS, IndependentChecker, unpack
 
 #: Lengths of VAMP's paths, radians (Thomason, Kingston & Kavraki, Motions in Microseconds via Vectorized Sampling-Based
 #: Planning, ICRA 2024).
 VAMP_LENGTHS = {"panda": 5.2, "ur5": 6.8}
-#: Greatest step of OMPL's motion checks, radians.
-OMPL_STEP = 0.05
-#: Seconds after which OMPL gives up; a check by coal through Python takes some hundred times ours.
-OMPL_SECONDS = 20.0
+#: The goals: share of the valid problems, milliseconds of planning and shortening (median, p95), length over VAMP's.
+GOAL_SOLVED, GOAL_MEDIAN, GOAL_P95, GOAL_LENGTH = 0.995, 3.0, 30.0, 1.1
+#: Motions of each arm that are replayed by coal in `run`.
+N_REPLAYED = 20
 #: By which share rounding may pass a limit.
 ROUNDING = 1e-6
 
@@ -76,11 +78,23 @@ def summary(paths: list[Path]) -> None:
             f"| {length.mean():.2f} | {np.median(length):.2f} | {bound} | {stage('blend'):.2f} | {stage('retime'):.2f} "
             f"| {stage('check'):.1f} | {np.mean([a['trajectory']['duration'] for a in plans]):.2f} | {len(violations)} |"
         )
+        goals(robot, ms, (ms < 1000).sum() / len(valid), length.mean())
         for answer in violations:
             print(f"{answer['problem']}: {answer['violation']}")
         for answer in valid:
             if answer["outcome"] != "path":
                 print(f"{answer['problem']}: {answer['outcome']}")
+
+
+def goals(robot: str, ms: np.ndarray, solved_within: float, length: float) -> None:
+    """Says which goals are met."""
+    for what, value, goal, met in (
+        ("solved within 1 s", solved_within, GOAL_SOLVED, solved_within >= GOAL_SOLVED),
+        ("median ms", np.median(ms), GOAL_MEDIAN, np.median(ms) <= GOAL_MEDIAN),
+        ("p95 ms", np.percentile(ms, 95), GOAL_P95, np.percentile(ms, 95) <= GOAL_P95),
+        ("mean length, rad", length, GOAL_LENGTH * VAMP_LENGTHS[robot], length <= GOAL_LENGTH * VAMP_LENGTHS[robot]),
+    ):
+        print(f"{robot}: {what}: {value:.4g}, goal {goal:.4g}: {'met' if met else 'missed'}", file=sys.stderr)
 
 
 def toppra(paths: list[Path], every: int) -> None:
@@ -209,72 +223,19 @@ def replay(folder: Path, path: Path, every: int) -> None:
     )
 
 
-def ompl_seed(folder: Path, path: Path, every: int, seed: int) -> None:
-    """Plans problems by OMPL with one seed and prints a line of JSON each."""
-    from ompl import base, geometric, util
-
-    util.RNG.setSeed(seed + 1)
-    util.setLogLevel(util.LOG_ERROR)
-    content = json.loads((folder / "problems.json").read_text())
-    problems = {problem["name"]: problem for problem in content["problems"]}
-    checker = IndependentChecker(folder, content["joints"])
-    n = len(content["joints"])
-    for answer in solved(read(path)[1])[::every]:
-        problem = problems[answer["problem"]]
-        contacts = checker.checks(problem["scene"], first_only=True)
-        space = base.RealVectorStateSpace(n)
-        bounds = base.RealVectorBounds(n)
-        for j, (lower, upper) in enumerate(zip(checker.model.lowerPositionLimit, checker.model.upperPositionLimit)):
-            bounds.setLow(j, float(lower))
-            bounds.setHigh(j, float(upper))
-        space.setBounds(bounds)
-        setup = geometric.SimpleSetup(space)
-        n_checks = 0
-
-        def is_free(state) -> bool:
-            nonlocal n_checks
-            n_checks += 1
-            return not contacts([state[j] for j in range(n)])
-
-        setup.setStateValidityChecker(is_free)
-        information = setup.getSpaceInformation()
-        information.setStateValidityCheckingResolution(OMPL_STEP / space.getMaximumExtent())
-        start, goal = space.allocState(), space.allocState()
-        for j in range(n):
-            start[j], goal[j] = problem["start"][j], problem["goal"][j]
-        setup.setStartAndGoalStates(start, goal)
-        planner = geometric.RRTConnect(information)
-        planner.setRange(1.0)
-        setup.setPlanner(planner)
-        begun = time.process_time()
-        setup.solve(OMPL_SECONDS)
-        found = setup.haveExactSolutionPath()
-        if found:
-            setup.simplifySolution()
-        seconds = time.process_time() - begun
-        length = setup.getSolutionPath().length() if found else None
-        line = {"problem": answer["problem"], "length": length, "seconds": seconds, "checks": n_checks}
-        print(json.dumps(line), flush=True)
-
-
-def ompl(folder: Path, path: Path, every: int, seeds: int) -> None:
-    """Runs a process for each seed and prints OMPL's lengths beside ours."""
-    ours = {answer["problem"]: answer["length"] for answer in solved(read(path)[1])}
-    rows = []
-    for seed in range(seeds):
-        command = [sys.executable, __file__, "ompl-seed", str(folder), str(path), f"--every={every}", f"--seed={seed}"]
-        out = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-        rows += [json.loads(line) for line in out.splitlines() if line.startswith("{")]
-    found = [row for row in rows if row["length"] is not None]
-    theirs = np.array([row["length"] for row in found])
-    own = np.array([ours[row["problem"]] for row in found])
-    print("| robot | runs | OMPL solved | length rad: OMPL mean | median | ours mean | median | OMPL checks, median | ms, median |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-    print(
-        f"| {folder.name} | {len(rows)} | {len(found)} | {theirs.mean():.2f} | {np.median(theirs):.2f} | {own.mean():.2f} "
-        f"| {np.median(own):.2f} | {np.median([row['checks'] for row in rows]):.0f} "
-        f"| {1e3 * np.median([row['seconds'] for row in rows]):.0f} |"
-    )
+def run(data: Path, cache: Path, binaries: Path, every: int, seed: int) -> None:
+    """All of it for both arms."""
+    folders = [cache / robot for robot in TIPS]
+    if not all((folder / "problems.json").is_file() for folder in folders):
+        unpack(data, cache)
+    plans = [folder / "plans.jsonl" for folder in folders]
+    for folder, out in zip(folders, plans):
+        program = binaries / "examples" / "plan_problems"
+        subprocess.run([program, folder, out, "--every", str(every), "--seed", str(seed)], check=True)
+    summary(plans)
+    toppra(plans, 1)
+    for folder, out in zip(folders, plans):
+        replay(folder, out, max(1, len(solved(read(out)[1])) // N_REPLAYED))
 
 
 def main() -> None:
@@ -285,15 +246,16 @@ def main() -> None:
     command = commands.add_parser("toppra")
     command.add_argument("plans", type=Path, nargs="+")
     command.add_argument("--every", type=int, default=1)
-    for name in ("replay", "ompl", "ompl-seed"):
-        command = commands.add_parser(name)
-        command.add_argument("folder", type=Path)
-        command.add_argument("plans", type=Path)
-        command.add_argument("--every", type=int, default=1)
-        if name == "ompl":
-            command.add_argument("--seeds", type=int, default=3)
-        if name == "ompl-seed":
-            command.add_argument("--seed", type=int, required=True)
+    command = commands.add_parser("replay")
+    command.add_argument("folder", type=Path)
+    command.add_argument("plans", type=Path)
+    command.add_argument("--every", type=int, default=1)
+    command = commands.add_parser("run")
+    command.add_argument("data", type=Path)
+    command.add_argument("cache", type=Path)
+    command.add_argument("--bin", type=Path, default=Path("target/release"), help="folder of the built programs")
+    command.add_argument("--every", type=int, default=1, help="only each N-th problem")
+    command.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     if arguments.command == "summary":
         summary(arguments.plans)
@@ -301,10 +263,8 @@ def main() -> None:
         toppra(arguments.plans, arguments.every)
     elif arguments.command == "replay":
         replay(arguments.folder, arguments.plans, arguments.every)
-    elif arguments.command == "ompl":
-        ompl(arguments.folder, arguments.plans, arguments.every, arguments.seeds)
     else:
-        ompl_seed(arguments.folder, arguments.plans, arguments.every, arguments.seed)
+        run(arguments.data, arguments.cache, arguments.bin, arguments.every, arguments.seed)
 
 
 if __name__ == "__main__":
