@@ -11,6 +11,7 @@ use semfm::files;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{read_mesh, read_mesh_or_points, read_points};
 use semfm::grasp::{GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with};
+use semfm::observe;
 use semfm::robot::{
     Arm, ArmSettings, Gripper, GripperSettings, JointLimitsFile, MeshPaths, RobotDescription, Srdf,
 };
@@ -114,9 +115,15 @@ fn json(path: &Path) -> bool {
     read |= files::read_pose(path).is_ok();
     read |= files::read_scene(path).is_ok();
     read |= files::TrajectoryFile::read(path).is_ok();
+    read |= files::MemoryFile::read(path).is_ok();
+    read |= files::MemoryReportFile::read(path).is_ok();
     read |= files::read_motion(path).is_ok();
     if let Ok(image) = semfm::align::DepthImage::new(4, 3, vec![1.0; 12]) {
-        read |= files::read_intrinsics(path, &image).is_ok();
+        read |= observe::read_intrinsics(path, &image).is_ok();
+        let size = observe::MaskedPicture { width: 4, height: 3, name: "the view" };
+        read |= observe::read_mask(path, size).is_ok();
+        read |= observe::read_calibration(path, 4, 3).is_ok();
+        read |= observe::read_bop_models(path).is_ok();
     }
     read |= Results::read(path).is_ok();
     read | MapResults::read(path).is_ok()
@@ -167,7 +174,10 @@ fn joint_limits(path: &Path) -> bool {
 }
 
 fn npy(path: &Path) -> bool {
-    files::read_vertex_features(path, seed_mesh()).is_ok()
+    let size = observe::MaskedPicture { width: 16, height: 12, name: "the view" };
+    let mask = observe::read_mask(path, size).is_ok();
+    let depth = observe::read_depth_image(path, None).is_ok();
+    files::read_vertex_features(path, seed_mesh()).is_ok() | mask | depth
 }
 
 fn npz(path: &Path) -> bool {
@@ -175,9 +185,9 @@ fn npz(path: &Path) -> bool {
 }
 
 fn picture(path: &Path) -> bool {
-    let size = files::MaskedPicture { width: 16, height: 12, name: "the view" };
-    let mask = files::read_mask(path, size).is_ok();
-    mask | files::read_depth_image(path, 1000.0).is_ok()
+    let size = observe::MaskedPicture { width: 16, height: 12, name: "the view" };
+    let mask = observe::read_mask(path, size).is_ok();
+    mask | observe::read_depth_image(path, None).is_ok()
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::files::{MaskedPicture, read_mask};
 use semfm::geom::io::{PointCloud, read_points};
+use semfm::observe::{MaskedPicture, read_mask};
 use semfm_tests::shell::{Answer, json, run, shared};
 use serde_json::Value;
 

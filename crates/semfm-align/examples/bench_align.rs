@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::time::Instant;
 
-use semfm_align::{AlignModel, AlignSettings, Observation, Sim3, align_model};
+use semfm_align::{AlignModel, AlignSettings, ObservedCloud, Sim3, align_model};
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
@@ -36,7 +36,7 @@ fn one(mesh: &Mesh, cloud: &[DVec3], init: &str) -> Result<serde_json::Value> {
     let task = Task::default();
     let settings = AlignSettings { init: pose(init)?, ..AlignSettings::default() };
     let (model, model_ms) = timed(|| AlignModel::new(mesh, 0, &task))?;
-    let (observed, observe_ms) = timed(|| Observation::from_view(cloud, DVec3::ZERO))?;
+    let (observed, observe_ms) = timed(|| ObservedCloud::from_view(cloud, DVec3::ZERO))?;
     let (found, solve_ms) = timed(|| align_model(&model, &observed, &settings, &task))?;
     Ok(serde_json::json!({
         "camera_from_object": found.camera_from_object.to_rows(),

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use objects::{Labelled, Mug, bottle, cuboid, label_error, lumpy, mug, render, view};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use semfm_align::{AlignModel, AlignSettings, Observation, Verdict, align_model};
+use semfm_align::{AlignModel, AlignSettings, ObservedCloud, Verdict, align_model};
 use semfm_geom::Task;
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
@@ -65,10 +65,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let noise = [0.0, 0.0007, 0.0015][rng.random_range(0..3)];
             let seen = render(&case.object, &pose, noise, 1.5, seed);
             let observed = if rng.random::<f64>() < 0.5 {
-                Observation::from_depth(&seen.image, &objects::camera(), Some(&seen.mask))?
+                ObservedCloud::from_depth(&seen.image, &objects::camera(), Some(&seen.mask))?
             } else {
                 let points = seen.image.points(&objects::camera(), Some(&seen.mask))?.object;
-                Observation::from_view(&points, DVec3::ZERO)?
+                ObservedCloud::from_view(&points, DVec3::ZERO)?
             };
             let init = (rng.random::<f64>() < 0.3).then_some(pose);
             let settings = AlignSettings { init, seed, ..AlignSettings::default() };

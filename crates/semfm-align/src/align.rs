@@ -10,7 +10,7 @@ use crate::ambiguity::{BETTER, Rival};
 use crate::correspondence::Problem;
 use crate::judgement::judge;
 use crate::model::AlignModel;
-use crate::observation::Observation;
+use crate::observed_cloud::ObservedCloud;
 use crate::refine::RefinedPose;
 use crate::settings::AlignSettings;
 use crate::sim3::Sim3;
@@ -28,7 +28,7 @@ const MAX_MOVES: usize = 3;
 /// Aligns a mesh to an observation; [`align_model`] is the same for a mesh that is prepared.
 ///
 /// ```
-/// use semfm_align::{AlignSettings, Observation, align};
+/// use semfm_align::{AlignSettings, ObservedCloud, align};
 /// use semfm_geom::{Mesh, Task, math::DVec3};
 /// # let (mut points, mut faces) = (Vec::new(), Vec::new());
 /// # for face in 0..6usize { let (n, s) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
@@ -46,7 +46,7 @@ const MAX_MOVES: usize = 3;
 ///         sides.map(|p| 0.01 * p + DVec3::new(0.2, 0.3, 0.4))
 ///     })
 ///     .collect();
-/// let observation = Observation::from_view(&seen, DVec3::ZERO)?;
+/// let observation = ObservedCloud::from_view(&seen, DVec3::ZERO)?;
 /// let found = align(&cuboid, &observation, &AlignSettings::default(), &Task::default())?;
 /// assert!((found.camera_from_object.scale - 0.01).abs() < 2e-4); // by its outline alone
 /// # Ok::<(), semfm_align::Error>(())
@@ -58,7 +58,7 @@ const MAX_MOVES: usize = 3;
 /// no error: see [`Alignment::verdict`].
 pub fn align(
     mesh: &Mesh,
-    observed: &Observation,
+    observed: &ObservedCloud,
     settings: &AlignSettings,
     task: &Task,
 ) -> Result<Alignment> {
@@ -77,7 +77,7 @@ pub fn align(
 /// [`semfm_geom::Error::Cancelled`].
 pub fn align_model(
     model: &AlignModel,
-    observed: &Observation,
+    observed: &ObservedCloud,
     settings: &AlignSettings,
     task: &Task,
 ) -> Result<Alignment> {

@@ -8,7 +8,7 @@ use semfm_geom::math::DMat3;
 
 use crate::extent::order_statistic;
 use crate::model::{AlignModel, agreement};
-use crate::observation::Observation;
+use crate::observed_cloud::ObservedCloud;
 use crate::sim3::{Sim3, Tangent};
 
 /// Median distances of normal noise to their standard deviation: 1/Φ⁻¹(¾).
@@ -30,7 +30,7 @@ pub(crate) enum NearestBy {
 #[derive(Clone, Copy)]
 pub(crate) struct Problem<'a> {
     pub model: &'a AlignModel,
-    pub observed: &'a Observation,
+    pub observed: &'a ObservedCloud,
     /// Least and greatest scale, metres for each radius of the object.
     pub scales: [f64; 2],
 }

@@ -63,6 +63,17 @@ impl DepthImage {
         self.height
     }
 
+    /// Depth of every pixel (height × width, row-major), 0 where nothing came back.
+    pub fn metres(&self) -> &[f32] {
+        &self.depth
+    }
+
+    /// Depth at a column and a row; `None` where nothing came back, and outside of the image.
+    pub fn at(&self, column: usize, row: usize) -> Option<f32> {
+        let inside = column < self.width && row < self.height;
+        inside.then(|| self.depth[row * self.width + column]).filter(|&z| z > 0.0)
+    }
+
     /// The points of the pixels that have a depth, in the camera's frame. The camera's own pose
     /// plays no part. Without a mask every pixel shows the object.
     ///

@@ -10,7 +10,7 @@
 use semfm_geom::math::{DMat3, DVec3};
 
 use crate::correspondence::Problem;
-use crate::observation::Coverage;
+use crate::observed_cloud::Coverage;
 use crate::sim3::Sim3;
 
 /// Distance that counts half, as a share of the observed diameter: 1 mm on a mug. Reconstructions are

@@ -132,16 +132,16 @@ mod tests {
 
     use super::*;
     use crate::model::AlignModel;
-    use crate::observation::Observation;
+    use crate::observed_cloud::ObservedCloud;
 
     /// An ellipsoid of half axes 8, 12 and 20 with all its sides observed.
-    fn observed_from(pose: &Sim3) -> (AlignModel, Observation) {
+    fn observed_from(pose: &Sim3) -> (AlignModel, ObservedCloud) {
         let mesh = zoo::icosphere(3);
         let stretched = mesh.vertices().iter().map(|&p| p * DVec3::new(8.0, 12.0, 20.0)).collect();
         let mesh = semfm_geom::Mesh::new(stretched, mesh.faces().to_vec()).unwrap();
         let points: Vec<DVec3> = mesh.vertices().iter().map(|&p| pose.apply(p)).collect();
         let model = AlignModel::new(&mesh, 0, &Task::default()).unwrap();
-        (model, Observation::from_many_views(&points).unwrap())
+        (model, ObservedCloud::from_many_views(&points).unwrap())
     }
 
     #[test]

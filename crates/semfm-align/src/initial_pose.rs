@@ -4,7 +4,7 @@ use semfm_geom::math::{DQuat, DVec3};
 
 use crate::extent::{Extent, ViewAxes};
 use crate::model::AlignModel;
-use crate::observation::Observation;
+use crate::observed_cloud::ObservedCloud;
 use crate::sim3::Sim3;
 
 /// Surface that the line of sight meets at less than this cosine does not count as facing.
@@ -20,7 +20,7 @@ const FACING: f64 = 0.15;
 /// > scale = |s'| / |s|,  translation = c' − scale · c
 pub(crate) fn fit_extent(
     model: &AlignModel,
-    observed: &Observation,
+    observed: &ObservedCloud,
     rotation: DQuat,
 ) -> Option<Sim3> {
     let axes = observed.axes();

@@ -31,7 +31,7 @@ mod judgement;
 mod kernel;
 mod model;
 mod nearest_table;
-mod observation;
+mod observed_cloud;
 mod oriented_point;
 mod refine;
 mod rotations;
@@ -49,7 +49,7 @@ pub use ambiguity::UndeterminedAxis;
 pub use depth_image::{DepthImage, DepthPoints};
 pub use error::{Error, Result};
 pub use model::AlignModel;
-pub use observation::Observation;
+pub use observed_cloud::ObservedCloud;
 pub use semfm_geom::Verdict;
 pub use settings::AlignSettings;
 pub use sim3::Sim3;
@@ -68,7 +68,7 @@ mod tests {
         assert_send_sync::<DepthImage>();
         assert_send_sync::<DepthPoints>();
         assert_send_sync::<Error>();
-        assert_send_sync::<Observation>();
+        assert_send_sync::<ObservedCloud>();
         assert_send_sync::<Sim3>();
         assert_send_sync::<Verdict>();
     }

@@ -8,7 +8,7 @@ use crate::Result;
 use crate::correspondence::{NearestBy, Problem};
 use crate::initial_pose::fit_extent;
 use crate::kernel::geman_mcclure;
-use crate::observation::Coverage;
+use crate::observed_cloud::Coverage;
 use crate::rotations::{around_guess, super_fibonacci};
 use crate::sim3::Sim3;
 use crate::visibility::Visibility;

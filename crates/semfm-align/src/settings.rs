@@ -1,7 +1,7 @@
 //! What the caller may choose.
 
 use crate::model::AlignModel;
-use crate::observation::Observation;
+use crate::observed_cloud::ObservedCloud;
 use crate::sim3::Sim3;
 use crate::{Error, Result};
 
@@ -63,7 +63,7 @@ impl AlignSettings {
     }
 
     /// Least and greatest scale, metres for each radius of the model.
-    pub(crate) fn scales(&self, model: &AlignModel, observed: &Observation) -> [f64; 2] {
+    pub(crate) fn scales(&self, model: &AlignModel, observed: &ObservedCloud) -> [f64; 2] {
         let radius = model.object_from_unit.scale;
         match (self.scale_range, self.init) {
             (Some(range), _) => range.map(|scale| scale * radius),

@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use semfm_align::{AlignSettings, Alignment, DepthImage, Error, Observation, Sim3, Verdict, align};
+use semfm_align::{AlignSettings, Alignment, DepthImage, Error, ObservedCloud, Sim3, Verdict, align};
 use semfm_geom::math::{DAffine3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, SurfaceIndex, Task, zoo};
@@ -61,7 +61,7 @@ fn noisy(points: &[DVec3], sigma: f64, seed: u64) -> Vec<DVec3> {
 }
 
 fn found(mesh: &Mesh, points: &[DVec3], settings: &AlignSettings) -> Alignment {
-    let observed = Observation::from_view(points, DVec3::ZERO).unwrap();
+    let observed = ObservedCloud::from_view(points, DVec3::ZERO).unwrap();
     align(mesh, &observed, settings, &Task::default()).unwrap()
 }
 
@@ -76,7 +76,7 @@ fn a_clean_surface_is_found_exactly_without_a_guess() {
     let mesh = pebble();
     let points: Vec<DVec3> =
         sample_uniform(&mesh, 20_000, 7).unwrap().iter().map(|s| truth().apply(s.point)).collect();
-    let observed = Observation::from_many_views(&points).unwrap();
+    let observed = ObservedCloud::from_many_views(&points).unwrap();
     let found = align(&mesh, &observed, &AlignSettings::default(), &Task::default()).unwrap();
     let pose = found.camera_from_object;
     assert!((pose.scale / truth().scale - 1.0).abs() < 1e-6, "{found:?}");
@@ -266,7 +266,7 @@ fn a_depth_image_with_a_mask_knows_what_stands_before_the_object() {
         depth.push(if pole { 0.4 } else { hit.map_or(0.9, |hit| hit.t as f32) });
     }
     let image = DepthImage::new(320, 240, depth).unwrap();
-    let observed = Observation::from_depth(&image, &camera, Some(&mask)).unwrap();
+    let observed = ObservedCloud::from_depth(&image, &camera, Some(&mask)).unwrap();
     let found = align(&mesh, &observed, &AlignSettings::default(), &Task::default()).unwrap();
     assert!(error(&mesh, &found) < 1e-4, "{} {found:?}", error(&mesh, &found));
     assert_eq!(found.verdict, Verdict::Accept, "{found:?}");
@@ -276,7 +276,7 @@ fn a_depth_image_with_a_mask_knows_what_stands_before_the_object() {
 fn bad_settings_and_cancelled_tasks_are_errors() {
     let mesh = pebble();
     let points = visible(&mesh, &truth(), 400, 1);
-    let observed = Observation::from_view(&points, DVec3::ZERO).unwrap();
+    let observed = ObservedCloud::from_view(&points, DVec3::ZERO).unwrap();
     for settings in [
         AlignSettings { scale_range: Some([0.0, 1.0]), ..AlignSettings::default() },
         AlignSettings { scale_range: Some([2.0, 1.0]), ..AlignSettings::default() },

@@ -9,7 +9,7 @@ use objects::{Labelled, Mug, bottle, camera, cuboid, label_error, lumpy, mug, re
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use semfm_align::{AlignSettings, Alignment, Observation, Sim3, Verdict, align};
+use semfm_align::{AlignSettings, Alignment, ObservedCloud, Sim3, Verdict, align};
 use semfm_geom::Task;
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::sample_uniform;
@@ -17,7 +17,7 @@ use semfm_geom::sampling::sample_uniform;
 /// A labelled part off by more than this is in another place, metres.
 const OFF: f64 = 0.005;
 
-fn aligned(model: &Labelled, observed: &Observation, settings: &AlignSettings) -> Alignment {
+fn aligned(model: &Labelled, observed: &ObservedCloud, settings: &AlignSettings) -> Alignment {
     align(&model.mesh, observed, settings, &Task::default()).unwrap()
 }
 
@@ -30,7 +30,7 @@ fn seen(
     seed: u64,
 ) -> (Alignment, f64) {
     let seen = render(object, pose, noise, 1.5, seed);
-    let observed = Observation::from_depth(&seen.image, &camera(), Some(&seen.mask)).unwrap();
+    let observed = ObservedCloud::from_depth(&seen.image, &camera(), Some(&seen.mask)).unwrap();
     let found = aligned(model, &observed, &AlignSettings { seed, ..Default::default() });
     let off = label_error(object, pose, &found.camera_from_object);
     (found, off)
@@ -120,7 +120,7 @@ fn neither_order_nor_repetition_of_points_changes_the_answer() {
     let picture = render(&object, &pose, 0.001, 1.5, 4);
     let points = picture.image.points(&camera(), Some(&picture.mask)).unwrap().object;
     let of = |points: &[DVec3]| {
-        let observed = Observation::from_view(points, DVec3::ZERO).unwrap();
+        let observed = ObservedCloud::from_view(points, DVec3::ZERO).unwrap();
         aligned(&object, &observed, &AlignSettings::default())
     };
     let first = of(&points);
@@ -157,7 +157,7 @@ fn the_inside_of_a_thin_vessel_belongs_to_it() {
             .collect();
         let mut rng = ChaCha8Rng::seed_from_u64(9);
         points.iter_mut().for_each(|p| *p += noise * objects::normal_vector(&mut rng));
-        let observed = Observation::from_many_views(&points).unwrap();
+        let observed = ObservedCloud::from_many_views(&points).unwrap();
         let found = aligned(&object, &observed, &AlignSettings::default());
         let scale = found.camera_from_object.scale;
         assert!((scale - 1.0).abs() < 0.002, "wall {wall}: scale {scale}");
@@ -186,7 +186,7 @@ fn thousands_of_copies_of_a_triangle_cost_nothing() {
         .map(|s| pose.apply(s.point))
         .collect();
     let start = std::time::Instant::now();
-    let observed = Observation::from_view(&points, DVec3::ZERO).unwrap();
+    let observed = ObservedCloud::from_view(&points, DVec3::ZERO).unwrap();
     let _ = aligned(&object, &observed, &AlignSettings::default());
     assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
 }

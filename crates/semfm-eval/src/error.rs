@@ -122,6 +122,12 @@ impl From<semfm::geom::Error> for Error {
     }
 }
 
+impl From<semfm::observe::Error> for Error {
+    fn from(cause: semfm::observe::Error) -> Self {
+        Self::Facade(cause.into())
+    }
+}
+
 impl From<semfm::fmap::Error> for Error {
     fn from(cause: semfm::fmap::Error) -> Self {
         Self::Facade(cause.into())

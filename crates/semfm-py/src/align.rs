@@ -6,7 +6,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::align::Alignment as Found;
-use semfm::align::{self, AlignSettings, Observation, Sim3};
+use semfm::align::{self, AlignSettings, ObservedCloud, Sim3};
 use semfm::files::AlignedFile;
 use semfm::geom::math::DVec3;
 
@@ -39,8 +39,8 @@ impl Question {
         let (found, file) = run(py, progress, move |task| {
             let Question { mesh, points, viewpoint, settings } = &*asked;
             let observed = match *viewpoint {
-                Some((x, y, z)) => Observation::from_view(points, [x, y, z].into())?,
-                None => Observation::from_many_views(points)?,
+                Some((x, y, z)) => ObservedCloud::from_view(points, [x, y, z].into())?,
+                None => ObservedCloud::from_many_views(points)?,
             };
             let found = align::align(mesh, &observed, settings, task)?;
             let file = AlignedFile::new(&found, mesh, settings);

@@ -113,6 +113,27 @@ pub fn region_under_mask(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result
     Ok(Region::from_mask(&inside))
 }
 
+/// The regions of several views, or frames, of one mesh as one: each vertex has the largest of its weights.
+///
+/// # Errors
+/// [`Error::Invalid`] for no region and for regions of different meshes.
+pub fn merge_regions(regions: impl IntoIterator<Item = Region>) -> Result<Region> {
+    let mut regions = regions.into_iter();
+    let none = || Error::invalid("regions", "at least one", "none");
+    let mut merged = regions.next().ok_or_else(none)?.weights().to_vec();
+    for region in regions {
+        if region.n_vertices() != merged.len() {
+            let expected = format!("{} weights, as the first region", merged.len());
+            return Err(Error::invalid("region", expected, region.n_vertices().to_string()));
+        }
+        merged
+            .iter_mut()
+            .zip(region.weights())
+            .for_each(|(most, &weight)| *most = most.max(weight));
+    }
+    Ok(Region::from_weights(merged)?)
+}
+
 /// A region that was to be completed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrownRegion {
@@ -340,6 +361,17 @@ mod tests {
         let empty = Region::from_mask(&vec![false; part.len()]);
         assert!(grow_region(&torus, &empty, None).is_err());
         assert!(grow_region(&zoo::icosphere(1), &whole, None).is_err());
+    }
+
+    #[test]
+    fn several_views_mark_what_each_of_them_marks() {
+        let regions =
+            [vec![0.2, 0.9, 0.0], vec![0.6, 0.1, 0.0]].map(|w| Region::from_weights(w).unwrap());
+        let merged = merge_regions(regions.clone()).unwrap();
+        assert_eq!((merged.weights(), merged.vertices()), (&[0.6, 0.9, 0.0][..], vec![0, 1]));
+        assert!(merge_regions([]).is_err());
+        let other = Region::from_weights(vec![1.0; 4]).unwrap();
+        assert!(merge_regions([regions[0].clone(), other]).is_err());
     }
 
     #[test]

@@ -48,6 +48,22 @@ pub enum Error {
     Format(#[from] FormatError),
 }
 
+impl From<semfm_observe::Error> for Error {
+    fn from(cause: semfm_observe::Error) -> Self {
+        match cause {
+            semfm_observe::Error::Geom(cause) => Self::Geom(cause),
+            semfm_observe::Error::Align(cause) => Self::Align(cause),
+            semfm_observe::Error::Format(cause) => Self::Format(cause),
+            semfm_observe::Error::Invalid { what, expected, found } => {
+                Self::Invalid { what, expected, found }
+            }
+            #[cfg(feature = "mcap")]
+            semfm_observe::Error::Views(cause) => Self::Views(cause),
+            other => Self::invalid("observation", "one that can be read", other.to_string()),
+        }
+    }
+}
+
 impl Error {
     pub(crate) fn invalid(
         what: impl Into<String>,

@@ -10,7 +10,7 @@
 //! Three calls do it: [`prepare`] each object, [`transfer`] the region, and, for a robot,
 //! [`find_grasps`] in it. [`Matching`] keeps a match for further regions. The crates below are
 //! re-exported whole: [`geom`] (meshes, Laplacians, eigenbases), [`views`] (rendering, lifting, MCAP
-//! files), [`fmap`] (anchors, maps, transfer), [`align`] (a model in what a depth camera sees),
+//! files), [`observe`] (depth cameras and hands), [`fmap`] (anchors, maps, transfer), [`align`] (a model in what a depth camera sees),
 //! [`robot`] (robot descriptions, grippers) and [`grasp`]. [`files`] reads and writes what a
 //! transfer, an alignment and grasps leave behind.
 //!
@@ -50,6 +50,7 @@ pub use semfm_fmap as fmap;
 pub use semfm_geom as geom;
 pub use semfm_grasp as grasp;
 pub use semfm_motion as motion;
+pub use semfm_observe as observe;
 pub use semfm_robot as robot;
 pub use semfm_views as views;
 
@@ -60,6 +61,9 @@ pub mod files;
 mod grasp_plan;
 mod grasp_request;
 mod grasp_result;
+mod hand_mounting;
+#[cfg(feature = "mcap")]
+pub mod memory;
 mod motion_scene;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
@@ -68,6 +72,7 @@ mod pipeline;
 mod planned_motion;
 mod pose_dependence;
 mod robot_arm;
+mod scene_contents;
 pub mod upright;
 pub mod weight_colors;
 
@@ -92,3 +97,4 @@ pub use pipeline::{
 pub use planned_motion::PlannedMotion;
 pub use pose_dependence::shares_of_poses;
 pub use robot_arm::RobotArm;
+pub use scene_contents::SceneContents;

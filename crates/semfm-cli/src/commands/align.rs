@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{ArgGroup, Args};
-use semfm::align::{AlignSettings, Alignment, Observation, Verdict, align};
-use semfm::files::{
-    AlignedFile, MaskedPicture, read_depth_image, read_intrinsics, read_mask, read_pose,
-};
+use semfm::align::{AlignSettings, Alignment, ObservedCloud, Verdict, align};
+use semfm::files::{AlignedFile, read_pose};
 use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
+use semfm::observe::{MaskFile, ObservationFiles};
 
 use super::Outcome;
 use super::size::size_in_metres;
@@ -60,25 +59,27 @@ struct ObservedOptions {
     /// The cloud was put together from many views: any side may be in it
     #[arg(long, requires = "cloud", conflicts_with = "viewpoint")]
     many_views: bool,
-    /// A depth image (16-bit PNG)
-    #[arg(long, value_name = "D.png", requires = "intrinsics")]
+    /// A depth image: 16-bit PNG or .npy
+    #[arg(long, value_name = "DEPTH", requires = "intrinsics")]
     depth: Option<PathBuf>,
-    /// Units of the depth image to the metre
-    #[arg(long, value_name = "N", default_value_t = 1000.0, allow_negative_numbers = true)]
-    depth_scale: f64,
-    /// The camera: `{"fx", "fy", "cx", "cy"}` or `{"K": 3 × 3}`
+    /// Units of the depth image to the metre [default: 1000 for whole numbers, 1 for floats]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    depth_scale: Option<f64>,
+    /// The camera: `{"fx", "fy", "cx", "cy"}` or `{"K": 3 × 3}`; with coefficients of distortion the image is undistorted
     #[arg(long, value_name = "K.json", requires = "depth")]
     intrinsics: Option<PathBuf>,
-    /// A picture of the depth image's size, bright where the object is
-    #[arg(long, value_name = "M.png", requires = "depth")]
-    mask: Option<PathBuf>,
+    /// A mask of the depth image's size: a picture that is bright, or opaque, on the object; .npy; COCO's run lengths
+    /// (.json); or one label of a picture of labels
+    #[arg(long, value_name = "MASK[#LABEL]", requires = "depth")]
+    mask: Option<String>,
 }
 
 impl AlignCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let mut inputs = vec![self.mesh.as_path()];
         inputs.extend(self.init.as_deref());
-        inputs.extend(self.observed.files());
+        let observed_files = self.observed.files();
+        inputs.extend(observed_files.iter().map(PathBuf::as_path));
         let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         let start = Instant::now();
@@ -114,24 +115,28 @@ impl AlignCommand {
 
 impl ObservedOptions {
     /// The files it reads.
-    fn files(&self) -> impl Iterator<Item = &Path> {
-        [&self.cloud, &self.depth, &self.intrinsics, &self.mask]
-            .into_iter()
-            .filter_map(|f| f.as_deref())
+    fn files(&self) -> Vec<PathBuf> {
+        let depth = self.depth_files().map(|files| files.paths().map(Path::to_owned).collect());
+        let depth: Vec<PathBuf> = depth.unwrap_or_default();
+        depth.into_iter().chain(self.cloud.clone()).collect()
     }
 
-    fn read(&self) -> Result<Observation> {
-        if let (Some(depth), Some(intrinsics)) = (&self.depth, &self.intrinsics) {
-            let image = read_depth_image(depth, self.depth_scale)?;
-            let camera = read_intrinsics(intrinsics, &image)?;
-            let of = MaskedPicture {
-                width: camera.width(),
-                height: camera.height(),
-                name: "the depth image",
-            };
-            let mask = self.mask.as_deref().map(|mask| read_mask(mask, of)).transpose()?;
-            let named = || self.mask.as_ref().unwrap_or(depth).display().to_string();
-            return Observation::from_depth(&image, &camera, mask.as_deref()).with_context(named);
+    /// A depth image with its camera and mask.
+    fn depth_files(&self) -> Option<ObservationFiles> {
+        Some(ObservationFiles {
+            depth: Some(self.depth.clone()?),
+            depth_scale: self.depth_scale,
+            calibration: self.intrinsics.clone()?,
+            masks: self.mask.as_deref().map(MaskFile::parse).into_iter().collect(),
+            ..Default::default()
+        })
+    }
+
+    fn read(&self) -> Result<ObservedCloud> {
+        if let Some(files) = self.depth_files() {
+            let seen = files.read()?;
+            let named = || files.paths().last().unwrap_or(Path::new("")).display().to_string();
+            return seen.observed_cloud(seen.masks().first()).with_context(named);
         }
         let cloud = self.cloud.as_deref().context("--cloud or --depth is needed")?;
         let points = read_points(cloud)?.points;
@@ -142,9 +147,9 @@ impl ObservedOptions {
             None => DVec3::ZERO,
         };
         let observed = if self.many_views {
-            Observation::from_many_views(&points)
+            ObservedCloud::from_many_views(&points)
         } else {
-            Observation::from_view(&points, viewpoint)
+            ObservedCloud::from_view(&points, viewpoint)
         };
         observed.with_context(|| cloud.display().to_string())
     }

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::demonstration::{
-    GrownRegion, grow_region, region_around_contact, region_of_paint, region_under_mask,
+    GrownRegion, grow_region, merge_regions, region_around_contact, region_of_paint,
+    region_under_mask,
 };
-use semfm::files::{MaskedPicture, read_mask, read_region, write_region};
+use semfm::files::{read_region, write_region};
 use semfm::geom::Pinhole;
 use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
+use semfm::observe::{MaskFile, MaskedPicture};
 use semfm::views::mcap::{SingleView, read_view};
 use semfm::{Mesh, Region};
 
@@ -52,12 +54,13 @@ pub struct RegionCommand {
         help_heading = "How"
     )]
     radius: Option<f64>,
-    /// A picture of the size of a view, bright where the region is; needs --view
-    #[arg(long, value_name = "IMAGE", requires = "view", help_heading = "How")]
-    mask: Option<PathBuf>,
+    /// A mask of the size of a view (a picture that is bright, or opaque, where the region is; .npy; COCO's run lengths;
+    /// or one label of a picture of labels); needs --view. Several masks, each with its view, are merged
+    #[arg(long, value_name = "MASK[#LABEL]", requires = "view", help_heading = "How")]
+    mask: Vec<String>,
     /// The view of the mask: a views file and a number
     #[arg(long, value_name = "V.views.mcap#NNN", requires = "mask", help_heading = "How")]
-    view: Option<String>,
+    view: Vec<String>,
     /// The vertices painted red, or in the colour given
     #[arg(long, value_name = "R,G,B", num_args = 0..=1, default_missing_value = "red", help_heading = "How")]
     ply_color: Option<String>,
@@ -75,10 +78,13 @@ pub struct RegionCommand {
 
 impl RegionCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
-        let view =
-            self.view.as_deref().map(|view| Path::new(view.rsplit_once('#').map_or(view, |v| v.0)));
+        let view_file =
+            |view: &String| PathBuf::from(view.rsplit_once('#').map_or(&view[..], |v| v.0));
+        let masks: Vec<MaskFile> = self.mask.iter().map(|mask| MaskFile::parse(mask)).collect();
+        let views: Vec<PathBuf> = self.view.iter().map(view_file).collect();
         let mut inputs = vec![self.mesh.as_path()];
-        inputs.extend(self.mask.as_deref().into_iter().chain(self.region.as_deref()).chain(view));
+        inputs.extend(masks.iter().map(|mask| mask.path.as_path()));
+        inputs.extend(views.iter().map(PathBuf::as_path).chain(self.region.as_deref()));
         let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         output.check_again()?;
@@ -87,10 +93,19 @@ impl RegionCommand {
             let [x, y, z] = numbers(near).context("--near: expected three numbers, X,Y,Z")?;
             region_around_contact(&file.mesh, DVec3::new(x, y, z), radius)
                 .with_context(|| self.mesh.display().to_string())?
-        } else if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
-            let seen = from_mask(&file.mesh, mask, view)?;
-            camera = Some(seen.camera);
-            seen.region
+        } else if !masks.is_empty() {
+            if masks.len() != self.view.len() {
+                let (n, found) = (masks.len(), self.view.len());
+                bail!("--view: expected {n}, one for each --mask, found {found}");
+            }
+            let pairs = masks.iter().zip(&self.view);
+            let seen: Vec<SeenRegion> = pairs
+                .map(|(mask, view)| from_mask(&file.mesh, mask, view))
+                .collect::<Result<_>>()?;
+            if let [seen] = &seen[..] {
+                camera = Some(seen.camera);
+            }
+            merge_regions(seen.into_iter().map(|seen| seen.region))?
         } else if let Some(path) = &self.region {
             read_region(path, &file.mesh)?
         } else if let Some(paint) = &self.ply_color {
@@ -144,7 +159,7 @@ struct SeenRegion {
     camera: Pinhole,
 }
 
-fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<SeenRegion> {
+fn from_mask(mesh: &Mesh, mask: &MaskFile, view: &str) -> Result<SeenRegion> {
     let Some((path, number)) = view.rsplit_once('#') else {
         bail!("--view: expected V.views.mcap#NNN, found `{view}`");
     };
@@ -155,8 +170,8 @@ fn from_mask(mesh: &Mesh, mask: &Path, view: &str) -> Result<SeenRegion> {
     let SingleView { metadata, view } = read_view(path, number)?;
     metadata.check_mesh(mesh, path)?;
     let (width, height) = (view.camera.width(), view.camera.height());
-    let marked = read_mask(mask, MaskedPicture { width, height, name: "the view" })?;
+    let marked = mask.read(MaskedPicture { width, height, name: "the view" })?;
     let region = region_under_mask(mesh, &view.camera, &marked)
-        .with_context(|| mask.display().to_string())?;
+        .with_context(|| mask.path.display().to_string())?;
     Ok(SeenRegion { region, camera: view.camera })
 }

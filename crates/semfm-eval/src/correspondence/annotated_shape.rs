@@ -5,8 +5,8 @@ use std::path::Path;
 use semfm::Task;
 use semfm::geom::math::DVec3;
 use semfm::geom::{Eigenbasis, Mesh, Shape, ShapeCache, ShapeSettings};
+use semfm::observe::NumpyArchive;
 
-use super::npz::Archive;
 use crate::{Error, Result};
 
 /// Eigenpairs: the most that a method needs.
@@ -29,7 +29,7 @@ impl AnnotatedMesh {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] with the array at fault.
     pub fn read(path: &Path) -> Result<Self> {
-        let archive = Archive::read(path)?;
+        let archive = NumpyArchive::read(path)?;
         let mesh = mesh(path, &archive)?;
         let n = mesh.n_vertices();
         let truth = ids(path, &archive, "gt", n)?
@@ -77,7 +77,7 @@ impl AnnotatedShape {
     }
 }
 
-fn mesh(path: &Path, archive: &Archive<'_>) -> Result<Mesh> {
+fn mesh(path: &Path, archive: &NumpyArchive<'_>) -> Result<Mesh> {
     let vertices = rows(path, archive, "V")?.into_iter().map(DVec3::from_array).collect();
     let faces = rows(path, archive, "F")?.into_iter().map(|face| face.map(vertex_id)).collect();
     Mesh::new(vertices, faces)
@@ -85,11 +85,11 @@ fn mesh(path: &Path, archive: &Archive<'_>) -> Result<Mesh> {
 }
 
 /// An array (n × 3).
-fn rows(path: &Path, archive: &Archive<'_>, name: &str) -> Result<Vec<[f64; 3]>> {
+fn rows(path: &Path, archive: &NumpyArchive<'_>, name: &str) -> Result<Vec<[f64; 3]>> {
     let expected = "an array of three columns";
     match archive.array(name)? {
         Some(array) if array.shape.len() == 2 && array.shape[1] == 3 => {
-            Ok(array.values.as_chunks::<3>().0.to_vec())
+            Ok(array.into_f64().as_chunks::<3>().0.to_vec())
         }
         Some(array) => Err(Error::format(path, name, expected, format!("shape {:?}", array.shape))),
         None => Err(Error::format(path, name, expected, "nothing")),
@@ -101,11 +101,12 @@ fn vertex_id(x: f64) -> u32 {
     if x >= 0.0 && x <= f64::from(u32::MAX) { x as u32 } else { u32::MAX }
 }
 
-fn ids(path: &Path, archive: &Archive<'_>, name: &str, n: usize) -> Result<Option<Vec<u32>>> {
+fn ids(path: &Path, archive: &NumpyArchive<'_>, name: &str, n: usize) -> Result<Option<Vec<u32>>> {
     let Some(array) = archive.array(name)? else { return Ok(None) };
-    if let Some(at) = array.values.iter().position(|&x| !(x >= 0.0 && x < n as f64)) {
-        let (expected, found) = (format!("ids below {n}"), array.values[at].to_string());
+    let values = array.into_f64();
+    if let Some(at) = values.iter().position(|&x| !(x >= 0.0 && x < n as f64)) {
+        let (expected, found) = (format!("ids below {n}"), values[at].to_string());
         return Err(Error::format(path, format!("{name}[{at}]"), expected, found));
     }
-    Ok(Some(array.values.into_iter().map(|x| x as u32).collect()))
+    Ok(Some(values.into_iter().map(|x| x as u32).collect()))
 }

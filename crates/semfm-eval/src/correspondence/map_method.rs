@@ -109,9 +109,8 @@ impl MapMethod {
             }
             Self::TrueZoomOut => true_map(source, target)?,
         };
-        let on_source = farthest_points(source.shape.mesh().vertices(), MAP_SAMPLES);
         let on_target = farthest_points(target.shape.mesh().vertices(), MAP_SAMPLES);
-        let a = MapSide { basis: source.basis(), features: None, samples: &on_source };
+        let a = MapSide { basis: source.basis(), features: None, samples: &[] };
         let b = MapSide { basis: target.basis(), features: None, samples: &on_target };
         let map = if matches!(self, Self::Wks | Self::Landmarks) {
             map
@@ -125,7 +124,7 @@ impl MapMethod {
             };
             zoomout(map, &a, &b, &settings, task)?
         };
-        Ok(point_map(&map, &a, &b, 0.0).onto_originals(&source.shape, &target.shape))
+        Ok(point_map(&map, &a, &b, 0.0)?.onto_originals(&source.shape, &target.shape))
     }
 }
 

@@ -9,7 +9,6 @@ mod annotated_shape;
 mod dataset;
 mod geodesic_error;
 mod map_method;
-mod npz;
 mod results;
 mod run;
 mod table;

@@ -176,7 +176,7 @@ impl MapRun<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::dataset::PAIRS;
-    use super::super::npz::tests::{npy, zip};
+    use semfm::observe::testing::{npy, zip};
     use super::*;
     use semfm::Mesh;
     use semfm_synth::{Category, ObjectSettings, make_object};

@@ -37,6 +37,28 @@ impl Cdr {
         self.bytes.extend(value.to_le_bytes());
     }
 
+    /// A truth value.
+    pub fn bool(&mut self, value: bool) {
+        self.bytes.push(u8::from(value));
+    }
+
+    /// A number in single precision.
+    pub fn f32(&mut self, value: f32) {
+        self.align(4);
+        self.bytes.extend(value.to_le_bytes());
+    }
+
+    /// One byte, as a truth value is.
+    pub fn u8(&mut self, value: u8) {
+        self.bytes.push(value);
+    }
+
+    /// A sequence of bytes.
+    pub fn byte_sequence(&mut self, bytes: &[u8]) {
+        self.length(bytes.len());
+        self.bytes.extend(bytes);
+    }
+
     /// The length of a sequence, before its members.
     pub fn length(&mut self, n: usize) {
         self.u32(u32::try_from(n).unwrap_or(u32::MAX));

@@ -7,6 +7,7 @@
 
 mod cameras;
 mod cdr;
+mod cdr_reader;
 mod contents;
 mod decode;
 mod decompress;
@@ -28,6 +29,7 @@ mod views_file;
 mod writer;
 
 pub use cdr::Cdr;
+pub use cdr_reader::CdrReader;
 pub use contents::{Attachment, Channel, Contents, MetadataRecord, Schema, TimeRange};
 pub use decode::{decode, message_error};
 pub use embeddings_file::{Dtype, EmbeddingsFile};

@@ -19,6 +19,12 @@ pub enum Ros2Message {
     String,
     /// How frames stand in each other.
     TfMessage,
+    /// A picture.
+    Image,
+    /// A camera.
+    CameraInfo,
+    /// Shapes for RViz, in frames.
+    MarkerArray,
 }
 
 /// A definition: its name, its fields, and the messages among them.
@@ -118,6 +124,75 @@ static TF_MESSAGE: Definition = Definition {
     fields: "geometry_msgs/TransformStamped[] transforms\n",
     parts: &[&TRANSFORM_STAMPED],
 };
+static COLOR: Definition = Definition {
+    name: "std_msgs/ColorRGBA",
+    fields: "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
+    parts: &[],
+};
+static COMPRESSED_IMAGE: Definition = Definition {
+    name: "sensor_msgs/CompressedImage",
+    fields: "std_msgs/Header header\nstring format\nuint8[] data\n",
+    parts: &[&HEADER],
+};
+static UV_COORDINATE: Definition = Definition {
+    name: "visualization_msgs/UVCoordinate",
+    fields: "float32 u\nfloat32 v\n",
+    parts: &[],
+};
+static MESH_FILE: Definition = Definition {
+    name: "visualization_msgs/MeshFile",
+    fields: "string filename\nuint8[] data\n",
+    parts: &[],
+};
+static MARKER: Definition = Definition {
+    name: "visualization_msgs/Marker",
+    fields: "int32 ARROW=0\nint32 CUBE=1\nint32 SPHERE=2\nint32 CYLINDER=3\nint32 LINE_STRIP=4\n\
+             int32 LINE_LIST=5\nint32 CUBE_LIST=6\nint32 SPHERE_LIST=7\nint32 POINTS=8\n\
+             int32 TEXT_VIEW_FACING=9\nint32 MESH_RESOURCE=10\nint32 TRIANGLE_LIST=11\n\
+             int32 ADD=0\nint32 MODIFY=0\nint32 DELETE=2\nint32 DELETEALL=3\n\
+             std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\n\
+             geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\n\
+             builtin_interfaces/Duration lifetime\nbool frame_locked\ngeometry_msgs/Point[] points\n\
+             std_msgs/ColorRGBA[] colors\nstring texture_resource\n\
+             sensor_msgs/CompressedImage texture\nvisualization_msgs/UVCoordinate[] uv_coordinates\n\
+             string text\nstring mesh_resource\nvisualization_msgs/MeshFile mesh_file\n\
+             bool mesh_use_embedded_materials\n",
+    parts: &[
+        &HEADER,
+        &POSE,
+        &VECTOR,
+        &COLOR,
+        &DURATION,
+        &POINT,
+        &COMPRESSED_IMAGE,
+        &UV_COORDINATE,
+        &MESH_FILE,
+    ],
+};
+static MARKER_ARRAY: Definition = Definition {
+    name: "visualization_msgs/msg/MarkerArray",
+    fields: "visualization_msgs/Marker[] markers\n",
+    parts: &[&MARKER],
+};
+
+static IMAGE: Definition = Definition {
+    name: "sensor_msgs/msg/Image",
+    fields: "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n\
+             uint8 is_bigendian\nuint32 step\nuint8[] data\n",
+    parts: &[&HEADER],
+};
+static REGION_OF_INTEREST: Definition = Definition {
+    name: "sensor_msgs/RegionOfInterest",
+    fields: "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+    parts: &[],
+};
+static CAMERA_INFO: Definition = Definition {
+    name: "sensor_msgs/msg/CameraInfo",
+    fields: "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n\
+             float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\n\
+             uint32 binning_y\nsensor_msgs/RegionOfInterest roi\n",
+    parts: &[&HEADER, &REGION_OF_INTEREST],
+};
 
 impl Ros2Message {
     fn definition(self) -> &'static Definition {
@@ -128,6 +203,9 @@ impl Ros2Message {
             Self::JointState => &JOINT_STATE,
             Self::String => &STRING,
             Self::TfMessage => &TF_MESSAGE,
+            Self::Image => &IMAGE,
+            Self::CameraInfo => &CAMERA_INFO,
+            Self::MarkerArray => &MARKER_ARRAY,
         }
     }
 
@@ -168,6 +246,7 @@ mod tests {
             Ros2Message::JointState,
             Ros2Message::String,
             Ros2Message::TfMessage,
+            Ros2Message::MarkerArray,
         ] {
             let text = String::from_utf8(message.schema().data.to_vec()).unwrap();
             let defined: Vec<&str> =
@@ -177,7 +256,7 @@ mod tests {
             }
             let types = text.lines().filter(|line| !line.starts_with(['=', 'M']));
             for kind in types.filter_map(|line| line.split_whitespace().next()) {
-                let kind = kind.trim_end_matches("[]");
+                let kind = kind.split('[').next().unwrap_or(kind);
                 assert!(!kind.contains('/') || defined.contains(&kind), "{kind} of {text}");
             }
         }

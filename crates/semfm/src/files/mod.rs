@@ -16,28 +16,29 @@
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
 //! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`), a motion as another
 //! (`write_ros2_trajectory`). From other
-//! programs come depth images, masks and intrinsics ([`read_depth_image`], [`read_mask`],
-//! [`read_intrinsics`]), per-vertex features ([`read_vertex_features`]) and obstacles
-//! ([`read_obstacle`]).
+//! programs come per-vertex features ([`read_vertex_features`]) and obstacles ([`read_obstacle`]); what cameras
+//! leave behind is read in [`observe`](crate::observe).
 //!
 //! Keys of a JSON file stand in alphabetical order, whatever the order of a struct's fields.
 
 mod aligned;
-mod depth_image;
 #[cfg(feature = "mcap")]
 mod embeddings;
 mod grasps;
-mod intrinsics;
 mod isaac_grasps;
-mod mask;
+#[cfg(feature = "mcap")]
+mod memory;
+#[cfg(feature = "mcap")]
+mod memory_report;
 mod obstacle;
-mod picture;
 mod plan;
 mod point_map;
 mod region;
-pub(crate) mod rigid_pose;
+mod rigid_pose;
 #[cfg(feature = "mcap")]
 mod ros2_grasps;
+#[cfg(feature = "mcap")]
+mod ros2_hand;
 #[cfg(feature = "mcap")]
 mod ros2_trajectory;
 mod scene;
@@ -57,35 +58,40 @@ use serde::Serialize;
 pub use aligned::{
     AlignSettingsRecord, AlignedFile, AlignedPose, UndeterminedAxisRecord, read_aligned, read_pose,
 };
-pub use depth_image::read_depth_image;
 #[cfg(feature = "mcap")]
 pub use embeddings::read_embeddings;
 pub use grasps::{
     FORMAT as GRASPS_FORMAT, GraspRecord, GraspSettingsRecord, GraspsFile, GripperRecord,
     HandRecord, MissRecord, PartRecord, TableRecord,
 };
-pub use intrinsics::read_intrinsics;
 pub use isaac_grasps::write_isaac_grasps;
-pub use mask::{MaskedPicture, read_mask};
+#[cfg(feature = "mcap")]
+pub use memory::{
+    EntryProvenance, EntryRecord, FORMAT as MEMORY_FORMAT, MemoryEncoder, MemoryFile,
+};
+#[cfg(feature = "mcap")]
+pub use memory_report::{
+    FORMAT as MEMORY_REPORT_FORMAT, MemoryReportFile, VoiceRecord, write_memory_answer,
+};
 pub use obstacle::read_obstacle;
 pub use plan::{
     FORMAT as PLAN_FORMAT, PlanFile, PlanSettingsRecord, SegmentSeconds, StartContactRecord,
 };
 pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
-pub use rigid_pose::read_rigid_pose;
+pub use rigid_pose::{read_rigid_pose, rigid_pose};
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
 pub use scene::{
     BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord,
-    SceneContents, SceneFile, SphereRecord, TablePlaneRecord, read_scene,
+    SceneFile, SphereRecord, TablePlaneRecord, read_scene,
 };
 pub use stored_transfer::StoredTransfer;
 pub use trajectory::{
     FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
-    MountedHandRecord, ObstacleRecord, ShapeRecord, TrajectoryFile, read_motion,
+    MountedHandRecord, OBJECT_FILE, ObstacleRecord, ShapeRecord, TrajectoryFile, read_motion,
 };
 pub use transfer_folder::{
     ANSWERS as TRANSFER_ANSWERS, AnchorRanks, FILES as TRANSFER_FILES, ObjectAnchors,

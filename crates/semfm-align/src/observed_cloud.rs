@@ -27,7 +27,7 @@ const LEAST_POINTS: usize = 30;
 /// Observed points in the camera's frame (x right, y down, z forward, metres), downsampled, with
 /// normals and with the silhouette they make. Prepared once for many models.
 #[derive(Debug)]
-pub struct Observation {
+pub struct ObservedCloud {
     pub(crate) points: Vec<DVec3>,
     /// Unit, towards the viewpoint where there is one.
     pub(crate) normals: Vec<DVec3>,
@@ -57,7 +57,7 @@ struct View<'a> {
     bounds: Option<ImageBounds>,
 }
 
-impl Observation {
+impl ObservedCloud {
     /// A cloud seen from one place, metres. A viewpoint at the origin says that the frame is the camera's
     /// own (x right, y down, z forward), in which nothing that it sees lies behind it; in any other
     /// frame the viewpoint is where the camera stood.
@@ -252,9 +252,9 @@ mod tests {
 
     #[test]
     fn normals_look_at_the_viewpoint() {
-        let seen = Observation::from_view(&patch(), DVec3::ZERO).unwrap();
+        let seen = ObservedCloud::from_view(&patch(), DVec3::ZERO).unwrap();
         assert!(seen.normals.iter().all(|n| n.z < -0.99));
-        let seen = Observation::from_view(&patch(), DVec3::Z).unwrap();
+        let seen = ObservedCloud::from_view(&patch(), DVec3::Z).unwrap();
         assert!(seen.normals.iter().all(|n| n.z > 0.99));
     }
 
@@ -263,7 +263,7 @@ mod tests {
         let points = patch();
         let shuffled: Vec<DVec3> = (0..900).map(|i| points[i * 7 % 900]).collect();
         let repeated = [&shuffled[..], &points[..450]].concat();
-        let of = |points: &[DVec3]| Observation::from_view(points, DVec3::ZERO).unwrap().points;
+        let of = |points: &[DVec3]| ObservedCloud::from_view(points, DVec3::ZERO).unwrap().points;
         assert_eq!(of(&points), of(&shuffled));
         assert_eq!(of(&points), of(&repeated));
     }
@@ -280,12 +280,12 @@ mod tests {
             (scaled(-1.0), "900 of 900"),
             (scaled(1e120), "point 0"),
         ] {
-            let error = Observation::from_view(&points, DVec3::ZERO).unwrap_err().to_string();
+            let error = ObservedCloud::from_view(&points, DVec3::ZERO).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
-        assert!(Observation::from_many_views(&scaled(1000.0)).is_err());
+        assert!(ObservedCloud::from_many_views(&scaled(1000.0)).is_err());
         // In a frame of its own, a cloud may lie on any side of the origin.
-        assert!(Observation::from_view(&scaled(-1.0), DVec3::new(0.1, 0.1, 0.3)).is_ok());
+        assert!(ObservedCloud::from_view(&scaled(-1.0), DVec3::new(0.1, 0.1, 0.3)).is_ok());
     }
 
     #[test]
@@ -298,9 +298,9 @@ mod tests {
             (vec![DVec3::ONE; 100], "one spot"),
             (broken, "point 7"),
         ] {
-            let error = Observation::from_view(&points, DVec3::ZERO).unwrap_err().to_string();
+            let error = ObservedCloud::from_view(&points, DVec3::ZERO).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
-            assert!(Observation::from_many_views(&points).is_err());
+            assert!(ObservedCloud::from_many_views(&points).is_err());
         }
     }
 }

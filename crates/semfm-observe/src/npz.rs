@@ -1,33 +1,29 @@
 //! NumPy's archives: a ZIP of arrays, stored or deflated.
 //!
-//! `npyz` reads the arrays. Its feature `npz` would read the ZIP, too, by `zip` 0.6 with AES, bzip2,
+//! [`NumpyArray`] is the array. The feature `npz` of `npyz` would read the ZIP, too, by `zip` 0.6 with AES, bzip2,
 //! a second zstd and `time`: thirty crates and one more C library for what stands here, and no limit
 //! on what an entry unpacks to.
 
 use std::io::Read;
 use std::path::Path;
 
-use semfm::geom::io::{foreign_kind, read_file};
+use semfm_geom::io::{FormatError, foreign_kind, read_file};
 
+use crate::numpy_array::NumpyArray;
 use crate::{Error, Result};
 
 /// No array of a shape is larger than this when unpacked.
 const LARGEST: u64 = 1 << 30;
 
 /// A ZIP file in memory, its directory read.
-pub(super) struct Archive<'a> {
+#[derive(Debug)]
+pub struct NumpyArchive<'a> {
     path: &'a Path,
     bytes: Vec<u8>,
     entries: Vec<Entry>,
 }
 
-/// An array of numbers.
-pub(super) struct Array {
-    /// Row-major.
-    pub values: Vec<f64>,
-    pub shape: Vec<u64>,
-}
-
+#[derive(Debug)]
 struct Entry {
     name: String,
     method: u16,
@@ -38,9 +34,12 @@ struct Entry {
     at: usize,
 }
 
-impl<'a> Archive<'a> {
+impl<'a> NumpyArchive<'a> {
     /// Reads the archive and its central directory (PKWARE's APPNOTE 4.3.12 and 4.3.16; no ZIP64, no
     /// encryption).
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::Io`]; [`Error::Format`] for what is no archive.
     pub fn read(path: &'a Path) -> Result<Self> {
         let bytes = read_file(path)?;
         // The end record is 22 bytes and a comment of at most 65535.
@@ -62,40 +61,25 @@ impl<'a> Archive<'a> {
         Ok(Self { path, bytes, entries })
     }
 
-    /// The array `name`, any number type turned into `f64`; none where the archive does not hold it.
-    pub fn array(&self, name: &str) -> Result<Option<Array>> {
+    /// Names of the arrays, in the order of the file.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().filter_map(|entry| entry.name.strip_suffix(".npy"))
+    }
+
+    /// The array `name`; none where the archive does not hold it.
+    ///
+    /// # Errors
+    /// [`Error::Format`] with the entry at fault.
+    pub fn array(&self, name: &str) -> Result<Option<NumpyArray>> {
         let file = format!("{name}.npy");
         let Some(entry) = self.entries.iter().find(|entry| entry.name == file) else {
             return Ok(None);
         };
-        let bytes = self.unpack(entry)?;
-        let unread = |error: std::io::Error| self.fault(name, "a NumPy array", error.to_string());
-        let header = npyz::NpyFile::new(&bytes[..]).map_err(unread)?;
-        let shape = header.shape().to_vec();
-        if header.order() == npyz::Order::Fortran && shape.len() > 1 {
-            return Err(self.fault(name, "row-major order", "column-major order".into()));
-        }
-        let kind = header.dtype().descr();
-        let count = shape.iter().try_fold(1u64, |n, &d| n.checked_mul(d));
-        if count.is_none_or(|n| n > bytes.len() as u64) {
-            let expected = "as many values as the file has bytes for";
-            return Err(self.fault(name, expected, format!("shape {shape:?}")));
-        }
-        macro_rules! read_as {
-            ($($kind:ty),*) => {
-                $(if let Ok(reader) = npyz::NpyFile::new(&bytes[..]).map_err(unread)?.data::<$kind>() {
-                    let values = reader.map(|value| value.map(|x| x as f64));
-                    let values = values.collect::<std::io::Result<Vec<f64>>>().map_err(unread)?;
-                    return Ok(Some(Array { values, shape }));
-                })*
-            };
-        }
-        read_as!(f64, f32, i64, i32, u64, u32, i16, u16, i8, u8);
-        Err(self.fault(name, "numbers", kind))
+        NumpyArray::parse(self.path, name, &self.unpack(entry)?).map(Some)
     }
 
     fn fault(&self, place: &str, expected: &str, found: String) -> Error {
-        Error::format(self.path, place, expected, found)
+        FormatError::new(self.path, place, expected, found).into()
     }
 
     fn unpack(&self, entry: &Entry) -> Result<Vec<u8>> {
@@ -130,7 +114,7 @@ impl<'a> Archive<'a> {
 
 /// The directory at the archive's end is none.
 fn broken(path: &Path, found: &str) -> Error {
-    Error::format(path, "directory", "a ZIP archive", found)
+    FormatError::new(path, "directory", "a ZIP archive", found).into()
 }
 
 /// An entry of the central directory, and where the next begins.
@@ -161,13 +145,14 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?))
 }
 
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
+/// Files as NumPy writes them, for tests here and in other crates.
+#[cfg(any(test, feature = "test-files"))]
+#[allow(clippy::unwrap_used, reason = "test files")]
+pub mod testing {
     use std::io::Write;
 
-    /// An `.npy` file of 32-bit numbers.
-    pub(crate) fn npy<T: npyz::AutoSerialize + Copy>(shape: &[u64], values: &[T]) -> Vec<u8> {
+    /// An `.npy` file.
+    pub fn npy<T: npyz::AutoSerialize + Copy>(shape: &[u64], values: &[T]) -> Vec<u8> {
         use npyz::WriterBuilder;
         let mut bytes = Vec::new();
         let mut writer = npyz::WriteOptions::new()
@@ -182,7 +167,7 @@ pub(crate) mod tests {
     }
 
     /// A ZIP archive as NumPy's `savez_compressed` writes it.
-    pub(crate) fn zip(files: &[(&str, Vec<u8>)], deflated: bool) -> Vec<u8> {
+    pub fn zip(files: &[(&str, Vec<u8>)], deflated: bool) -> Vec<u8> {
         let (mut out, mut directory) = (Vec::new(), Vec::new());
         for (name, bytes) in files {
             let mut crc = flate2::Crc::new();
@@ -225,6 +210,12 @@ pub(crate) mod tests {
         out.extend([0, 0]);
         out
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{npy, zip};
+    use super::*;
 
     #[test]
     fn arrays_come_back_and_damage_is_seen() {
@@ -239,21 +230,22 @@ pub(crate) mod tests {
         for deflated in [false, true] {
             let whole = zip(&files(), deflated);
             std::fs::write(&path, &whole).unwrap();
-            let archive = Archive::read(&path).unwrap();
+            let archive = NumpyArchive::read(&path).unwrap();
             let array = archive.array("V").unwrap().unwrap();
-            assert_eq!((array.shape, array.values[5]), (vec![2, 3], 5.0));
-            assert_eq!(archive.array("gt").unwrap().unwrap().values, [7.0, 1.0]);
+            assert_eq!(array.shape, [2, 3]);
+            assert_eq!(array.into_f64()[5], 5.0);
+            assert_eq!(archive.array("gt").unwrap().unwrap().into_f64(), [7.0, 1.0]);
             assert!(archive.array("gt_sym").unwrap().is_none());
             for at in 0..whole.len() {
                 let mut broken = whole.clone();
                 broken[at] ^= 0x10;
                 std::fs::write(&path, &broken).unwrap();
                 // Whatever the flip hits, the answer is an array, nothing or an error.
-                if let Ok(archive) = Archive::read(&path) {
+                if let Ok(archive) = NumpyArchive::read(&path) {
                     let _ = archive.array("V");
                 }
                 std::fs::write(&path, &whole[..at]).unwrap();
-                if let Ok(archive) = Archive::read(&path) {
+                if let Ok(archive) = NumpyArchive::read(&path) {
                     assert!(archive.array("V").is_err(), "cut at {at}");
                 }
             }

@@ -17,13 +17,17 @@ const MOST_PIXEL_BYTES: u64 = 1 << 30;
 /// # Errors
 /// [`semfm_geom::Error::Io`]; [`Error::Format`](crate::Error::Format) where it is none, or where it unpacks to more
 /// than a gigabyte.
-pub(super) fn read_picture(path: &Path) -> Result<DynamicImage> {
-    let bytes = read_file(path)?;
-    decode(&bytes).map_err(|error| {
+pub(crate) fn read_picture(path: &Path) -> Result<DynamicImage> {
+    let decoded = picture_of(&read_file(path)?);
+    decoded.map_err(|found| FormatError::new(path, "picture", "a PNG or JPEG", found).into())
+}
+
+/// A picture out of the bytes of a PNG or JPEG; what they are instead, in words, where they are none.
+pub(crate) fn picture_of(bytes: &[u8]) -> std::result::Result<DynamicImage, String> {
+    decode(bytes).map_err(|error| {
         let is_ours = matches!(error, ImageError::Decoding(_) | ImageError::Limits(_));
-        let kind = foreign_kind(&bytes).filter(|_| !is_ours);
-        let found = kind.map_or_else(|| error.to_string(), Into::into);
-        FormatError::new(path, "picture", "a PNG or JPEG", found).into()
+        let kind = foreign_kind(bytes).filter(|_| !is_ours);
+        kind.map_or_else(|| error.to_string(), Into::into)
     })
 }
 

@@ -1,0 +1,39 @@
+//! What cameras and hands leave behind, brought into one form.
+//!
+//! * **Observations**: colour, depth, masks, camera and pose of one moment ([`Observation`]), from single files
+//!   ([`ObservationFiles`]) from folders of the BOP benchmark ([`BopScene`], [`write_bop`])
+//!   and, with the feature `mcap`, from bags of ROS 2 (`read_bag`, `write_bag`).
+//!   [`check_registration`] tells which camera a depth image belongs to.
+//! * **Files of other programs**: depth images, masks, calibrations and NumPy's arrays, each with one reader.
+
+#[cfg(feature = "mcap")]
+mod bag;
+mod bop;
+mod coco_rle;
+mod depth_image;
+mod distortion;
+mod error;
+mod intrinsics;
+mod mask;
+mod npz;
+mod numpy_array;
+mod observation;
+mod observation_files;
+mod picture;
+mod registration;
+
+#[cfg(feature = "mcap")]
+pub use bag::{BagReport, BagSettings, read_bag, write_bag};
+pub use bop::{BopModel, BopScene, read_bop_models, write_bop};
+pub use depth_image::read_depth_image;
+pub use distortion::Distortion;
+pub use error::{Error, Result};
+pub use intrinsics::{Calibration, read_calibration, read_intrinsics};
+pub use mask::{MaskedPicture, read_labelled_mask, read_mask};
+pub use npz::NumpyArchive;
+#[cfg(any(test, feature = "test-files"))]
+pub use npz::testing;
+pub use numpy_array::{Numbers, NumpyArray};
+pub use observation::{Mask, Observation, SeenObject};
+pub use observation_files::{MaskFile, ObservationFiles};
+pub use registration::{DepthGrid, RegistrationCheck, check_registration};
