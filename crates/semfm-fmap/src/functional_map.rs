@@ -4,6 +4,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use semfm_geom::Eigenbasis;
 
+use crate::zoomout::{MapSide, point_map};
 use crate::{Error, PointMap, Result, nearest_rows};
 
 /// C (k_target × k_source): takes coefficients of a source function to those of the same function
@@ -32,22 +33,21 @@ impl FunctionalMap {
     ) -> Result<Self> {
         Error::length("point map (target vertices)", target.n_vertices(), map.n_target())?;
         check_size("the functional map", k, source, target)?;
-        let mut pulled = map.pull_back_basis(source, k); // (n_target × k)
+        Ok(Self::projected(map.pull_back_basis(source, k), target))
+    }
+
+    /// Φ_targetᵀ M_target F of functions F (n_target × k) on the target, of size k × k.
+    pub(crate) fn projected(mut functions: Mat<f64>, target: &Eigenbasis) -> Self {
+        let k = functions.ncols();
         for c in 0..k {
-            for (x, m) in pulled.col_mut(c).iter_mut().zip(&target.mass) {
+            for (x, m) in functions.col_mut(c).iter_mut().zip(&target.mass) {
                 *x *= m;
             }
         }
         let mut matrix = Mat::zeros(k, k);
-        matmul(
-            matrix.as_mut(),
-            Accum::Replace,
-            target.first(k).transpose(),
-            pulled.as_ref(),
-            1.0,
-            Par::Seq,
-        );
-        Ok(Self { matrix })
+        let basis = target.first(k).transpose();
+        matmul(matrix.as_mut(), Accum::Replace, basis, functions.as_ref(), 1.0, Par::Seq);
+        Self { matrix }
     }
 
     /// The matrix C (k_target × k_source).
@@ -75,16 +75,24 @@ impl FunctionalMap {
 
     /// source_of\[j\] = argminᵢ ‖Φ_target\[j\] − (Φ_source Cᵀ)\[i\]‖: the delta functions of the
     /// source are sent through C and each target vertex takes the nearest.
-    pub fn point_map(&self, source: &Eigenbasis, target: &Eigenbasis) -> PointMap {
-        let mapped = self.mapped_deltas(source.first(self.k_source()));
-        PointMap { source_of: nearest_rows(target.first(self.k_target()), mapped.as_ref()) }
+    ///
+    /// # Errors
+    /// [`Error::BasisTooSmall`] for a map larger than a basis, [`Error::OutOfRange`] for numbers that are not finite.
+    pub fn point_map(&self, source: &Eigenbasis, target: &Eigenbasis) -> Result<PointMap> {
+        point_map(self, &MapSide::spectral(source), &MapSide::spectral(target), 0.0)
     }
 
     /// The adjoint reading, argminᵢ ‖(Φ_target C)\[j\] − Φ_source\[i\]‖: the target's delta functions
     /// come back through Cᵀ. The same for an orthogonal C.
-    pub fn adjoint_point_map(&self, source: &Eigenbasis, target: &Eigenbasis) -> PointMap {
+    ///
+    /// # Errors
+    /// As [`Self::point_map`].
+    pub fn adjoint_point_map(&self, source: &Eigenbasis, target: &Eigenbasis) -> Result<PointMap> {
+        let k = self.k_source().max(self.k_target());
+        check_size("the point map", k, source, target)?;
         let returned = target.first(self.k_target()) * self.matrix(); // (n_target × k_source)
-        PointMap { source_of: nearest_rows(returned.as_ref(), source.first(self.k_source())) }
+        let source_of = nearest_rows(returned.as_ref(), source.first(self.k_source()))?;
+        Ok(PointMap { source_of })
     }
 
     /// ‖C Cᵀ − I‖ / √k_target (Frobenius): 0 where the map keeps areas.
@@ -149,8 +157,8 @@ mod tests {
         assert!(
             map.orthogonality() < 1e-9 && map.commutativity(shape.basis(), shape.basis()) < 1e-9
         );
-        assert_eq!(map.point_map(shape.basis(), shape.basis()), identity);
-        assert_eq!(map.adjoint_point_map(shape.basis(), shape.basis()), identity);
+        assert_eq!(map.point_map(shape.basis(), shape.basis()).unwrap(), identity);
+        assert_eq!(map.adjoint_point_map(shape.basis(), shape.basis()).unwrap(), identity);
     }
 
     #[test]

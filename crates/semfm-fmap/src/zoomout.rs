@@ -4,19 +4,14 @@
 //! additions, each optional: the search may run on samples only (their section 5), on the basis
 //! *and* on features, and in both directions at once (Ren et al., "MapTree", 2020).
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::Solve;
-use faer::{Accum, Mat, MatRef, Par, Side};
+use faer::MatRef;
 use semfm_geom::{Eigenbasis, Task};
 
 use crate::functional_map::check_size;
-use crate::nearest_rows::Rows;
+use crate::match_search::{Direction, MatchSearch};
 use crate::point_map::rows_of;
+use crate::sampled_projection::{Equations, SampledProjection, least_squares};
 use crate::{Error, FunctionalMap, PointMap, Result};
-
-/// Tikhonov weight per sample in the projection onto sampled eigenfunctions. Far smaller, and 600
-/// samples no longer hold 50 functions apart on thin blades; larger shrinks the map.
-const RIDGE: f64 = 1e-4;
 
 /// One shape as ZoomOut sees it.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +21,9 @@ pub struct MapSide<'a> {
     /// Features of its vertices (n × d), in the same space on both sides; `None` for a purely
     /// spectral search.
     pub features: Option<MatRef<'a, f64>>,
-    /// The vertices that are matched while the map grows; empty for all of them.
+    /// The vertices that stand for the shape while the map grows; empty for all of them. [`zoomout`]
+    /// matches the target's with the source's, [`zoomout_bidirectional`] those of either side with all
+    /// vertices of the other.
     pub samples: &'a [u32],
 }
 
@@ -71,8 +68,9 @@ impl Default for ZoomOutSettings {
 /// solution of Φ_target\[samples\] C = Φ_source\[matches\].
 ///
 /// # Errors
-/// [`Error::BasisTooSmall`], [`Error::OutOfRange`] for a step of 0 or a map that is not square,
-/// [`Error::LinearAlgebra`] where the projection is singular, [`Error::Geom`] on cancellation.
+/// [`Error::BasisTooSmall`]; [`Error::OutOfRange`] for a step of 0, a map that is not square, a sample that is no
+/// vertex, and numbers that are not finite; [`Error::Length`] for features of another number of vertices;
+/// [`Error::LinearAlgebra`] where the projection is singular; [`Error::Geom`] on cancellation.
 pub fn zoomout(
     map: FunctionalMap,
     source: &MapSide<'_>,
@@ -87,22 +85,34 @@ pub fn zoomout(
         let expected = format!("a square map of at most {}", settings.k_final);
         return Error::out_of_range("the map to refine", expected, found);
     }
+    let (k_final, weight) = (settings.k_final, settings.feature_weight);
     let mut k = map.k_source();
-    while k < settings.k_final {
-        task.step("zoomout", k, settings.k_final)?;
-        let matches = search(&map, source, target, settings.feature_weight, target.samples);
-        k = (k + settings.step).min(settings.k_final);
-        map = if target.samples.is_empty() {
-            FunctionalMap::from_point_map(
-                &PointMap { source_of: matches },
-                source.basis,
-                target.basis,
-                k,
-            )?
-        } else {
-            let on_target = rows_of(target.basis.first(k), target.samples);
-            let on_source = rows_of(source.basis.first(k), &matches);
-            least_squares(&[Equations { left: on_target, right: on_source }])?
+    if k == k_final {
+        return Ok(map);
+    }
+    let sampled = match target.samples {
+        [] => None,
+        samples => {
+            let rows = rows_of(target.basis.first(k_final), samples);
+            Some((SampledProjection::new(&[rows.as_ref()])?, rows))
+        }
+    };
+    let (on_source, on_target) = ((source, source.samples), (target, target.samples));
+    let mut search =
+        MatchSearch::new(on_source, on_target, k_final, weight, Direction::TargetToSource);
+    while k < k_final {
+        task.step("zoomout", k, k_final)?;
+        let source_of = search.matches(&map)?;
+        k = (k + settings.step).min(k_final);
+        map = match &sampled {
+            None => {
+                let points = PointMap { source_of };
+                FunctionalMap::from_point_map(&points, source.basis, target.basis, k)?
+            }
+            Some((projection, rows)) => {
+                let right = rows_of(source.basis.first(k), &source_of);
+                projection.solve(&[rows.subcols(0, k)], &[right.as_ref()])
+            }
         };
     }
     Ok(map)
@@ -127,116 +137,86 @@ pub fn zoomout_bidirectional(
     let Matches { mut source_of, mut target_of } = matches;
     Error::length("matches of the target's samples", target.samples.len(), source_of.len())?;
     Error::length("matches of the source's samples", source.samples.len(), target_of.len())?;
-    let mut k = settings.k_start.min(settings.k_final);
+    check_vertices("matches of the target's samples", &source_of, source.basis)?;
+    check_vertices("matches of the source's samples", &target_of, target.basis)?;
+    let (k_final, weight) = (settings.k_final, settings.feature_weight);
+    let mut forth = MatchSearch::new(
+        (source, &[]),
+        (target, target.samples),
+        k_final,
+        weight,
+        Direction::TargetToSource,
+    );
+    let mut back = MatchSearch::new(
+        (source, source.samples),
+        (target, &[]),
+        k_final,
+        weight,
+        Direction::SourceToTarget,
+    );
+    let mut k = settings.k_start.min(k_final);
     loop {
-        task.step("zoomout", k, settings.k_final)?;
+        task.step("zoomout", k, k_final)?;
         let (on_source, on_target) = (source.basis.first(k), target.basis.first(k));
-        let forth = Equations {
-            left: rows_of(on_target, target.samples),
-            right: rows_of(on_source, &source_of),
-        };
-        let back = Equations {
-            left: rows_of(on_target, &target_of),
-            right: rows_of(on_source, source.samples),
-        };
-        let map = least_squares(&[forth, back])?;
-        if k >= settings.k_final {
+        let map = least_squares(&[
+            Equations {
+                left: rows_of(on_target, target.samples).as_ref(),
+                right: rows_of(on_source, &source_of).as_ref(),
+            },
+            Equations {
+                left: rows_of(on_target, &target_of).as_ref(),
+                right: rows_of(on_source, source.samples).as_ref(),
+            },
+        ])?;
+        if k >= k_final {
             return Ok(map);
         }
-        source_of = search(&map, source, target, settings.feature_weight, target.samples);
-        target_of = search_back(&map, source, target, settings.feature_weight, source.samples);
-        k = (k + settings.step).min(settings.k_final);
+        let (of_target, of_source) = rayon::join(|| forth.matches(&map), || back.matches(&map));
+        (source_of, target_of) = (of_target?, of_source?);
+        k = (k + settings.step).min(k_final);
     }
 }
 
 /// The point map target → source of a functional map, in the space of basis and features.
+///
+/// # Errors
+/// [`Error::BasisTooSmall`] for a map larger than a basis, [`Error::Length`] for features of another number of
+/// vertices, [`Error::OutOfRange`] for numbers that are not finite.
 pub fn point_map(
     map: &FunctionalMap,
     source: &MapSide<'_>,
     target: &MapSide<'_>,
     feature_weight: f64,
-) -> PointMap {
-    PointMap { source_of: search(map, source, target, feature_weight, &[]) }
+) -> Result<PointMap> {
+    let source_of = all_matches(map, source, target, feature_weight, Direction::TargetToSource)?;
+    Ok(PointMap { source_of })
 }
 
 /// The opposite reading of the same functional map: a target vertex for each source vertex.
+///
+/// # Errors
+/// As [`point_map`].
 pub fn reverse_point_map(
     map: &FunctionalMap,
     source: &MapSide<'_>,
     target: &MapSide<'_>,
     feature_weight: f64,
-) -> Vec<u32> {
-    search_back(map, source, target, feature_weight, &[])
+) -> Result<Vec<u32>> {
+    all_matches(map, source, target, feature_weight, Direction::SourceToTarget)
 }
 
-/// For each of the target's `rows` (all, where empty) the nearest source vertex.
-fn search(
+/// Matches of all vertices.
+fn all_matches(
     map: &FunctionalMap,
     source: &MapSide<'_>,
     target: &MapSide<'_>,
-    weight: f64,
-    rows: &[u32],
-) -> Vec<u32> {
-    let mapped = map.mapped_deltas(source.basis.first(map.k_source()));
-    let scale = weight * (map.k_target() as f64).sqrt();
-    let points = with_features(mapped.as_ref(), source.features, scale, &[]);
-    let queries = with_features(target.basis.first(map.k_target()), target.features, scale, rows);
-    queries.nearest_of(&points)
-}
-
-/// For each of the source's `rows` (all, where empty) the nearest target vertex.
-fn search_back(
-    map: &FunctionalMap,
-    source: &MapSide<'_>,
-    target: &MapSide<'_>,
-    weight: f64,
-    rows: &[u32],
-) -> Vec<u32> {
-    let mapped = map.mapped_deltas(source.basis.first(map.k_source()));
-    let scale = weight * (map.k_target() as f64).sqrt();
-    let points = with_features(target.basis.first(map.k_target()), target.features, scale, &[]);
-    let queries = with_features(mapped.as_ref(), source.features, scale, rows);
-    queries.nearest_of(&points)
-}
-
-/// \[spectral, scale · features\] on the chosen rows, or on all of them where none is chosen.
-fn with_features<'a>(
-    spectral: MatRef<'a, f64>,
-    features: Option<MatRef<'a, f64>>,
-    scale: f64,
-    rows: &'a [u32],
-) -> Rows<'a> {
-    let both = match features.filter(|_| scale > 0.0) {
-        Some(features) => Rows::of(spectral).beside(features, scale),
-        None => Rows::of(spectral),
-    };
-    if rows.is_empty() { both } else { both.chosen(rows) }
-}
-
-/// Equations A C = B, one for each row.
-struct Equations {
-    /// A (rows × k_target).
-    left: Mat<f64>,
-    /// B (rows × k_source).
-    right: Mat<f64>,
-}
-
-/// C of least Σ ‖Aᵢ C − Bᵢ‖² + ρ ‖C‖² over some blocks of equations, ρ = [`RIDGE`] · rows:
-///
-/// (Σ Aᵢᵀ Aᵢ + ρ I) C = Σ Aᵢᵀ Bᵢ
-fn least_squares(blocks: &[Equations]) -> Result<FunctionalMap> {
-    let (k_target, k_source) = (blocks[0].left.ncols(), blocks[0].right.ncols());
-    let (mut gram, mut right) =
-        (Mat::<f64>::zeros(k_target, k_target), Mat::<f64>::zeros(k_target, k_source));
-    let mut rows = 0;
-    for Equations { left: a, right: b } in blocks {
-        matmul(gram.as_mut(), Accum::Add, a.transpose(), a.as_ref(), 1.0, Par::Seq);
-        matmul(right.as_mut(), Accum::Add, a.transpose(), b.as_ref(), 1.0, Par::Seq);
-        rows += a.nrows();
-    }
-    (0..k_target).for_each(|i| gram[(i, i)] += RIDGE * rows as f64);
-    let factor = gram.llt(Side::Lower).map_err(|_| Error::LinearAlgebra("ZoomOut's projection"))?;
-    Ok(FunctionalMap::new(factor.solve(right)))
+    feature_weight: f64,
+    direction: Direction,
+) -> Result<Vec<u32>> {
+    let k = map.k_source().max(map.k_target());
+    check_size("the point map", k, source.basis, target.basis)?;
+    check_features(source, target)?;
+    MatchSearch::new((source, &[]), (target, &[]), k, feature_weight, direction).matches(map)
 }
 
 fn check(settings: &ZoomOutSettings, source: &MapSide<'_>, target: &MapSide<'_>) -> Result<()> {
@@ -245,12 +225,36 @@ fn check(settings: &ZoomOutSettings, source: &MapSide<'_>, target: &MapSide<'_>)
         let found = format!("start {}, step {}", settings.k_start, settings.step);
         return Error::out_of_range("ZoomOut", "a start and a step of at least 1", found);
     }
-    Ok(())
+    check_vertices("samples of the source", source.samples, source.basis)?;
+    check_vertices("samples of the target", target.samples, target.basis)?;
+    check_features(source, target)
+}
+
+/// Checks that there is a feature for each vertex, in one space.
+fn check_features(source: &MapSide<'_>, target: &MapSide<'_>) -> Result<()> {
+    let (Some(on_source), Some(on_target)) = (source.features, target.features) else {
+        if source.features.is_some() || target.features.is_some() {
+            return Error::out_of_range("features", "those of both sides or of none", "one side's");
+        }
+        return Ok(());
+    };
+    Error::length("features of the source", source.basis.n_vertices(), on_source.nrows())?;
+    Error::length("features of the target", target.basis.n_vertices(), on_target.nrows())?;
+    Error::length("numbers of a target's feature", on_source.ncols(), on_target.ncols())
+}
+
+fn check_vertices(what: &'static str, ids: &[u32], basis: &Eigenbasis) -> Result<()> {
+    let n = basis.n_vertices();
+    match ids.iter().find(|&&id| id as usize >= n) {
+        None => Ok(()),
+        Some(id) => Error::out_of_range(what, format!("vertices below {n}"), id),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::Mat;
     use crate::test_objects::{blob, shape};
 
     /// Share of vertices that the map sends to themselves or to somewhere very near.
@@ -276,7 +280,7 @@ mod tests {
         for samples in [&[][..], &samples] {
             let side = MapSide { basis: shape.basis(), features: None, samples };
             let map = zoomout(spoiled_start(), &side, &side, &settings, &Task::default()).unwrap();
-            let share = right(&point_map(&map, &side, &side, 0.0), &shape);
+            let share = right(&point_map(&map, &side, &side, 0.0).unwrap(), &shape);
             assert!(
                 share > 0.98,
                 "{share} of the vertices are right with {} samples",
@@ -306,8 +310,8 @@ mod tests {
             &Task::default(),
         )
         .unwrap();
-        let forth = point_map(&map, &side, &side, 1.0);
-        let back = PointMap { source_of: reverse_point_map(&map, &side, &side, 1.0) };
+        let forth = point_map(&map, &side, &side, 1.0).unwrap();
+        let back = PointMap { source_of: reverse_point_map(&map, &side, &side, 1.0).unwrap() };
         assert!(right(&forth, &shape) > 0.99, "{}", right(&forth, &shape));
         assert!(right(&back, &shape) > 0.99, "{}", right(&back, &shape));
     }

@@ -94,7 +94,7 @@ fn check_rule(rule: &str, from: &Object, to: &Object, anchors: &Anchors) -> Vec<
     let (from, to) = (MapSide::spectral(&from.basis), MapSide::spectral(&to.basis));
     let map = zoomout(fit.map, &from, &to, &settings.zoomout, &task).unwrap();
     assert_close(map.matrix(), &floats(&format!("{rule}_C_final")), "C after ZoomOut");
-    let map = point_map(&map, &from, &to, 0.0).source_of;
+    let map = point_map(&map, &from, &to, 0.0).unwrap().source_of;
     assert_eq!(map, ids(&format!("{rule}_point_map")), "point map");
     map
 }

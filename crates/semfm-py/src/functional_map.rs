@@ -300,10 +300,10 @@ impl FunctionalMap {
                     let on = |basis, features| MapSide { basis, features, samples: &[] };
                     let source = on(&source, Some(a.as_ref()));
                     let target = on(&target, Some(b.as_ref()));
-                    zoomout::point_map(&map, &source, &target, feature_weight)
+                    zoomout::point_map(&map, &source, &target, feature_weight)?
                 }
-                None if adjoint => map.adjoint_point_map(&source, &target),
-                None => map.point_map(&source, &target),
+                None if adjoint => map.adjoint_point_map(&source, &target)?,
+                None => map.point_map(&source, &target)?,
             })
         })?;
         Ok(PointMap { inner: Shared::new(found), n_source })

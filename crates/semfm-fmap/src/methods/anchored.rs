@@ -13,7 +13,7 @@ use super::votes;
 use crate::Result;
 use crate::settings::{Rule, TransferSettings};
 use crate::stages::Stages;
-use crate::zoomout::{ZoomOutSettings, point_map, reverse_point_map, zoomout};
+use crate::zoomout::{MapSide, ZoomOutSettings, point_map, reverse_point_map, zoomout};
 
 pub(super) const INFO: MethodInfo = MethodInfo {
     name: "anchored",
@@ -56,12 +56,16 @@ fn matched(
             task,
         )
     })?;
+    // Samples of the target find their match among all vertices of the source.
+    let among = MapSide { samples: &[], ..*source };
     let map =
-        stages.time("zoomout", || zoomout(fit.map, source, target, &settings.zoomout, task))?;
-    let (weight, image) = (settings.zoomout.feature_weight, settings.rule == Rule::Image);
-    let (points, target_of) = stages.time("point_map", || {
-        let points = point_map(&map, source, target, weight);
-        (points, image.then(|| reverse_point_map(&map, source, target, weight)))
-    });
+        stages.time("zoomout", || zoomout(fit.map, &among, target, &settings.zoomout, task))?;
+    let weight = settings.zoomout.feature_weight;
+    let points = stages.time("point_map", || point_map(&map, source, target, weight))?;
+    let reversed = || reverse_point_map(&map, source, target, weight);
+    let target_of = match settings.rule {
+        Rule::Image => Some(stages.time("point_map", reversed)?),
+        Rule::Preimage => None,
+    };
     Ok(Matched { target_of, map: Some(map), fit: Some(fit.report), ..Matched::points(points) })
 }

@@ -62,12 +62,13 @@ pub(super) fn matched(
     let (source, target) = (&sides.source, &sides.target);
     let map =
         stages.time("zoomout", || zoomout_bidirectional(matches, source, target, zoomout, task))?; // IV-E
-    let image = settings.rule == Rule::Image;
     let weight = zoomout.feature_weight;
-    let (points, target_of) = stages.time("point_map", || {
-        let points = point_map(&map, source, target, weight); // IV-E
-        (points, image.then(|| reverse_point_map(&map, source, target, weight)))
-    });
+    let points = stages.time("point_map", || point_map(&map, source, target, weight))?; // IV-E
+    let reversed = || reverse_point_map(&map, source, target, weight);
+    let target_of = match settings.rule {
+        Rule::Image => Some(stages.time("point_map", reversed)?),
+        Rule::Preimage => None,
+    };
     Ok(Matched { target_of, map: Some(map), ..Matched::points(points) })
 }
 

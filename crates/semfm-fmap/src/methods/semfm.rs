@@ -112,6 +112,6 @@ pub(super) fn refine(
     task: &Task,
 ) -> Result<Refined> {
     let map = zoomout(map, source, target, settings, task)?;
-    let points = point_map(&map, source, target, settings.feature_weight);
+    let points = point_map(&map, source, target, settings.feature_weight)?;
     Ok(Refined { map, points })
 }
