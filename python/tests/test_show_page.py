@@ -336,8 +336,9 @@ def test_hands_step_through_every_grasp(browser, demo):  # noqa: F811
     assert calm(console) == [] and told["gl"] == 0
     n = len(grasps)
     assert told["n"] == n > 2
-    assert told["titles"] == [f"grasp {i + 1} of {n}" for i in range(n)]
-    assert told["around"] == f"grasp 1 of {n}" and told["last"] == f"grasp {n} of {n}"
+    titles = [f"grasp {i}, of 0 to {n - 1}" for i in range(n)]
+    assert told["titles"] == titles
+    assert told["around"] == titles[0] and told["last"] == titles[-1]
     assert told["terms"][0] == sorted(grasps[0]["terms"])
     np.testing.assert_allclose(told["scores"], [g["score"] for g in grasps], atol=6e-4)
     assert len(set(told["pictures"])) > 0.8 * n, "steps show the same picture"

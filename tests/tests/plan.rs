@@ -21,6 +21,10 @@ struct Bench(TempDir);
 
 impl Bench {
     fn new() -> Self {
+        Self::with_gripper("franka")
+    }
+
+    fn with_gripper(gripper: &str) -> Self {
         let bench = Self(tempfile::tempdir().unwrap());
         let object = make_object(Category::Containers, 0, &ObjectSettings::default()).unwrap();
         write_mesh(bench.at("mug.obj"), &object.mesh).unwrap();
@@ -34,7 +38,7 @@ impl Bench {
             "--region",
             "@grip.json",
             "--gripper",
-            "franka",
+            gripper,
             "--samples",
             "300",
             "--scale",
@@ -126,6 +130,35 @@ fn what_cannot_be_reached_is_no_answer_and_says_which_gate() {
     let plan = json(&bench.at("plan/plan.json"));
     assert_eq!(plan["gates"][0]["gate"], "reach");
     assert!(!bench.at("plan/trajectory.json").exists());
+}
+
+#[test]
+fn a_tip_that_the_hand_cannot_sit_on_is_refused_or_told() {
+    let bench = Bench::with_gripper("@arm.urdf");
+    for (tip, says) in [
+        // Joints beyond it would count as the hand's.
+        ("link4", ["joint5", "link7"].as_slice()),
+        // The fingers of the description are elsewhere, and another link fits.
+        ("link7", &["60 mm", "`flange`"]),
+    ] {
+        let answer = bench.plan(PLACE, &["--tip", tip, "--start", START]);
+        assert_eq!(answer.code, Some(2), "{tip}: {}{}", answer.out, answer.err);
+        assert!(says.iter().all(|word| answer.err.contains(word)), "{tip}: {}", answer.err);
+        assert!(!bench.at("plan").exists());
+    }
+    // What was assumed stands in the files, too.
+    let answer = bench.plan(PLACE, &["--tip", "flange", "--start", START]);
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    for name in ["plan.json", "trajectory.json"] {
+        let notes = json(&bench.at("plan").join(name))["notes"].to_string();
+        assert!(notes.contains("acceleration") && notes.contains("left_finger"), "{name}: {notes}");
+        assert!(!notes.contains("mounted"), "{name}: {notes}");
+    }
+    // A gripper that is not the description's own closes elsewhere than its fingers do.
+    let bench = Bench::new();
+    let answer = bench.plan(PLACE, &["--tip", "flange", "--start", START]);
+    assert_eq!(answer.code, Some(0), "{}", answer.err);
+    assert!(answer.err.contains("a hand of its own"), "{}", answer.err);
 }
 
 #[test]

@@ -165,6 +165,16 @@ pub enum Obstruction {
 }
 
 impl Obstruction {
+    /// Names of the two things that touch, where that is the reason.
+    pub fn pair(&self) -> Option<(&str, &str)> {
+        match self {
+            Self::Contact { a, b, .. }
+            | Self::ContactOnLine { a, b, .. }
+            | Self::ContactAtTime { a, b, .. } => Some((a, b)),
+            _ => None,
+        }
+    }
+
     /// Two things that touch.
     pub(crate) fn contact(contact: Contact) -> Self {
         let Contact { a, b, depth } = contact;

@@ -140,6 +140,22 @@ impl Hand {
         let is_symmetric = corners.iter().all(|&corner| is_met(half_turn * corner));
         Self { parts, is_symmetric }
     }
+
+    /// What messages call each part: unique, and unlike the links of a robot.
+    pub fn part_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for part in &self.parts {
+            let side = match part.role {
+                Role::Palm => "palm",
+                Role::Left => "left finger",
+                Role::Right => "right finger",
+            };
+            let plain = format!("gripper's {} ({side})", part.name);
+            let n_alike = names.iter().filter(|other| other.starts_with(&plain)).count();
+            names.push(if n_alike == 0 { plain } else { format!("{plain} {}", n_alike + 1) });
+        }
+        names
+    }
 }
 
 /// Corners of a convex piece; of round shapes the corners of the box around them.

@@ -10,8 +10,8 @@ use semfm_robot::Role;
 
 use crate::motion_request::TargetObject;
 use crate::{
-    AttachedBody, CollisionBody, CollisionChecker, CollisionModel, Hand, MotionRequest, Result,
-    Scene, TargetGrasp,
+    AttachedBody, CollisionBody, CollisionChecker, CollisionModel, Hand, HandPart, MotionRequest,
+    Result, Scene, TargetGrasp,
 };
 
 /// The object's name in messages.
@@ -49,20 +49,12 @@ struct HandBody {
 
 impl HandBodies {
     pub fn new(hand: &Hand) -> Result<Self> {
-        let mut parts: Vec<HandBody> = Vec::new();
-        for part in &hand.parts {
-            let side = match part.role {
-                Role::Palm => "palm",
-                Role::Left => "left finger",
-                Role::Right => "right finger",
-            };
-            let plain = format!("gripper's {} ({side})", part.name);
-            let n_alike = parts.iter().filter(|other| other.name.starts_with(&plain)).count();
-            let name = if n_alike == 0 { plain } else { format!("{plain} {}", n_alike + 1) };
+        let body = |(part, name): (&HandPart, String)| -> Result<HandBody> {
             let body = CollisionBody::from_pieces(&part.pieces)?;
-            parts.push(HandBody { name, is_finger: part.role != Role::Palm, body });
-        }
-        Ok(Self { parts })
+            Ok(HandBody { name, is_finger: part.role != Role::Palm, body })
+        };
+        let parts = hand.parts.iter().zip(hand.part_names()).map(body);
+        Ok(Self { parts: parts.collect::<Result<_>>()? })
     }
 
     /// A checker with the parts where they are.

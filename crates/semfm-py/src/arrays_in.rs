@@ -6,7 +6,9 @@
 use faer::{Mat, MatRef};
 use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use semfm::files::rigid_pose;
 use semfm::geom::math::DVec3;
+use semfm::robot::Pose;
 
 use crate::errors;
 
@@ -161,6 +163,14 @@ pub fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<DVec3>> {
 pub fn point(value: &Bound<'_, PyAny>, name: &str) -> PyResult<DVec3> {
     let (values, _) = floats(value, name, &[Is(3)])?;
     Ok(DVec3::new(values[0], values[1], values[2]))
+}
+
+/// A rotation and a translation from a homogeneous matrix (4 × 4), rows first.
+pub fn rigid(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Pose> {
+    let (numbers, _) = floats(value, name, &[Is(4), Is(4)])?;
+    let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
+    let expected = "a rotation and a translation, rows first";
+    rigid_pose(rows).map_err(|found| errors::invalid(value.py(), name, expected, &found))
 }
 
 /// Ids from 0 to 2³² − 1, row-major, and the shape.

@@ -23,6 +23,8 @@ pub struct PickledGrasp {
     contacts: [[f64; 3]; 2],
     normals: [[f64; 3]; 2],
     epsilon: f64,
+    #[serde(default)]
+    closing_turn: f64,
     score: f64,
     terms: Vec<(String, f64)>,
 }
@@ -73,6 +75,7 @@ impl PickledGrasp {
             contacts: grasp.contacts.map(|p| p.to_array()),
             normals: grasp.normals.map(|n| n.to_array()),
             epsilon: grasp.epsilon,
+            closing_turn: grasp.closing_turn,
             score: grasp.score,
             terms: grasp.terms.iter().map(|&(name, x)| (name.to_owned(), x)).collect(),
         }
@@ -87,6 +90,7 @@ impl PickledGrasp {
             contacts: self.contacts.map(DVec3::from_array),
             normals: self.normals.map(DVec3::from_array),
             epsilon: self.epsilon,
+            closing_turn: self.closing_turn,
             score: self.score,
             terms: self
                 .terms

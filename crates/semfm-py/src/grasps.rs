@@ -12,7 +12,7 @@ use semfm::grasp::{self, ApproachCone, GraspSettings, Pose};
 use semfm::{GraspRequest, GraspResult, Obstacle, Table};
 use semfm_show::write_grasp_picture;
 
-use crate::arrays_in::{self, Axis};
+use crate::arrays_in::{self, rigid};
 use crate::grasp_pickle::{PickledGrasp, PickledGrasps};
 use crate::gripper::{Gripper, matrix};
 use crate::interruptible::run;
@@ -89,6 +89,12 @@ impl Grasp {
         self.grasp.epsilon
     }
 
+    /// float: angle by which the object turns while the pads close, radians.
+    #[getter]
+    fn closing_turn(&self) -> f64 {
+        self.grasp.closing_turn
+    }
+
     /// float: weighted mean of the terms, 0 to 1.
     #[getter]
     fn score(&self) -> f64 {
@@ -143,9 +149,22 @@ pub struct Grasps {
     gripper: Py<Gripper>,
     scale: f64,
     camera_from_object: Option<Pose>,
+    /// In the frame of the object in metres.
+    table: Option<Table>,
 }
 
 impl Grasps {
+    /// The content of `grasps.json`.
+    pub fn file(&self, py: Python<'_>) -> PyResult<GraspsFile> {
+        let table = self.table;
+        self.with_answer(py, move |answer| Ok(GraspsFile::new(answer).with_table(table)))
+    }
+
+    /// The object's mesh, in its own units.
+    pub fn object(&self) -> &Shared<semfm::Mesh> {
+        &self.mesh
+    }
+
     /// Runs `write` with all that a file of grasps tells, away from the interpreter.
     fn with_answer<T: Send + 'static>(
         &self,
@@ -261,8 +280,7 @@ impl Grasps {
     /// -------
     /// dict
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let value = self.with_answer(py, |answer| Ok(GraspsFile::new(answer).to_json()))?;
-        json::to_python(py, &value)
+        json::to_python(py, &self.file(py)?.to_json())
     }
 
     /// A picture of the best grasps on the object, which notebooks show by themselves.
@@ -272,7 +290,7 @@ impl Grasps {
     /// bytes
     ///     PNG.
     fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let file = self.with_answer(py, |answer| Ok(GraspsFile::new(answer)))?;
+        let file = self.file(py)?;
         let (mesh, region) = (self.mesh.clone(), self.region.clone());
         pictures::png(py, move |path, task| {
             Ok(write_grasp_picture(path, &mesh, region.weights(), &file, task)?)
@@ -293,7 +311,10 @@ impl Grasps {
     #[pyo3(signature = (path, *, format="json"))]
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<()> {
         match format {
-            "json" => self.with_answer(py, move |a| GraspsFile::new(a).write(&path)),
+            "json" => {
+                let file = self.file(py)?;
+                run(py, None, move |_| file.write(&path))
+            }
             "ros2" => self.with_answer(py, move |answer| write_ros2_grasps(&path, answer)),
             "isaac" => self.with_answer(py, move |answer| write_isaac_grasps(&path, answer)),
             other => Err(errors::invalid(py, "format", "json, ros2 or isaac", other)),
@@ -305,14 +326,15 @@ impl Grasps {
         py: Python<'py>,
     ) -> PyResult<(
         Bound<'py, PyAny>,
-        (String, crate::mesh::Mesh, Region, Py<Gripper>, f64, Option<[f64; 16]>),
+        (String, crate::mesh::Mesh, Region, Py<Gripper>, f64, Option<[f64; 16]>, Option<[f64; 6]>),
     )> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_grasps")?;
         let plain = serde_json::to_string(&PickledGrasps::of(&self.found))
             .map_err(|error| errors::internal(py, &error.to_string()))?;
         let camera = self.camera_from_object.map(columns);
+        let table = self.table.map(|Table { point: p, normal: n }| [p.x, p.y, p.z, n.x, n.y, n.z]);
         let gripper = self.gripper.clone_ref(py);
-        Ok((restore, (plain, self.mesh(), self.region(), gripper, self.scale, camera)))
+        Ok((restore, (plain, self.mesh(), self.region(), gripper, self.scale, camera, table)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -335,6 +357,8 @@ fn stack(py: Python<'_>, poses: impl Iterator<Item = Pose>) -> PyResult<Bound<'_
 
 /// Grasps out of a pickle.
 #[pyfunction]
+#[pyo3(signature = (plain, mesh, region, gripper, scale, camera_from_object, table=None))]
+#[expect(clippy::too_many_arguments, reason = "what a pickle holds")]
 pub fn _restore_grasps(
     py: Python<'_>,
     plain: &str,
@@ -343,6 +367,7 @@ pub fn _restore_grasps(
     gripper: Py<Gripper>,
     scale: f64,
     camera_from_object: Option<[f64; 16]>,
+    table: Option<[f64; 6]>,
 ) -> PyResult<Grasps> {
     let plain: PickledGrasps = serde_json::from_str(plain)
         .map_err(|error| errors::invalid(py, "pickle", "grasps", &error.to_string()))?;
@@ -353,6 +378,10 @@ pub fn _restore_grasps(
         gripper,
         scale,
         camera_from_object: camera_from_object.map(of_columns),
+        table: table.map(|[x, y, z, nx, ny, nz]| Table {
+            point: DVec3::new(x, y, z),
+            normal: DVec3::new(nx, ny, nz),
+        }),
     })
 }
 
@@ -472,7 +501,8 @@ pub fn find_grasps(
         Err(_) => py.get_type::<Gripper>().call1((gripper,))?.cast_into::<Gripper>()?.unbind(),
     };
     let mut request = GraspRequest::new(scale);
-    request.camera_from_object = camera_from_object.map(rigid).transpose()?;
+    let name = "camera_from_object";
+    request.camera_from_object = camera_from_object.map(|pose| rigid(pose, name)).transpose()?;
     let settings = &mut request.settings;
     *settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
     settings.demonstrated_approach = vector(demonstrated_approach, "demonstrated_approach")?;
@@ -498,28 +528,15 @@ pub fn find_grasps(
     let region = region_of(region, &mesh)?;
     let (weights, object) = (region.clone(), mesh.clone());
     let fingers = gripper.get().inner.clone();
-    let found = run(py, progress, move |task| {
+    let (found, table) = run(py, progress, move |task| {
         let problem = request.prepare(Arc::new((*object).clone()), (*fingers).clone())?;
-        problem.find(weights.weights(), task)
+        Ok((problem.find(weights.weights(), task)?, problem.table()))
     })?;
-    Ok(Grasps { found: Arc::new(found), mesh, region, gripper, scale, camera_from_object })
+    let found = Arc::new(found);
+    Ok(Grasps { found, mesh, region, gripper, scale, camera_from_object, table })
 }
 
 /// A vector (3), where there is one.
 fn vector(value: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<Option<DVec3>> {
     value.map(|value| arrays_in::point(value, name)).transpose()
-}
-
-/// A rigid motion from a homogeneous matrix.
-fn rigid(value: &Bound<'_, PyAny>) -> PyResult<Pose> {
-    let name = "camera_from_object";
-    let (numbers, _) = arrays_in::floats(value, name, &[Axis::Is(4), Axis::Is(4)])?;
-    let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
-    let sim3 = semfm::align::Sim3::from_rows(rows)
-        .map_err(|error| errors::raise(value.py(), &error.into()))?;
-    if (sim3.scale - 1.0).abs() > 1e-3 {
-        let found = format!("a scale of {}", sim3.scale);
-        return Err(errors::invalid(value.py(), name, "a rigid motion (scale 1)", &found));
-    }
-    Ok(sim3.rigid())
 }

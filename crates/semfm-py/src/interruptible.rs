@@ -104,9 +104,27 @@ fn nap<T>(news: Receiver<News<T>>) -> (Event<T>, Receiver<News<T>>) {
 
 /// Short work on the calling thread, under the interpreter's lock: only its panics are caught.
 pub fn guard<T>(py: Python<'_>, work: impl FnOnce() -> semfm::Result<T>) -> PyResult<T> {
+    ended(py, caught(work))
+}
+
+/// Work of milliseconds on the calling thread, without the interpreter's lock. To hand it to another thread and back
+/// would take longer; Ctrl-C is heard when it ends.
+pub fn direct<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> semfm::Result<T> + Send,
+) -> PyResult<T> {
+    let end = py.detach(|| caught(work));
+    ended(py, end)
+}
+
+fn caught<T>(work: impl FnOnce() -> semfm::Result<T>) -> std::thread::Result<semfm::Result<T>> {
     IS_OURS.with(|ours| ours.set(true));
     let end = catch_unwind(AssertUnwindSafe(work));
     IS_OURS.with(|ours| ours.set(false));
+    end
+}
+
+fn ended<T>(py: Python<'_>, end: std::thread::Result<semfm::Result<T>>) -> PyResult<T> {
     match end {
         Ok(result) => result.map_err(|error| errors::raise(py, &error)),
         Err(panic) => Err(errors::internal(py, &message_of(&*panic))),

@@ -32,10 +32,12 @@ mod matching;
 mod mesh;
 mod pictures;
 mod pinhole;
+mod plan;
 mod point_map;
 mod prepared;
 mod region;
 mod robot;
+mod scene;
 mod settings;
 mod shape;
 mod shared;
@@ -89,6 +91,8 @@ mod _semfm {
     #[pymodule_export]
     use crate::pinhole::{Pinhole, camera_towards, rig};
     #[pymodule_export]
+    use crate::plan::{GraspPlan, Segment, plan};
+    #[pymodule_export]
     use crate::point_map::PointMap;
     #[pymodule_export]
     use crate::prepared::{_restore_prepared, PreparedObject, prepare};
@@ -96,6 +100,8 @@ mod _semfm {
     use crate::region::Region;
     #[pymodule_export]
     use crate::robot::{_restore_robot, Robot};
+    #[pymodule_export]
+    use crate::scene::Scene;
     #[pymodule_export]
     use crate::settings::{_restore_settings, TransferSettings};
     #[pymodule_export]

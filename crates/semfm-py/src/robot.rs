@@ -1,19 +1,22 @@
 //! `Robot`: an arm out of its files, with kinematics.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use semfm::align::Sim3;
+use semfm::RobotArm;
+use semfm::motion::CollisionSettings;
 use semfm::robot::{
     ArmFiles, IkAnswer, IkSettings, IkSolution, InverseKinematics, OpenedArm, Pose, Preference,
 };
 
-use crate::arrays_in::{self, Axis};
+use crate::arrays_in::{self, Axis, rigid};
 use crate::arrays_out;
 use crate::errors;
 use crate::gripper::matrix;
-use crate::interruptible::run;
+use crate::interruptible::{direct, run};
 
 /// Names of preferences, in the order in which messages tell them.
 const PREFERENCES: [(&str, Preference); 4] = [
@@ -22,6 +25,10 @@ const PREFERENCES: [(&str, Preference); 4] = [
     ("limits", Preference::Limits),
     ("manipulability", Preference::Manipulability),
 ];
+
+/// Searches of inverse kinematics (solutions times restarts) up to which a call stays on the calling thread: a search takes
+/// some tens of microseconds, ten thousand of them less than a second.
+const MOST_DIRECT: usize = 10_000;
 
 /// An arm: the joints of a robot between a base and a tip. Joint values are arrays of n numbers, base to tip,
 /// radians or metres; poses are (4, 4) matrices in the base link's frame, metres.
@@ -49,7 +56,10 @@ const PREFERENCES: [(&str, Preference); 4] = [
 #[pyclass(frozen, module = "semfm")]
 pub struct Robot {
     files: ArmFiles,
+    packages: BTreeMap<String, PathBuf>,
     inner: OpenedArm,
+    /// With the collision model, made when it is first planned with.
+    arm: OnceLock<Arc<RobotArm>>,
 }
 
 #[pymethods]
@@ -70,12 +80,15 @@ impl Robot {
     ///     The link that the arm moves; by default the SRDF's, or the end of the one chain of joints.
     /// fixed : dict, optional
     ///     Positions of joints outside the chain by name, such as fingers.
+    /// packages : dict, optional
+    ///     Folders by the names of packages in ``package://NAME/…``; for `plan`, which needs every collision mesh.
     ///
     /// Returns
     /// -------
     /// Robot
     #[staticmethod]
-    #[pyo3(signature = (urdf, *, srdf=None, limits=None, base=None, tip=None, fixed=None))]
+    #[pyo3(signature = (urdf, *, srdf=None, limits=None, base=None, tip=None, fixed=None, packages=None))]
+    #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn from_urdf(
         py: Python<'_>,
         urdf: PathBuf,
@@ -84,6 +97,7 @@ impl Robot {
         base: Option<String>,
         tip: Option<String>,
         fixed: Option<&Bound<'_, PyDict>>,
+        packages: Option<BTreeMap<String, PathBuf>>,
     ) -> PyResult<Self> {
         let fixed = match fixed {
             Some(fixed) => fixed
@@ -92,7 +106,8 @@ impl Robot {
                 .collect::<PyResult<Vec<(String, f64)>>>()?,
             None => Vec::new(),
         };
-        Self::open(py, ArmFiles { urdf, srdf, limits, base, tip, fixed })
+        let files = ArmFiles { urdf, srdf, limits, base, tip, fixed };
+        Self::open(py, files, packages.unwrap_or_default())
     }
 
     /// str: as in the URDF.
@@ -246,8 +261,8 @@ impl Robot {
     /// ----------
     /// pose : (4, 4) array_like
     ///     Where the tip shall be, in the base's frame.
-    /// near : (n,) array_like, optional
-    ///     Where the search begins; by default zero, or the limit next to it.
+    /// near : (n,) array_like or str, optional
+    ///     Where the search begins, or a state of the SRDF; by default zero, or the limit next to it.
     /// solutions : int, default 8
     ///     Distinct solutions to look for: more than .1 rad apart, whole turns aside.
     /// restarts : int, default 50
@@ -276,9 +291,9 @@ impl Robot {
         seed: u64,
         preference: &str,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let pose = rigid(pose)?;
+        let pose = rigid(pose, "pose")?;
         let near = match near {
-            Some(near) => self.joint_values(near, "near")?,
+            Some(near) => self.state_of(near, "near")?,
             None => {
                 let joints = self.inner.arm.joints().iter();
                 joints.map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect()
@@ -291,19 +306,19 @@ impl Robot {
         let preference = *preference;
         let settings = IkSettings { seed, restarts, solutions, preference, ..Default::default() };
         let arm = self.inner.arm.clone();
-        let answer =
-            run(
-                py,
-                None,
-                move |_| Ok(InverseKinematics::new(arm, settings)?.solve(&pose, &near)?),
-            )?;
+        let solve = move || Ok(InverseKinematics::new(arm, settings)?.solve(&pose, &near)?);
+        let answer = if solutions.saturating_mul(restarts) <= MOST_DIRECT {
+            direct(py, solve)?
+        } else {
+            run(py, None, move |_| solve())?
+        };
         self.answer(py, &answer)
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, RestoredFiles)> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_robot")?;
         let ArmFiles { urdf, srdf, limits, base, tip, fixed } = self.files.clone();
-        Ok((restore, (urdf, srdf, limits, base, tip, fixed)))
+        Ok((restore, (urdf, srdf, limits, base, tip, fixed, self.packages.clone())))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -321,14 +336,55 @@ impl Robot {
 }
 
 /// What a pickle holds: names of files, and what they do not say.
-type RestoredFiles =
-    (PathBuf, Option<PathBuf>, Option<PathBuf>, Option<String>, Option<String>, Vec<(String, f64)>);
+type RestoredFiles = (
+    PathBuf,
+    Option<PathBuf>,
+    Option<PathBuf>,
+    Option<String>,
+    Option<String>,
+    Vec<(String, f64)>,
+    BTreeMap<String, PathBuf>,
+);
 
 impl Robot {
-    fn open(py: Python<'_>, files: ArmFiles) -> PyResult<Self> {
+    fn open(
+        py: Python<'_>,
+        files: ArmFiles,
+        packages: BTreeMap<String, PathBuf>,
+    ) -> PyResult<Self> {
         let to_read = files.clone();
         let inner = run(py, None, move |_| Ok(to_read.open()?))?;
-        Ok(Self { files, inner })
+        Ok(Self { files, packages, inner, arm: OnceLock::new() })
+    }
+
+    /// The arm with its collision model.
+    pub fn arm(&self, py: Python<'_>) -> PyResult<Arc<RobotArm>> {
+        if let Some(arm) = self.arm.get() {
+            return Ok(arm.clone());
+        }
+        let (opened, urdf) = (self.inner.clone(), self.files.urdf.clone());
+        let packages = self.packages.clone();
+        let arm = run(py, None, move |_| {
+            RobotArm::of(opened, &urdf, &packages, &CollisionSettings::default())
+        })?;
+        // Another thread may have made one meanwhile: any will do.
+        Ok(self.arm.get_or_init(|| Arc::new(arm)).clone())
+    }
+
+    /// Whether the tip was named, not found.
+    pub fn has_named_tip(&self) -> bool {
+        self.files.tip.is_some()
+    }
+
+    /// Joint values from an array or from the name of a state of the SRDF.
+    pub fn state_of(&self, value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+        match value.extract::<String>() {
+            Ok(state) => {
+                let found = self.inner.named_state(&state);
+                found.map_err(|error| errors::raise(value.py(), &error.into()))
+            }
+            Err(_) => self.joint_values(value, name),
+        }
     }
 
     fn joint_values(&self, value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
@@ -366,6 +422,7 @@ impl Robot {
 
 /// A robot that was pickled: read again from where it came.
 #[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "what a pickle holds")]
 pub fn _restore_robot(
     py: Python<'_>,
     urdf: PathBuf,
@@ -374,22 +431,7 @@ pub fn _restore_robot(
     base: Option<String>,
     tip: Option<String>,
     fixed: Vec<(String, f64)>,
+    packages: BTreeMap<String, PathBuf>,
 ) -> PyResult<Robot> {
-    Robot::open(py, ArmFiles { urdf, srdf, limits, base, tip, fixed })
-}
-
-/// A rigid motion from a homogeneous matrix.
-fn rigid(value: &Bound<'_, PyAny>) -> PyResult<Pose> {
-    let py = value.py();
-    let (values, _) = arrays_in::floats(value, "pose", &[Axis::Is(4), Axis::Is(4)])?;
-    let mut rows = [[0.0; 4]; 4];
-    for (row, values) in rows.iter_mut().zip(values.chunks_exact(4)) {
-        row.copy_from_slice(values);
-    }
-    let similarity = Sim3::from_rows(rows).map_err(|error| errors::raise(py, &error.into()))?;
-    if (similarity.scale - 1.0).abs() > 1e-6 {
-        let found = format!("a scale of {}", similarity.scale);
-        return Err(errors::invalid(py, "pose", "a rigid motion", &found));
-    }
-    Ok(similarity.rigid())
+    Robot::open(py, ArmFiles { urdf, srdf, limits, base, tip, fixed }, packages)
 }

@@ -28,6 +28,8 @@ pub struct LinkSurface {
     pub faces: Vec<[u32; 3]>,
     /// Meshes that cannot be read, and why.
     pub missing: Vec<String>,
+    /// Meshes of visuals that cannot be read, and why, for which the collisions stand.
+    pub replaced: Vec<String>,
 }
 
 impl LinkSurface {
@@ -44,7 +46,7 @@ impl LinkSurface {
         }
         let collisions = Self::of(&link.collisions, link, paths)?;
         Ok(if collisions.missing.is_empty() || visuals.faces.is_empty() {
-            collisions
+            Self { replaced: visuals.missing, ..collisions }
         } else {
             visuals
         })

@@ -70,7 +70,7 @@ pub fn sample_motion(folder: &Path) -> Result<PlannedMotion, Box<dyn std::error:
             shape: ObstacleShape::HalfSpace,
         },
     ];
-    Ok(PlannedMotion { scene, trajectory: trajectory(), grasp: Some(2) })
+    Ok(PlannedMotion { scene, trajectory: trajectory(), grasp: Some(2), notes: Vec::new() })
 }
 
 /// A post of 4 cm between the fingers at the grasp, in millimetres.
@@ -104,7 +104,7 @@ fn post(scene: &MotionScene, file: PathBuf) -> Result<MotionObject, Box<dyn std:
     let mesh = Arc::new(semfm::geom::io::read_mesh(&file)?.mesh);
     let turn = semfm::geom::math::DQuat::from_rotation_z(GRASP[0]);
     let base_from_object = Pose::from_parts(DVec3::new(grip.x, grip.y, 0.0), turn);
-    Ok(MotionObject { mesh, file, scale: 1e-3, base_from_object })
+    Ok(MotionObject { mesh, file: Some(file), scale: 1e-3, base_from_object })
 }
 
 fn names() -> Vec<String> {

@@ -16,6 +16,8 @@ mod error;
 pub mod foxglove;
 mod hand;
 pub mod html;
+#[cfg(feature = "mcap")]
+mod memory_files;
 mod motion;
 mod page;
 mod pictures;
@@ -23,11 +25,17 @@ mod surface;
 mod transfer_files;
 
 pub use error::{Error, Result};
-pub use motion::{PLAN_FILES, write_animated_glb, write_plan, write_plan_folder};
+#[cfg(feature = "mcap")]
+pub use memory_files::write_memory_transfer;
+pub use motion::{
+    PLAN_FILES, write_animated_glb, write_plan, write_plan_folder, write_plan_picture,
+};
 pub use page::{
     Fact, Group, Hands, Layer, LegendEntry, Motion, Panel, Picture, VertexColors, groups_of_paths,
     write_page,
 };
+#[cfg(feature = "mcap")]
+pub use pictures::write_memory_picture;
 pub use pictures::{
     NearMiss, TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_miss_picture,
     write_motion_picture, write_sheet,

@@ -23,9 +23,9 @@ fn the_folder_of_a_plan_is_whole_and_read_back_as_it_was() {
     let (motion, plan) = (motion(folder.path()), folder.path().join("plan"));
     let written = write_plan_folder(&plan, &motion, &Task::default()).unwrap();
     let names: Vec<&str> = written.iter().filter_map(|path| path.file_name()?.to_str()).collect();
-    // The two that tell of grasps are not of a motion alone.
+    // The two that tell of grasps are not of a motion alone, and the object has a file.
     let mut expected = PLAN_FILES.to_vec();
-    expected.retain(|name| !["plan.json", "miss.png"].contains(name));
+    expected.retain(|name| !["plan.json", "miss.png", "object.ply"].contains(name));
     if !cfg!(feature = "mcap") {
         expected.retain(|name| !name.ends_with(".mcap") && !name.ends_with(".yaml"));
     }
@@ -46,6 +46,22 @@ fn the_folder_of_a_plan_is_whole_and_read_back_as_it_was() {
     let before: Vec<Vec<u8>> = bytes().collect();
     write_plan_folder(&plan, &motion, &Task::default()).unwrap();
     assert!(bytes().eq(before), "a file differs the second time");
+}
+
+#[test]
+fn an_object_without_a_file_is_written_beside_the_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut motion, plan) = (motion(folder.path()), folder.path().join("plan"));
+    motion.notes = vec!["acceleration assumed".into()];
+    motion.scene.object.as_mut().unwrap().file = None;
+    write_plan_folder(&plan, &motion, &Task::default()).unwrap();
+    let read = read_motion(&plan.join("trajectory.json")).unwrap();
+    let [a, b] = [&motion, &read].map(|m| m.scene.object.as_ref().unwrap());
+    assert_eq!(a.mesh.vertices(), b.mesh.vertices());
+    assert_eq!(b.file.as_ref().unwrap().file_name().unwrap(), "object.ply");
+    assert_eq!(read.notes, motion.notes);
+    let groups = groups_of_paths(&[plan], &Task::default()).unwrap();
+    assert_eq!(groups[0].notes, motion.notes);
 }
 
 #[test]

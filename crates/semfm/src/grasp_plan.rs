@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
 use parry3d_f64::shape::SharedShape;
-use semfm_geom::math::{DQuat, DVec3};
+use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_motion::{
     CollisionBody, Hand, HandPart, MotionAnswer, MotionRequest, MotionSettings, NearestMiss,
@@ -19,11 +19,11 @@ use semfm_motion::{
 };
 use semfm_robot::Role;
 
-use crate::files::rigid_pose::{WRITTEN_SCALE_TOLERANCE, rigid_pose};
-use crate::files::{GraspRecord, GraspsFile, MatrixRows, PartRecord, SceneContents, TableRecord};
+use crate::files::{GraspRecord, GraspsFile, MatrixRows, PartRecord, TableRecord, rigid_pose};
+use crate::hand_mounting::{Mounting, check_mounting};
 use crate::{
-    Error, FingerJoint, MotionObject, MotionObstacle, MotionRobot, MotionScene, MountedHand,
-    ObstacleShape, PlannedMotion, Result, RobotArm, SceneState,
+    Error, FingerJoint, FrameOwner, MotionObject, MotionObstacle, MotionRobot, MotionScene,
+    MountedHand, PlannedMotion, Result, RobotArm, SceneContents, SceneState,
 };
 
 /// The name of the table that grasps were found with.
@@ -55,8 +55,8 @@ pub struct PlanRequest {
 pub struct PlanObject {
     /// The mesh, in its own units.
     pub mesh: Arc<Mesh>,
-    /// The file that it was read from.
-    pub file: PathBuf,
+    /// The file that it was read from, if it was: `trajectory.json` names it, and else has the mesh beside it.
+    pub file: Option<PathBuf>,
 }
 
 /// A motion, or what kept the grasps from one.
@@ -66,9 +66,11 @@ pub struct GraspPlan {
     pub answer: MotionAnswer,
     /// What is seen: robot, object, obstacles.
     pub scene: MotionScene,
+    /// The hand as it was checked.
+    pub hand: Hand,
     /// How the motion was made.
     pub settings: MotionSettings,
-    /// What was assumed, in words.
+    /// What was found or assumed, of the arm too, in words.
     pub notes: Vec<String>,
 }
 
@@ -77,14 +79,23 @@ pub struct GraspPlan {
 /// planner").
 ///
 /// # Errors
-/// [`Error::Invalid`] for grasps of another format or poses that are none; [`Error::Motion`] for a request that is not
-/// sound, such as a start out of limits. That no grasp can be carried out is no error: see [`GraspPlan::answer`].
+/// [`Error::Invalid`] where there is no grasp, for grasps of another format or poses that are none, and for a hand that
+/// cannot sit at the arm's tip; [`Error::Motion`] for a request that is not sound, such as a start out of limits. That no
+/// grasp can be carried out is no error: see [`GraspPlan::answer`].
 pub fn plan(arm: &RobotArm, request: &PlanRequest, task: &Task) -> Result<GraspPlan> {
+    if request.grasps.grasps.is_empty() {
+        let expected = "at least one to carry out";
+        return Err(Error::invalid("grasps", expected, "none (their file says why)"));
+    }
     let scene = surroundings(request)?;
-    let (object, notes) = target_object(request)?;
+    let (object, of_object) = target_object(request)?;
+    let mut notes = arm.notes().to_vec();
+    notes.extend(check_mounting(arm, &mounting(request)?)?);
+    notes.extend(of_object);
+    let hand = hand(&request.grasps)?;
     let motion_request = MotionRequest {
         start: request.start.clone(),
-        hand: hand(&request.grasps)?,
+        hand: hand.clone(),
         grasps: target_grasps(request)?,
         object,
         scene: scene.scene,
@@ -92,7 +103,7 @@ pub fn plan(arm: &RobotArm, request: &PlanRequest, task: &Task) -> Result<GraspP
     };
     let answer = arm.planner().plan(&motion_request, task)?;
     let scene = motion_scene(arm, request, scene.obstacles, &answer)?;
-    Ok(GraspPlan { answer, scene, settings: request.settings.clone(), notes })
+    Ok(GraspPlan { answer, scene, hand, settings: request.settings.clone(), notes })
 }
 
 impl GraspPlan {
@@ -103,7 +114,23 @@ impl GraspPlan {
             scene: self.scene.clone(),
             trajectory: motion.trajectory.clone(),
             grasp: Some(motion.grasp),
+            notes: self.notes.clone(),
         })
+    }
+
+    /// The two things that touch at a miss, by the names of their frames in the scene.
+    pub fn miss_pair(&self, miss: &NearestMiss) -> Option<[String; 2]> {
+        let (a, b) = miss.obstruction.pair()?;
+        let names = self.hand.part_names();
+        let frame = |name: &str| {
+            let Some(part) = names.iter().position(|other| other == name) else {
+                return name.to_owned();
+            };
+            let frames = self.scene.frames();
+            let mounted = frames.into_iter().find(|f| f.owner == FrameOwner::HandPart(part));
+            mounted.map_or_else(|| self.hand.parts[part].name.clone(), |frame| frame.name)
+        };
+        Some([frame(a), frame(b)])
     }
 
     /// Where everything stands at the nearest miss, to be drawn.
@@ -120,20 +147,22 @@ impl GraspPlan {
 
 /// What stands around, with the table of the grasps.
 fn surroundings(request: &PlanRequest) -> Result<SceneContents> {
-    let SceneContents { mut scene, mut obstacles } = request.scene.clone();
-    let table = request.grasps.table.filter(|_| request.with_table);
-    if let Some(TableRecord { point, normal }) = table {
-        let point = request.base_from_object * DVec3::from_array(point);
-        let normal = request.base_from_object.rotation * DVec3::from_array(normal);
-        scene = scene.with_table(TABLE, point, normal)?;
-        let turn = DQuat::from_rotation_arc(DVec3::Z, normal.normalize());
-        obstacles.push(MotionObstacle {
-            name: TABLE.into(),
-            base_from_obstacle: Pose::from_parts(point, turn),
-            shape: ObstacleShape::HalfSpace,
-        });
-    }
-    Ok(SceneContents { scene, obstacles })
+    let contents = request.scene.clone();
+    let Some(TableRecord { point, normal }) = request.grasps.table.filter(|_| request.with_table)
+    else {
+        return Ok(contents);
+    };
+    let point = request.base_from_object * DVec3::from_array(point);
+    let normal = request.base_from_object.rotation * DVec3::from_array(normal);
+    contents.with_table(TABLE, point, normal)
+}
+
+/// The closed hand at the arm's tip.
+fn mounting(request: &PlanRequest) -> Result<Mounting<'_>> {
+    let gripper = &request.grasps.gripper;
+    let flange_from_tcp = pose("gripper.flange_from_tcp", gripper.flange_from_tcp)?;
+    let tip_from_tcp = request.tip_from_tcp.unwrap_or(flange_from_tcp);
+    Ok(Mounting { gripper, flange_from_tcp, tip_from_tcp })
 }
 
 /// The object for collision checks, and notes on how its mesh was cut.
@@ -185,10 +214,9 @@ fn hand_part(record: &PartRecord) -> Result<HandPart> {
 }
 
 fn target_grasps(request: &PlanRequest) -> Result<Vec<TargetGrasp>> {
-    let flange_from_closed =
-        pose("gripper.flange_from_tcp", request.grasps.gripper.flange_from_tcp)?;
+    let Mounting { flange_from_tcp, tip_from_tcp, .. } = mounting(request)?;
     let tip_from_flange = match request.tip_from_tcp {
-        Some(tip_from_tcp) => tip_from_tcp * flange_from_closed.inverse(),
+        Some(_) => tip_from_tcp * flange_from_tcp.inverse(),
         None => Pose::IDENTITY,
     };
     let target = |(i, grasp): (usize, &GraspRecord)| -> Result<TargetGrasp> {
@@ -260,5 +288,5 @@ fn poses(what: &str, rows: &[MatrixRows]) -> Result<Vec<Pose>> {
 /// A rotation and a translation.
 fn pose(what: &str, rows: MatrixRows) -> Result<Pose> {
     let expected = "rows of a rotation and a translation";
-    rigid_pose(rows, WRITTEN_SCALE_TOLERANCE).map_err(|found| Error::invalid(what, expected, found))
+    rigid_pose(rows).map_err(|found| Error::invalid(what, expected, found))
 }

@@ -76,8 +76,8 @@ pub struct MountedHand {
 pub struct MotionObject {
     /// Its mesh, in its own units.
     pub mesh: Arc<Mesh>,
-    /// The file that the mesh was read from.
-    pub file: PathBuf,
+    /// The file that the mesh was read from, if it was.
+    pub file: Option<PathBuf>,
     /// Metres per unit of the mesh.
     pub scale: f64,
     /// Where it stands, scaled to metres, before it is lifted.

@@ -14,6 +14,8 @@ pub struct PlannedMotion {
     pub trajectory: Trajectory,
     /// Which grasp it carries out: its place in the file of grasps, from 0.
     pub grasp: Option<usize>,
+    /// What was found or assumed, in words.
+    pub notes: Vec<String>,
 }
 
 impl PlannedMotion {

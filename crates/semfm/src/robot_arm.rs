@@ -34,12 +34,25 @@ impl RobotArm {
         packages: &BTreeMap<String, PathBuf>,
         collision: &CollisionSettings,
     ) -> Result<Self> {
-        let opened = files.open()?;
-        let paths = MeshPaths::new(&files.urdf, packages);
+        Self::of(files.open()?, &files.urdf, packages, collision)
+    }
+
+    /// The arm that was read from `urdf`, with its collision model.
+    ///
+    /// # Errors
+    /// As [`RobotArm::open`], but for the files that were read.
+    pub fn of(
+        opened: OpenedArm,
+        urdf: &Path,
+        packages: &BTreeMap<String, PathBuf>,
+        collision: &CollisionSettings,
+    ) -> Result<Self> {
+        let paths = MeshPaths::new(urdf, packages);
         let model =
             CollisionModel::new(opened.arm.clone(), &paths, opened.srdf.as_ref(), collision)?;
         if let Some(first) = model.missing().first() {
-            let expected = "every mesh, so that no link moves unchecked: map its package (--package NAME=FOLDER)";
+            let expected =
+                "every mesh, so that no link moves unchecked: map its package (NAME=FOLDER)";
             let found = format!("{} that are missing, first {first}", model.missing().len());
             return Err(Error::invalid("collision meshes of the robot", expected, found));
         }
@@ -47,7 +60,7 @@ impl RobotArm {
         notes.extend(model.notes().iter().cloned());
         let planner = MotionPlanner::new(Arc::new(model))?;
         notes.extend(planner.notes().iter().cloned());
-        let (urdf, packages) = (files.urdf.clone(), packages.clone());
+        let (urdf, packages) = (urdf.to_owned(), packages.clone());
         Ok(Self { urdf, packages, opened, planner, notes })
     }
 

@@ -1,37 +1,48 @@
-//! `semfm-cli demo`: a transfer between built-in objects, from the very files that `transfer` reads.
+//! `semfm-cli demo`: a transfer between built-in objects and the motion of an arm of our own to one of the grasps, from
+//! the very files that `transfer` and `plan` read.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
 use semfm::encoder::builtin_encoder;
-use semfm::files::{Provenance, read_embeddings, read_region};
+use semfm::files::{Provenance, SceneFile, TablePlaneRecord, read_embeddings, read_region};
 use semfm::fmap::metrics::iou;
-use semfm::geom::io::read_mesh;
+use semfm::geom::io::{read_mesh, write_atomically};
+use semfm::geom::math::{DQuat, DVec3, bounds};
 use semfm::object_encoder::ObjectEncoder;
+use semfm::upright::upright;
 use semfm::views::mcap::Dtype;
 use semfm::{FeatureSource, Mesh, PipelineSettings, Prepared, Task, prepare, transfer};
-use semfm_show::TransferFiles;
+use semfm_show::{TransferFiles, groups_of_paths, write_page};
 use semfm_synth::{
-    Category, Level, ObjectFiles, ObjectSettings, make_object, write_labelled_mesh, write_object,
+    ARM_FLANGE, ARM_HOME, Category, Level, ObjectFiles, ObjectSettings, arm_urdf, make_object,
+    write_labelled_mesh, write_object,
 };
 
 use super::Outcome;
 use super::grasp::GraspOptions;
-use super::transfer_output::TransferOutput;
+use super::motion_options::MotionOptions;
+use super::transfer_output::{ArmMotion, PLAN, TransferOutput};
 use crate::console;
 use crate::options::Common;
 use crate::output::check_folder;
 
-/// The gripper that grasps at the end, and how large the object is made for it: from corner to
-/// corner of its box, in metres.
-const GRIPPER: &str = "franka";
+/// How large the object is made for the arm's hand: from corner to corner of its box, in metres.
 const LONGEST: f64 = 0.25;
+/// Files of the arm and of what stands around it, and the page of everything.
+const ARM_FILE: &str = "arm.urdf";
+const SCENE_FILE: &str = "scene.json";
+const PAGE_FILE: &str = "page.html";
+/// Where the middle of the object stands before the arm, metres.
+const DISTANCE: f64 = 0.5;
+/// The top of the table below the arm's base and the object, metres: neither touches it where it stands.
+const TABLE_TOP: f64 = -0.002;
 
-/// Transfer a grip between two made-up objects, offline: meshes, embeddings, transfer, pictures
+/// Transfer a grip between two made-up objects and move an arm there, offline: meshes, transfer, grasps, motion
 ///
-/// The objects are made on the spot and the built-in encoder is shown views of them; this is what
-/// `transfer` does, from the same files.
+/// The objects and the arm are made on the spot and the built-in encoder is shown views of the objects; this is what
+/// `transfer` and `plan` do, from the same files.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  semfm-cli demo --category scissors -o semfm-demo")]
 pub struct DemoCommand {
@@ -71,7 +82,10 @@ impl DemoCommand {
         // Rounded, so that the command below says exactly what was done.
         let scale = (1e4 * LONGEST / target_mesh.mesh.diagonal()).round() / 1e4;
         let for_grasps = target_mesh.mesh.clone();
-        let grasps = GraspOptions::at_scale(scale).prepare(GRIPPER, self.seed, for_grasps)?;
+        let arm = DemoArm::write(&self.output, &target_mesh.mesh, scale)?;
+        let gripper = arm.urdf.display().to_string();
+        let grasps = GraspOptions::at_scale(scale).prepare(&gripper, self.seed, for_grasps)?;
+        let motion = arm.options().prepare(&arm.urdf, &[], &[arm.scene.clone()], self.seed)?;
 
         let (prepared_source, prepared_target) = match &encoded {
             Some(pair) => (
@@ -101,7 +115,11 @@ impl DemoCommand {
             },
             files: TransferFiles::All,
             grasps: Some(grasps),
-            motion: None,
+            motion: Some(ArmMotion {
+                motion,
+                target: target.mesh.clone(),
+                folder: self.output.join(PLAN),
+            }),
         };
         let folder = self.output.join("transfer");
         // A demonstration shows where the time goes.
@@ -109,24 +127,33 @@ impl DemoCommand {
         let outcome = output.write(&folder, &task, &with_times)?;
         if !common.json {
             console::data(format_args!("IoU         {overlap:.2} with the true grip"));
-            let pictures = ["transfer.png", "features.png", "grasps.png"];
+            let pictures = ["transfer.png", "features.png", "grasps.png"].map(|p| folder.join(p));
+            let of_plan = ["motion.png", "miss.png"].map(|name| self.output.join(PLAN).join(name));
             // A refused region is not grasped.
-            for picture in pictures.map(|name| folder.join(name)).iter().filter(|p| p.is_file()) {
+            for picture in pictures.iter().chain(&of_plan).filter(|picture| picture.is_file()) {
                 console::data(format_args!("picture     {}", picture.display()));
             }
+        }
+        let page = self.output.join(PAGE_FILE);
+        // Without a motion, one of an earlier demonstration may lie in the folder.
+        let shown = if outcome == Outcome::Done { &self.output } else { &folder };
+        let groups = groups_of_paths(std::slice::from_ref(shown), &task)?;
+        write_page(&page, "SemFM demo", &groups)?;
+        if !common.json {
+            console::data(format_args!("page        {}: open it in a browser", page.display()));
             if !common.quiet {
-                self.print_commands(&source, &target, scale, &folder);
+                self.print_commands(&source, &target, &arm, &folder);
             }
         }
         Ok(outcome)
     }
 
-    /// The same transfer as commands.
+    /// The same transfer and motion as commands.
     fn print_commands(
         &self,
         source: &ObjectFiles,
         target: &ObjectFiles,
-        scale: f64,
+        arm: &DemoArm,
         folder: &Path,
     ) {
         let features = self.level.map_or_else(String::new, |_| {
@@ -136,14 +163,30 @@ impl DemoCommand {
         console::data("by hand");
         console::data(format_args!(
             "  semfm-cli transfer {} {} --region {} \\\n    {features}\
-             --gripper {GRIPPER} --scale {scale} -o {}",
+             --gripper {} --scale {} -o {}",
             quoted(&source.mesh),
             quoted(&target.mesh),
             quoted(&source.truth),
+            quoted(&arm.urdf),
+            arm.scale,
             quoted(folder),
         ));
-        console::data("in three dimensions, in a browser");
-        console::data(format_args!("  semfm-cli show {} -o semfm-demo.html", quoted(folder)));
+        console::data(format_args!(
+            "  semfm-cli plan --robot {} --tip {ARM_FLANGE} --start {} \\\n    \
+             --grasps {} --object {} --base-from-object {} \\\n    --scene {} -o {}",
+            quoted(&arm.urdf),
+            arm.start(),
+            quoted(&folder.join("grasps.json")),
+            quoted(&target.mesh),
+            arm.base_from_object,
+            quoted(&arm.scene),
+            quoted(&self.output.join(PLAN)),
+        ));
+        console::data(format_args!(
+            "  semfm-cli show {} -o {}",
+            quoted(&self.output),
+            quoted(&self.output.join(PAGE_FILE))
+        ));
     }
 
     /// Makes an object and writes its files.
@@ -159,6 +202,48 @@ impl DemoCommand {
             None => write_labelled_mesh(&self.output, &object)?,
         })
     }
+}
+
+/// The arm of the demonstration with what stands around it, in files.
+struct DemoArm {
+    urdf: PathBuf,
+    scene: PathBuf,
+    /// Metres per unit of the object's mesh.
+    scale: f64,
+    /// As `--base-from-object` takes it.
+    base_from_object: String,
+}
+
+impl DemoArm {
+    /// Writes the arm and the table into `folder`. The object stands upright on the table.
+    fn write(folder: &Path, object: &Mesh, scale: f64) -> Result<Self> {
+        let (urdf, scene) = (folder.join(ARM_FILE), folder.join(SCENE_FILE));
+        write_atomically(&urdf, |out| out.write_all(arm_urdf().as_bytes()))?;
+        let (name, point, normal) = ("table".into(), [0.0, 0.0, TABLE_TOP], [0.0, 0.0, 1.0]);
+        let table = TablePlaneRecord { name, point, normal };
+        SceneFile { tables: vec![table], ..SceneFile::new() }.write(&scene)?;
+        let base_from_object = standing(object, scale)?;
+        Ok(Self { urdf, scene, scale, base_from_object })
+    }
+
+    fn options(&self) -> MotionOptions {
+        MotionOptions::told(ARM_FLANGE, &self.base_from_object, &self.start())
+    }
+
+    fn start(&self) -> String {
+        ARM_HOME.map(|q| q.to_string()).join(",")
+    }
+}
+
+/// Where an object stands upright on z = 0 before the arm: X,Y,Z,QX,QY,QZ,QW.
+fn standing(object: &Mesh, scale: f64) -> Result<String> {
+    let turn = DQuat::from_rotation_arc(upright(object)?.up, DVec3::Z);
+    let points: Vec<DVec3> = object.vertices().iter().map(|&p| turn * p * scale).collect();
+    let (low, high) = bounds(&points).unwrap_or_default();
+    let middle = (low + high) / 2.0;
+    let numbers = [DISTANCE - middle.x, -middle.y, -low.z, turn.x, turn.y, turn.z, turn.w];
+    // Rounded, so that the command says exactly what was done; `+ 0.0` leaves no minus before zero.
+    Ok(numbers.map(|x| ((1e5 * x).round() / 1e5 + 0.0).to_string()).join(","))
 }
 
 fn prepare_files(

@@ -8,12 +8,12 @@ use clap::{Args, ValueEnum};
 use semfm::align::Verdict;
 use semfm::demonstration::is_one_sided;
 use semfm::files::{
-    AlignedPose, GraspSettingsRecord, GraspsFile, TableRecord, read_aligned, read_obstacle,
-    read_region, write_isaac_grasps, write_ros2_grasps,
+    AlignedPose, GraspSettingsRecord, GraspsFile, read_aligned, read_obstacle, read_region,
+    write_isaac_grasps, write_ros2_grasps,
 };
 use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
-use semfm::grasp::{ApproachCone, GraspSettings, Grasps};
+use semfm::grasp::{ApproachCone, GraspSettings, Grasps, Selection};
 use semfm::robot::{BuiltinGripper, Gripper, GripperSettings};
 use semfm::{GraspProblem, GraspRequest, Mesh, POINT_MARGIN, Table, Task};
 use semfm_show::write_grasp_picture;
@@ -93,12 +93,24 @@ pub struct GraspOptions {
     /// Grasps to return
     #[arg(long, default_value_t = GraspSettings::default().top, value_name = "N", help_heading = "Grasps")]
     top: usize,
+    /// Share of the score that grasps may give up to differ from each other; 0 returns the best, however near
+    #[arg(long, default_value_t = GraspSettings::default().diversity, value_name = "SHARE", help_heading = "Grasps")]
+    diversity: f64,
+    /// Draw the grasps at random from all that pass every check, whatever their score (to measure a score)
+    #[arg(long, help_heading = "Grasps")]
+    random: bool,
     /// Points of the region from which candidates are grown
     #[arg(long, default_value_t = GraspSettings::default().n_samples, value_name = "N", help_heading = "Grasps")]
     samples: usize,
     /// Friction coefficient between pad and object
     #[arg(long, default_value_t = GraspSettings::default().friction, value_name = "MU", help_heading = "Grasps")]
     friction: f64,
+    /// Mass of the object, kilograms: the score is then the probability that the grasp holds
+    #[arg(long, value_name = "KG", help_heading = "Grasps")]
+    mass: Option<f64>,
+    /// Force with which each pad presses, newtons
+    #[arg(long, default_value_t = GraspSettings::default().grip_force, value_name = "N", help_heading = "Grasps")]
+    grip_force: f64,
     /// Least and largest distance between the closed pads, metres
     #[arg(long, value_name = "LEAST,MOST", value_parser = parse_range, help_heading = "Grasps")]
     width_range: Option<[f64; 2]>,
@@ -200,7 +212,8 @@ impl GraspCommand {
 impl GraspOptions {
     /// The defaults, for an object of `scale` metres per unit.
     pub fn at_scale(scale: f64) -> Self {
-        let GraspSettings { top, n_samples, friction, limits, .. } = GraspSettings::default();
+        let GraspSettings { top, diversity, n_samples, friction, grip_force, limits, .. } =
+            GraspSettings::default();
         Self {
             metric: MetricOptions { aligned: None, scale: Some(scale), metres: false },
             use_refused: false,
@@ -209,8 +222,12 @@ impl GraspOptions {
             scene_margin: POINT_MARGIN,
             table: None,
             top,
+            diversity,
+            random: false,
             samples: n_samples,
             friction,
+            mass: None,
+            grip_force,
             width_range: None,
             approach: None,
             approach_cone: APPROACH_CONE,
@@ -251,10 +268,16 @@ impl GraspOptions {
             top: self.top,
             n_samples: self.samples,
             friction: self.friction,
+            mass: self.mass,
+            diversity: self.diversity,
+            grip_force: self.grip_force,
             demonstrated_approach: self.demonstrated,
             seed,
             ..Default::default()
         };
+        if self.random {
+            settings.selection = Selection::Random;
+        }
         settings.limits.width = self.width_range.map(|[least, most]| least..=most);
         settings.limits.approach = self.approach.map(|axis| ApproachCone { axis, half_angle });
         settings.limits.clearance = self.clearance;
@@ -369,11 +392,8 @@ pub fn grasps_file(problem: &GraspProblem, found: &Grasps) -> GraspsFile {
         n_samples: settings.n_samples,
         version: env!("CARGO_PKG_VERSION").into(),
     };
-    let table = problem.table().map(|Table { point, normal }| TableRecord {
-        point: point.to_array(),
-        normal: normal.to_array(),
-    });
-    GraspsFile { settings: Some(settings), table, ..GraspsFile::new(&problem.result(found)) }
+    let file = GraspsFile::new(&problem.result(found)).with_table(problem.table());
+    GraspsFile { settings: Some(settings), ..file }
 }
 
 /// Draws the best grasps in a region, one weight per vertex.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use semfm::files::read_pose;
+use semfm::files::read_rigid_pose;
 use semfm::geom::math::{DQuat, DVec3};
 use semfm::robot::{
     Arm, ArmFiles, ArmJoint, IkAnswer, IkSettings, IkSolution, InverseKinematics, OpenedArm, Pose,
@@ -28,7 +28,7 @@ pub struct IkCommand {
     /// The robot (URDF)
     robot: PathBuf,
     /// Where the tip shall be, in the base's frame, metres: X,Y,Z and a quaternion QX,QY,QZ,QW, or angles about the
-    /// fixed axes ROLL,PITCH,YAW in radians, or a JSON file with a 4 × 4 matrix
+    /// fixed axes ROLL,PITCH,YAW in radians, or a JSON file with a 4 × 4 matrix, bare or in the field `pose`
     #[arg(long, value_name = "X,Y,Z,…|FILE", allow_hyphen_values = true)]
     pose: String,
     #[command(flatten)]
@@ -51,7 +51,7 @@ pub struct IkCommand {
 }
 
 /// The files of an arm.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct ArmOptions {
     /// SRDF: the chain that is meant as the arm, named states
     #[arg(long, value_name = "FILE")]
@@ -103,7 +103,7 @@ impl ArmOptions {
 impl IkCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         let opened = self.arm.files(&self.robot).open()?;
-        let pose = parse_pose(&self.pose).context("--pose")?;
+        let pose = pose_option("pose", &self.pose)?;
         let near = near(&opened, self.near.as_deref()).context("--near")?;
         let settings = IkSettings {
             seed: self.seed,
@@ -149,20 +149,24 @@ pub fn near(opened: &OpenedArm, text: Option<&str>) -> Result<Vec<f64>> {
     }
 }
 
-/// A pose from numbers between commas, or from a file.
-pub fn parse_pose(text: &str) -> Result<Pose> {
+/// The pose that an option tells: numbers between commas, or a file that has it bare or in the field `name`, the
+/// option's name with `_`.
+pub fn pose_option(name: &str, text: &str) -> Result<Pose> {
+    let option = || format!("--{}", name.replace('_', "-"));
+    let path = Path::new(text);
     let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
-    let Some(numbers) = numbers else {
-        let path = Path::new(text);
-        if text.contains(',') && !path.exists() {
-            bail!("expected 6 or 7 numbers between commas or a file, found `{text}`");
+    match numbers {
+        Some(numbers) if !path.exists() => pose_of(text, &numbers).with_context(option),
+        None if text.contains(',') && !path.exists() => {
+            let expected = "6 or 7 numbers between commas or a file";
+            bail!("{}: expected {expected}, found `{text}`", option())
         }
-        let similarity = read_pose(path)?;
-        if (similarity.scale - 1.0).abs() > 1e-6 {
-            bail!("{text}: expected a rigid motion, found a scale of {}", similarity.scale);
-        }
-        return Ok(similarity.rigid());
-    };
+        _ => read_rigid_pose(path, name).with_context(option),
+    }
+}
+
+/// Position and quaternion, or position and angles.
+fn pose_of(text: &str, numbers: &[f64]) -> Result<Pose> {
     let rotation = match numbers[3.min(numbers.len())..] {
         [roll, pitch, yaw] => {
             DQuat::from_rotation_z(yaw)
@@ -243,6 +247,7 @@ mod tests {
 
     #[test]
     fn poses_come_as_quaternion_as_angles_or_from_a_file() {
+        let parse_pose = |text: &str| pose_option("pose", text);
         let by_quaternion = parse_pose("1,-2,3, 0.7071,0,0,0.7071").unwrap();
         let by_angles = parse_pose(&format!("1,-2,3,{},0,0", std::f64::consts::FRAC_PI_2)).unwrap();
         assert!((by_quaternion.inverse() * by_angles).rotation.xyz().length() < 1e-9);
@@ -252,6 +257,8 @@ mod tests {
         std::fs::write(&path, "[[1,0,0,0.5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]").unwrap();
         let from_file = parse_pose(&path.display().to_string()).unwrap();
         assert_eq!(from_file.translation, DVec3::X * 0.5);
+        std::fs::write(&path, "{\"pose\": [[1,0,0,2],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}").unwrap();
+        assert_eq!(parse_pose(&path.display().to_string()).unwrap().translation, DVec3::X * 2.0);
         for wrong in ["1,2,3", "1,2,3,0,0,0,2", "1,2,x,0,0,0", "1,2,3,0,0,nan", "no.json"] {
             assert!(parse_pose(wrong).is_err(), "{wrong}");
         }

@@ -4,18 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use semfm::files::{
-    GraspsFile, PlanFile, SceneContents, read_obstacle, read_rigid_pose, read_scene,
-};
+use semfm::files::{GraspsFile, PlanFile};
 use semfm::geom::math::DVec3;
-use semfm::motion::{CollisionSettings, MotionSettings, Pose, Scene};
-use semfm::{
-    GraspPlan, MotionObstacle, Obstacle, ObstacleShape, POINT_MARGIN, PlanObject, PlanRequest,
-    RobotArm, Task, plan,
-};
+use semfm::motion::{CollisionSettings, MotionSettings, Pose};
+use semfm::{GraspPlan, PlanObject, PlanRequest, RobotArm, SceneContents, Task, plan};
 use serde_json::{Value, json};
 
-use super::ik::{ArmOptions, near, parse_pose};
+use super::ik::{ArmOptions, near, pose_option};
 use crate::console;
 use crate::options::Common;
 
@@ -66,6 +61,27 @@ pub struct MotionOptions {
     searches: usize,
 }
 
+impl MotionOptions {
+    /// The defaults, for a hand on the link `tip`; the object's place and the start as they are told at the shell.
+    pub fn told(tip: &str, base_from_object: &str, start: &str) -> Self {
+        let defaults = MotionSettings::default();
+        Self {
+            arm: ArmOptions { tip: Some(tip.into()), ..ArmOptions::default() },
+            tip_from_tcp: None,
+            start: Some(start.into()),
+            base_from_object: Some(base_from_object.into()),
+            base_from_camera: None,
+            no_table: false,
+            approach_length: defaults.approach,
+            lift_height: defaults.lift.z,
+            speed: defaults.speed,
+            line_speed: defaults.line_speed,
+            iterations: defaults.iterations,
+            searches: defaults.searches,
+        }
+    }
+}
+
 /// Where the object stands.
 #[derive(Clone, Copy, Debug)]
 enum ObjectPlace {
@@ -103,8 +119,8 @@ impl MotionOptions {
         seed: u64,
     ) -> Result<PreparedMotion> {
         let place = match (&self.base_from_object, &self.base_from_camera) {
-            (Some(text), _) => ObjectPlace::Object(pose("base_from_object", text)?),
-            (None, Some(text)) => ObjectPlace::Camera(pose("base_from_camera", text)?),
+            (Some(text), _) => ObjectPlace::Object(pose_option("base_from_object", text)?),
+            (None, Some(text)) => ObjectPlace::Camera(pose_option("base_from_camera", text)?),
             (None, None) => bail!(
                 "where does the object stand? expected --base-from-object, or --base-from-camera with grasps in a \
                  camera's frame, found neither"
@@ -123,12 +139,12 @@ impl MotionOptions {
             Some(text) => near(arm.opened(), Some(text)).context("--start")?,
             None => arm.ready_state().context("--start")?,
         };
-        let tip_from_tcp = self.tip_from_tcp.as_ref().map(|text| pose("tip_from_tcp", text));
+        let tip_from_tcp = self.tip_from_tcp.as_ref().map(|text| pose_option("tip_from_tcp", text));
         Ok(PreparedMotion {
             place,
             tip_from_tcp: tip_from_tcp.transpose()?,
             start,
-            scene: read_surroundings(scene)?,
+            scene: SceneContents::read(scene)?,
             with_table: !self.no_table,
             settings: MotionSettings {
                 seed,
@@ -146,11 +162,6 @@ impl MotionOptions {
 }
 
 impl PreparedMotion {
-    /// Says what was found or assumed.
-    pub fn print_notes(&self) {
-        self.arm.notes().iter().for_each(|note| console::message(format_args!("note: {note}")));
-    }
-
     /// With grasps that are there.
     pub fn plan(
         &self,
@@ -174,46 +185,6 @@ impl PreparedMotion {
         };
         Ok(plan(&self.arm, &request, task)?)
     }
-}
-
-/// A pose from numbers, or from a file that has it bare or in the field `name`.
-fn pose(name: &str, text: &str) -> Result<Pose> {
-    let option = || format!("--{}", name.replace('_', "-"));
-    let path = Path::new(text);
-    if path.exists() {
-        return read_rigid_pose(path, name).with_context(option);
-    }
-    parse_pose(text).with_context(option)
-}
-
-/// One scene.json at most, then meshes and clouds by the names of their files.
-fn read_surroundings(files: &[PathBuf]) -> Result<SceneContents> {
-    let is_scene =
-        |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let mut scenes = files.iter().filter(is_scene);
-    let mut contents = match scenes.next() {
-        Some(path) => read_scene(path)?,
-        None => SceneContents { scene: Scene::new(), obstacles: Vec::new() },
-    };
-    if let Some(second) = scenes.next() {
-        bail!("{}: expected one scene.json at most, found a second one", second.display());
-    }
-    for path in files.iter().filter(|path| !is_scene(path)) {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let (at, scene) = (Pose::IDENTITY, contents.scene);
-        let (scene, shape) = match read_obstacle(path)? {
-            Obstacle::Mesh(mesh) => {
-                let scene = scene.with_mesh(&name, &mesh, 1.0, at);
-                (scene, ObstacleShape::Mesh(std::sync::Arc::new(mesh)))
-            }
-            Obstacle::Points(points) => {
-                (scene.with_cloud(&name, &points, POINT_MARGIN, at), ObstacleShape::Points(points))
-            }
-        };
-        contents.scene = scene.with_context(|| path.display().to_string())?;
-        contents.obstacles.push(MotionObstacle { name, base_from_obstacle: at, shape });
-    }
-    Ok(contents)
 }
 
 /// The plan in short, for `--json`.

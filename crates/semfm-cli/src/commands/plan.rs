@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
 use semfm::files::GraspsFile;
 use semfm::geom::io::read_mesh;
@@ -61,9 +61,6 @@ impl PlanCommand {
         let motion = self.motion.prepare(&self.robot, &self.package, &self.scene, self.seed)?;
         let (grasps, object) = self.read_grasps(common)?;
         check_folder_again(&self.output, PLAN_FILES)?;
-        if !common.quiet {
-            motion.print_notes();
-        }
         carry_out(&motion, grasps, object, &self.output, &task, common)
     }
 
@@ -84,7 +81,7 @@ impl PlanCommand {
         };
         let mesh = read_mesh(file)?.mesh;
         let grasps = GraspsFile::read(&self.grasps, &mesh)?;
-        Ok((grasps, Some(PlanObject { mesh: Arc::new(mesh), file: file.clone() })))
+        Ok((grasps, Some(PlanObject { mesh: Arc::new(mesh), file: Some(file.clone()) })))
     }
 }
 
@@ -97,9 +94,6 @@ pub fn carry_out(
     task: &Task,
     common: &Common,
 ) -> Result<Outcome> {
-    if grasps.grasps.is_empty() {
-        bail!("no grasps to carry out: the file of grasps says why none was found");
-    }
     let plan = motion.plan(grasps, object, task)?;
     let files = write_plan(folder, &motion.arm, &plan, task)?;
     if common.json {

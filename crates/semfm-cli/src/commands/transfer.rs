@@ -187,9 +187,6 @@ impl TransferCommand {
         };
         let motion = self.prepare_motion()?;
         check_folder_again(&self.output, TRANSFER_FILES)?;
-        if let Some(arm) = motion.as_ref().filter(|_| !common.quiet) {
-            arm.motion.print_notes();
-        }
         if let Some(problem) = grasps.as_ref().filter(|_| !common.quiet) {
             print_size(&problem.size());
         }
@@ -223,7 +220,8 @@ impl TransferCommand {
         let Some(robot) = &self.robot else { return Ok(None) };
         let (packages, seed) = (self.grasps.packages(), self.matching.seed);
         let motion = self.motion.prepare(robot, packages, &self.robot_scene, seed)?;
-        Ok(Some(ArmMotion { motion, target: self.target.clone() }))
+        let (target, folder) = (self.target.clone(), self.output.join(PLAN));
+        Ok(Some(ArmMotion { motion, target, folder }))
     }
 
     /// The files that it reads; the encoder and the gripper may be files, too.

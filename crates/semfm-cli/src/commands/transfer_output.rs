@@ -43,9 +43,11 @@ pub struct ArmMotion {
     pub motion: PreparedMotion,
     /// The file of the target's mesh.
     pub target: PathBuf,
+    /// Where the plan goes.
+    pub folder: PathBuf,
 }
 
-/// The folder of the plan in that of the transfer.
+/// The folder of the plan in that of the transfer, where no other is told.
 pub const PLAN: &str = "plan";
 
 impl TransferOutput<'_> {
@@ -76,7 +78,7 @@ impl TransferOutput<'_> {
         }
         let mut files = put_transfer(staged)?;
         if let Some((arm, plan)) = &plan {
-            files.extend(write_plan(&folder.join(PLAN), &arm.motion.arm, plan, task)?);
+            files.extend(write_plan(&arm.folder, &arm.motion.arm, plan, task)?);
         }
         let plan = plan.map(|(_, plan)| plan);
         let mut stages = stages_ms(self.source, self.target, self.transfer);
@@ -113,7 +115,7 @@ impl TransferOutput<'_> {
     /// The motion to one of the grasps.
     fn plan(&self, arm: &ArmMotion, grasps: GraspsFile, task: &Task) -> Result<GraspPlan> {
         let mesh = Arc::new(self.result().target_mesh().clone());
-        let object = PlanObject { mesh, file: arm.target.clone() };
+        let object = PlanObject { mesh, file: Some(arm.target.clone()) };
         arm.motion.plan(grasps, Some(object), task)
     }
 

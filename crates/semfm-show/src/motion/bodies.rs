@@ -52,6 +52,15 @@ pub(crate) struct MotionBodies {
     pub bodies: Vec<Body>,
     /// Meshes that cannot be read, and why.
     pub missing: Vec<String>,
+    /// Links whose visuals cannot be read, with the first reason: their collisions are shown.
+    replaced: Vec<Replaced>,
+}
+
+/// A link that is shown by its collisions.
+#[derive(Clone, Debug)]
+struct Replaced {
+    link: String,
+    why: String,
 }
 
 impl MotionBodies {
@@ -64,7 +73,7 @@ impl MotionBodies {
         let frames = scene.frames();
         let paths = scene.robot.mesh_paths();
         let fingers = finger_links(scene);
-        let (mut bodies, mut missing) = (Vec::new(), Vec::new());
+        let (mut bodies, mut missing, mut replaced) = (Vec::new(), Vec::new(), Vec::new());
         let mut n_links = 0;
         for (frame, MotionFrame { owner, .. }) in frames.iter().enumerate() {
             let (kind, color, surface) = match *owner {
@@ -72,6 +81,8 @@ impl MotionBodies {
                     let link = &scene.robot.robot.links[i];
                     let read = LinkSurface::new(link, &paths).map_err(semfm::Error::from)?;
                     missing.extend(read.missing);
+                    let why = read.replaced.into_iter().next();
+                    replaced.extend(why.map(|why| Replaced { link: link.name.clone(), why }));
                     let surface = Surface { vertices: read.points, faces: read.faces };
                     if fingers.contains(&i) {
                         (BodyKind::Hand, HandColors::of_one().finger, surface)
@@ -113,7 +124,27 @@ impl MotionBodies {
                 bodies.push(Body { frame, kind, color, surface });
             }
         }
-        Ok(Self { frames, bodies, missing })
+        Ok(Self { frames, bodies, missing, replaced })
+    }
+
+    /// What is not shown as the robot's description has it, in words.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(first) = self.replaced.first() {
+            let links: Vec<&str> = self.replaced.iter().map(|r| r.link.as_str()).collect();
+            notes.push(format!(
+                "pictures show the collision shapes of {}: their visual meshes cannot be read ({})",
+                links.join(", "),
+                first.why
+            ));
+        }
+        if let Some(first) = self.missing.first() {
+            notes.push(format!(
+                "pictures leave out {} meshes of the robot that cannot be read, first {first}",
+                self.missing.len()
+            ));
+        }
+        notes
     }
 
     /// The pose of each frame in the base link's frame.

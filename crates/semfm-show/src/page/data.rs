@@ -24,6 +24,7 @@ pub(super) struct PageData<'a> {
 struct GroupData<'a> {
     title: &'a str,
     facts: Vec<FactData<'a>>,
+    notes: &'a [String],
     layers: Vec<LayerData<'a>>,
     panels: Vec<PanelData<'a>>,
     source_of: Option<String>,
@@ -96,6 +97,7 @@ impl<'a> GroupData<'a> {
         Self {
             title: &group.title,
             facts: facts.map(|fact| FactData { name: &fact.name, value: &fact.value }).collect(),
+            notes: &group.notes,
             layers: group.layers.iter().map(LayerData::new).collect(),
             panels: panels.map(|(k, panel)| PanelData::new(panel, k, &group.layers)).collect(),
             source_of: group.source_of.as_ref().map(|ids| encode_numbers(ids.iter().copied())),

@@ -12,9 +12,10 @@ use crate::colors::{MARKED, NamedColor, PLAIN, color_bytes, css_properties, verd
 use crate::html::{Field, escape, fill, policy};
 
 /// The viewer, in the order in which its files build on each other.
-const VIEWER: [&str; 8] = [
+const VIEWER: [&str; 9] = [
     include_str!("viewer/painter.js"),
     include_str!("viewer/panel.js"),
+    include_str!("viewer/grasping.js"),
     include_str!("viewer/hands.js"),
     include_str!("viewer/charts.js"),
     include_str!("viewer/motion.js"),
@@ -87,6 +88,7 @@ mod tests {
         Group {
             title: "pair".into(),
             facts: vec![Fact::new("verdict", "accept")],
+            notes: vec!["</script> assumed".into()],
             panels: vec![panel("source"), panel("target")],
             layers: vec![
                 layer("region", VertexColors::Weights(vec![0.0, 0.5, 1.0])),

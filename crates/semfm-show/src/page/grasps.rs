@@ -18,6 +18,11 @@ use crate::pictures::{
 };
 use crate::surface::Surface;
 
+/// The grasp over time begins this far behind, and ends this far above, metres: enough to be seen, and little
+/// beside the hand.
+const RETREAT: f64 = 0.05;
+const LIFT: f64 = 0.05;
+
 /// The grasps of `path` on `mesh`, which must be the one they were found on; `weights` are those of
 /// the region, where it is known. Nothing where there is no grasp.
 ///
@@ -32,17 +37,17 @@ pub(super) fn grasps_group(
 ) -> Result<Option<Group>> {
     let file = GraspsFile::read(path, mesh)?;
     let Some(best) = file.grasps.first() else { return Ok(None) };
-    let hands = Hands::new(&file, mesh);
+    let up = match &file.table {
+        Some(table) => DVec3::from_array(table.normal),
+        None => upright(mesh)?.up,
+    };
+    let hands = Hands::new(&file, mesh, up);
     let none = vec![0.0; mesh.n_vertices()];
     let weights = weights.unwrap_or(&none);
     let viewpoints = {
         let with_hand = with_hand(&file, &hands.hand, best, mesh)?;
         let mut weights = weights.to_vec();
         weights.resize(with_hand.n_vertices(), 0.0);
-        let up = match &file.table {
-            Some(table) => DVec3::from_array(table.normal),
-            None => upright(mesh)?.up,
-        };
         let all = WeightedMesh { mesh: &with_hand, weights: &weights };
         viewpoints_around(up, all, VIEWPOINT_SIDE, task)?
     };
@@ -58,6 +63,7 @@ pub(super) fn grasps_group(
         ],
         panels: vec![panel],
         layers: vec![Layer { name: "region".into(), legend: Vec::new(), colors }],
+        notes: Vec::new(),
         source_of: None,
         pictures: Vec::new(),
         hands: Some(hands),
@@ -107,6 +113,10 @@ pub(super) struct HandsData {
     /// Colours of the best few where they are shown together.
     ranks: Vec<HandColorData>,
     opacity: f32,
+    /// How far behind the grasp the hand begins, metres.
+    retreat: f64,
+    /// How far hand and object are lifted, in the panel's frame.
+    lift: [f64; 3],
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -126,6 +136,7 @@ struct Shape {
 }
 
 #[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
 struct GraspData {
     /// Of the TCP in the panel's frame.
     place: [f64; 12],
@@ -134,6 +145,7 @@ struct GraspData {
     open: Vec<[f64; 12]>,
     width: f64,
     opening: f64,
+    closing_turn: f64,
     score: f64,
     terms: Vec<(String, f64)>,
     /// In the panel's frame.
@@ -158,7 +170,7 @@ struct ColorData {
 }
 
 impl Hands {
-    fn new(file: &GraspsFile, mesh: &Mesh) -> Self {
+    fn new(file: &GraspsFile, mesh: &Mesh, up: DVec3) -> Self {
         let hand = DrawnHand::of(file);
         let (low, high) = bounds(mesh.vertices()).unwrap_or_default();
         let middle = (low + high) / 2.0;
@@ -187,6 +199,8 @@ impl Hands {
             },
             ranks: (0..n_together).map(|i| HandColors::of_rank(i, n_together).into()).collect(),
             opacity: OPACITY,
+            retreat: RETREAT,
+            lift: (LIFT / file.object_scale * up.normalize_or_zero()).to_array(),
         };
         Self { hand, data }
     }
@@ -233,6 +247,7 @@ impl GraspData {
             open: places(&grasp.hand.open),
             width: grasp.width,
             opening: grasp.opening,
+            closing_turn: grasp.closing_turn,
             score: grasp.score,
             terms: grasp.terms.clone().into_iter().collect(),
             contacts: [contact(&grasp.contacts[0]), contact(&grasp.contacts[1])],

@@ -86,6 +86,8 @@ pub struct Group {
     pub title: String,
     /// What is known about them.
     pub facts: Vec<Fact>,
+    /// What was assumed, a sentence each.
+    pub notes: Vec<String>,
     /// The meshes, at least one.
     pub panels: Vec<Panel>,
     /// Ways to colour them, at least one.

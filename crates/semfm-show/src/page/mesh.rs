@@ -34,6 +34,7 @@ pub(super) fn mesh_group(path: &Path, task: &Task) -> Result<Group> {
         facts: Vec::new(),
         panels: vec![panel],
         layers,
+        notes: Vec::new(),
         source_of: None,
         pictures: Vec::new(),
         hands: None,

@@ -53,7 +53,8 @@ pub(super) fn motion_group(path: &Path, task: &Task) -> Result<Group> {
     };
     Ok(Group {
         title: super::mesh::file_name(path),
-        facts: facts(&motion, &bodies),
+        facts: facts(&motion),
+        notes: notes(&motion, &bodies),
         panels: vec![panel],
         layers: vec![Layer {
             name: "colours".into(),
@@ -71,7 +72,7 @@ fn n_joints(motion: &PlannedMotion) -> usize {
     motion.trajectory.joint_names.len()
 }
 
-fn facts(motion: &PlannedMotion, bodies: &MotionBodies) -> Vec<Fact> {
+fn facts(motion: &PlannedMotion) -> Vec<Fact> {
     let trajectory = &motion.trajectory;
     let n_points: usize = trajectory.segments.iter().map(|segment| segment.points.len()).sum();
     let mut facts = vec![
@@ -79,11 +80,14 @@ fn facts(motion: &PlannedMotion, bodies: &MotionBodies) -> Vec<Fact> {
         Fact::new("seconds", format!("{:.2}", trajectory.duration())),
         Fact::new("points", n_points),
     ];
-    facts.extend(motion.grasp.map(|grasp| Fact::new("grasp", grasp + 1)));
-    if !bodies.missing.is_empty() {
-        facts.push(Fact::new("meshes that cannot be read", bodies.missing.len()));
-    }
+    facts.extend(motion.grasp.map(|grasp| Fact::new("grasp", grasp)));
     facts
+}
+
+/// What was assumed when the motion was made, and what is not shown as it is.
+fn notes(motion: &PlannedMotion, bodies: &MotionBodies) -> Vec<String> {
+    let shown = bodies.notes().into_iter().filter(|note| !motion.notes.contains(note));
+    motion.notes.iter().cloned().chain(shown).collect()
 }
 
 /// From where the object at the grasp is seen best, or the arm where there is none.

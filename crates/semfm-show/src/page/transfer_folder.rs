@@ -176,6 +176,7 @@ impl TransferFolder {
                 panel("target", self.target, viewpoints.target),
             ],
             layers,
+            notes: Vec::new(),
             source_of: Some(self.map.source_of),
             pictures: Vec::new(),
             hands: None,

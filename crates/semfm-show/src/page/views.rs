@@ -30,6 +30,7 @@ pub(super) fn views_group(path: &Path, task: &Task) -> Result<Group> {
         facts: facts(&file),
         panels: vec![Panel::new("object", mesh, None, task)?],
         layers: vec![Layer::own_colors(colors)],
+        notes: Vec::new(),
         source_of: None,
         pictures,
         hands: None,

@@ -155,7 +155,7 @@ fn moments(motion: &PlannedMotion) -> Vec<Moment> {
 }
 
 fn title(motion: &PlannedMotion) -> String {
-    let grasp = motion.grasp.map(|grasp| format!(", grasp {}", grasp + 1)).unwrap_or_default();
+    let grasp = motion.grasp.map(|grasp| format!(", grasp {grasp}")).unwrap_or_default();
     let (name, seconds) = (&motion.scene.robot.robot.name, motion.trajectory.duration());
     format!("{name}{grasp}: {seconds:.1} s")
 }

@@ -17,7 +17,7 @@ use super::trajectory::FingerRecord;
 use super::{MatrixRows, write_json};
 use crate::grasp_result::{AnswerFrame, GraspResult, position_and_rotation};
 use crate::motion_scene::FingerJoint;
-use crate::{Error, Result};
+use crate::{Error, Result, Table};
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.grasps/1";
@@ -109,6 +109,9 @@ pub struct GraspRecord {
     pub normals: [[f64; 3]; 2],
     /// Ferrari and Canny's ε.
     pub epsilon: f64,
+    /// Angle by which the object turns while the pads close, radians; 0 in files of older versions.
+    #[serde(default)]
+    pub closing_turn: f64,
     /// Weighted mean of the terms, 0 to 1.
     pub score: f64,
     /// The terms of the score, each 0 to 1.
@@ -194,6 +197,15 @@ impl GraspsFile {
             table: None,
             settings: None,
         }
+    }
+
+    /// With the table that the object stands on, in its frame, metres.
+    pub fn with_table(mut self, table: Option<Table>) -> Self {
+        self.table = table.map(|Table { point, normal }| TableRecord {
+            point: point.to_array(),
+            normal: normal.to_array(),
+        });
+        self
     }
 
     /// With what [`GraspProblem::shares_of_poses`](crate::GraspProblem::shares_of_poses) tells of each
@@ -282,6 +294,7 @@ impl GraspRecord {
             contacts: grasp.contacts.map(|point| point.to_array()),
             normals: grasp.normals.map(|normal| normal.to_array()),
             epsilon: grasp.epsilon,
+            closing_turn: grasp.closing_turn,
             score: grasp.score,
             terms: terms.collect(),
             pose_share: None,

@@ -11,10 +11,9 @@ use serde_json::Value;
 use super::MatrixRows;
 use crate::Result;
 
-/// Farthest from 1 that the scale of a pose may be: calibrations round their numbers.
+/// Farthest from 1 that the scale of a pose may be, as far as [`Sim3::from_rows`] lets rotations be from one:
+/// calibrations round their numbers, and four digits pass.
 const SCALE_TOLERANCE: f64 = 1e-4;
-/// The same of a pose that this program wrote.
-pub(crate) const WRITTEN_SCALE_TOLERANCE: f64 = 1e-6;
 
 /// Reads a rigid pose: a bare 4 × 4 matrix, rows first, or an object with it in the field `name` (such as
 /// `base_from_camera`).
@@ -32,14 +31,15 @@ pub fn read_rigid_pose(path: &Path, name: &str) -> Result<Pose> {
     let rows = MatrixRows::deserialize(rows)
         .map_err(|error| FormatError::new(path, place, expected, error.to_string()))?;
     let expected = "rows of a rotation and a translation in metres";
-    let pose = rigid_pose(rows, SCALE_TOLERANCE);
+    let pose = rigid_pose(rows);
     Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
 }
 
-/// The rotation and translation of a matrix whose scale is within `tolerance` of 1; else what was found, in words.
-pub(crate) fn rigid_pose(rows: MatrixRows, tolerance: f64) -> std::result::Result<Pose, String> {
+/// The rotation and translation of a matrix whose scale is 1 to within 1e-4; else what was found, in words: wherever a
+/// pose of something that keeps its size comes from.
+pub fn rigid_pose(rows: MatrixRows) -> std::result::Result<Pose, String> {
     let motion = Sim3::from_rows(rows).map_err(|error| error.to_string())?;
-    if (motion.scale - 1.0).abs() > tolerance {
+    if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {
         return Err(format!("a scale of {}", motion.scale));
     }
     Ok(motion.rigid())
@@ -47,6 +47,8 @@ pub(crate) fn rigid_pose(rows: MatrixRows, tolerance: f64) -> std::result::Resul
 
 #[cfg(test)]
 mod tests {
+    use semfm_geom::math::DQuat;
+
     use super::*;
 
     fn read(text: &str) -> Result<Pose> {
@@ -63,6 +65,22 @@ mod tests {
         let bare = read(POSE).unwrap();
         assert_eq!(bare.translation.to_array(), [1.0, 2.0, 0.5]);
         assert_eq!(read(&format!("{{\"base_from_camera\": {POSE}}}")).unwrap(), bare);
+    }
+
+    #[test]
+    fn four_digits_are_enough() {
+        let turn = [[0.8660, -0.5, 0.0], [0.4330, 0.75, -0.5], [0.25, 0.4330, 0.8660]];
+        let pose = rigid_pose([
+            [turn[0][0], turn[0][1], turn[0][2], 0.1],
+            [turn[1][0], turn[1][1], turn[1][2], 0.2],
+            [turn[2][0], turn[2][1], turn[2][2], 0.3],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        // 30° about z, then 30° about x.
+        let found = pose.unwrap().rotation;
+        let half = std::f64::consts::FRAC_PI_6;
+        let expected = DQuat::from_rotation_x(half) * DQuat::from_rotation_z(half);
+        assert!(found.angle_between(expected) < 1e-3);
     }
 
     #[test]

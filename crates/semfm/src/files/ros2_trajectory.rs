@@ -2,7 +2,8 @@
 //! every installation has.
 //!
 //! `ros2 bag play FOLDER --clock` moves the robot in RViz (with `use_sim_time`), and a controller takes the
-//! trajectories as they are. Joints, links and frames have the names of the robot's description.
+//! trajectories as they are. Joints, links and frames have the names of the robot's description, which is sent as it is;
+//! a hand that it does not know is sent as markers (`/hand`).
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -14,9 +15,10 @@ use semfm_views::mcap::{
     Cdr, ChannelId, ChunkCompression, METADATA_NAME, McapWriter, Ros2Message, write_mcap,
 };
 
+use super::ros2_hand::hand_markers;
 use super::trajectory::FORMAT;
 use crate::grasp_result::position_and_rotation;
-use crate::{FrameOwner, MotionFrame, PlannedMotion, Result, SceneState};
+use crate::{MotionFrame, PlannedMotion, Result, SceneState};
 
 /// The bag's file.
 pub const BAG_FILE: &str = "trajectory.mcap";
@@ -73,6 +75,11 @@ const JOINTS: Topic = Topic {
     message: Ros2Message::JointState,
     durability: Durability::Volatile,
 };
+const HAND: Topic = Topic {
+    name: "/hand",
+    message: Ros2Message::MarkerArray,
+    durability: Durability::TransientLocal,
+};
 const TF: Topic =
     Topic { name: "/tf", message: Ros2Message::TfMessage, durability: Durability::Volatile };
 
@@ -116,6 +123,9 @@ impl Bag {
             .collect();
         let frames = MovingFrames::new(motion, &states);
         topics.push(once(TF_STATIC, frames.message(&frames.still, 0, 0)));
+        if let Some(hand) = &motion.scene.hand {
+            topics.push(once(HAND, hand_markers(hand, &frames.frames)));
+        }
         topics.push(once(ARM, arm_trajectory(motion)));
         if !motion.scene.robot.fingers.is_empty() {
             topics.push(once(FINGERS, finger_trajectory(motion)));
@@ -310,17 +320,13 @@ struct MovingFrames {
 }
 
 impl MovingFrames {
-    /// Parts of a hand that the description does not know are left out.
     fn new(motion: &PlannedMotion, states: &[TrajectoryPoint]) -> Self {
         let frames = motion.scene.frames();
         let poses: Vec<_> =
             states.iter().map(|state| motion.scene.poses(&motion.state_of(state))).collect();
-        let is_known = |&i: &usize| {
-            frames[i].parent.is_some() && !matches!(frames[i].owner, FrameOwner::HandPart(_))
-        };
         let stays = |&i: &usize| poses.iter().all(|at| at[i] == poses[0][i]);
-        let known = (0..frames.len()).filter(is_known);
-        let (still, moving) = known.partition(stays);
+        let with_parent = (0..frames.len()).filter(|&i| frames[i].parent.is_some());
+        let (still, moving) = with_parent.partition(stays);
         Self { frames, poses, still, moving }
     }
 

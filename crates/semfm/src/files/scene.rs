@@ -1,18 +1,15 @@
 //! `scene.json`: what stands around an arm.
 
 use std::path::{Component, Path, PathBuf};
-use std::sync::Arc;
 
 use parry3d_f64::math::Pose;
-use semfm_geom::Mesh;
 use semfm_geom::io::{FormatError, MeshOrPoints, read_json, read_mesh, read_mesh_or_points};
 use semfm_geom::math::{DQuat, DVec3};
-use semfm_motion::Scene;
 use semfm_robot::Geometry;
 use serde::{Deserialize, Serialize};
 
 use super::write_json;
-use crate::{MotionObstacle, ObstacleShape, Result};
+use crate::{Result, SceneContents};
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.scene/1";
@@ -141,15 +138,6 @@ pub struct TablePlaneRecord {
     pub normal: [f64; 3],
 }
 
-/// A scene with the files that it names, for collision checks and for what is drawn.
-#[derive(Clone, Debug)]
-pub struct SceneContents {
-    /// For collision checks.
-    pub scene: Scene,
-    /// For pictures and for files that keep the scene.
-    pub obstacles: Vec<MotionObstacle>,
-}
-
 fn unturned() -> [f64; 4] {
     [0.0, 0.0, 0.0, 1.0]
 }
@@ -208,7 +196,7 @@ impl SceneFile {
     /// a quaternion whose length is not 1, a file outside the folder. [`Error::Geom`](crate::Error::Geom) for a mesh or
     /// cloud that cannot be read, [`Error::Motion`](crate::Error::Motion) for a name that occurs twice.
     pub fn contents(&self, path: &Path) -> Result<SceneContents> {
-        let mut reading = Reading { path, scene: Scene::new(), obstacles: Vec::new() };
+        let mut reading = Reading { path, contents: SceneContents::new() };
         for (i, record) in self.boxes.iter().enumerate() {
             let at = reading.pose(("boxes", i), record.position, record.quaternion_xyzw)?;
             let size = DVec3::from_array(record.size);
@@ -232,10 +220,11 @@ impl SceneFile {
             let at = reading.pose(("clouds", i), record.position, record.quaternion_xyzw)?;
             reading.cloud(i, record, at)?;
         }
-        for record in &self.tables {
-            reading.table(record)?;
+        for TablePlaneRecord { name, point, normal } in &self.tables {
+            let [point, normal] = [*point, *normal].map(DVec3::from_array);
+            reading.add(|contents| contents.with_table(name, point, normal))?;
         }
-        Ok(SceneContents { scene: reading.scene, obstacles: reading.obstacles })
+        Ok(reading.contents)
     }
 }
 
@@ -250,8 +239,7 @@ pub fn read_scene(path: &Path) -> Result<SceneContents> {
 /// What was read so far.
 struct Reading<'a> {
     path: &'a Path,
-    scene: Scene,
-    obstacles: Vec<MotionObstacle>,
+    contents: SceneContents,
 }
 
 impl Reading<'_> {
@@ -290,43 +278,27 @@ impl Reading<'_> {
             let (place, expected) = (format!("{list}[{i}]"), "finite lengths of at least 0");
             return Err(FormatError::new(self.path, place, expected, size.to_string()).into());
         }
-        self.scene = self.scene.clone().with_primitive(name, &shape, at)?;
-        self.add(name, at, ObstacleShape::Primitive(shape));
-        Ok(())
+        self.add(|contents| contents.with_primitive(name, &shape, at))
     }
 
     fn mesh(&mut self, i: usize, record: &MeshRecord, at: Pose) -> Result<()> {
-        let place = format!("meshes[{i}]");
-        let mesh = read_mesh(self.file(&place, &record.file)?)?.mesh;
-        self.scene = self.scene.clone().with_mesh(&record.name, &mesh, record.scale, at)?;
-        let points = mesh.vertices().iter().map(|&p| p * record.scale).collect();
-        let in_metres = Mesh::new(points, mesh.faces().to_vec())?;
-        self.add(&record.name, at, ObstacleShape::Mesh(Arc::new(in_metres)));
-        Ok(())
+        let mesh = read_mesh(self.file(&format!("meshes[{i}]"), &record.file)?)?.mesh;
+        self.add(|contents| contents.with_mesh(&record.name, &mesh, record.scale, at))
     }
 
     fn cloud(&mut self, i: usize, record: &CloudObstacleRecord, at: Pose) -> Result<()> {
-        let place = format!("clouds[{i}]");
-        let points = match read_mesh_or_points(self.file(&place, &record.file)?)? {
+        let points = match read_mesh_or_points(self.file(&format!("clouds[{i}]"), &record.file)?)? {
             MeshOrPoints::Points(cloud) => cloud.points,
             // A mesh may stand for its vertices.
             MeshOrPoints::Mesh(file) => file.mesh.vertices().to_vec(),
         };
-        self.scene = self.scene.clone().with_cloud(&record.name, &points, record.margin, at)?;
-        self.add(&record.name, at, ObstacleShape::Points(points));
-        Ok(())
+        self.add(|contents| contents.with_cloud(&record.name, points, record.margin, at))
     }
 
-    fn table(&mut self, record: &TablePlaneRecord) -> Result<()> {
-        let [point, normal] = [record.point, record.normal].map(DVec3::from_array);
-        self.scene = self.scene.clone().with_table(&record.name, point, normal)?;
-        let turn = DQuat::from_rotation_arc(DVec3::Z, normal.normalize());
-        self.add(&record.name, Pose::from_parts(point, turn), ObstacleShape::HalfSpace);
+    /// What was read so far, with one obstacle more.
+    fn add(&mut self, with: impl FnOnce(SceneContents) -> Result<SceneContents>) -> Result<()> {
+        self.contents = with(std::mem::take(&mut self.contents))?;
         Ok(())
-    }
-
-    fn add(&mut self, name: &str, at: Pose, shape: ObstacleShape) {
-        self.obstacles.push(MotionObstacle { name: name.into(), base_from_obstacle: at, shape });
     }
 
     /// A file that the scene names: inside of its folder, links followed.

@@ -13,7 +13,7 @@ use semfm_robot::{Geometry, Robot, RobotDescription};
 use serde::{Deserialize, Serialize};
 
 use super::grasps::{PartRecord, rows};
-use super::rigid_pose::{WRITTEN_SCALE_TOLERANCE, rigid_pose};
+use super::rigid_pose::rigid_pose;
 use super::trajectory_check::check_segments;
 use super::{MatrixRows, write_json};
 use crate::{
@@ -23,6 +23,9 @@ use crate::{
 
 /// The format that is written.
 pub const FORMAT: &str = "semfm.trajectory/1";
+
+/// The file of an object's mesh that came from none, in the folder of the trajectory.
+pub const OBJECT_FILE: &str = "object.ply";
 
 /// A motion as its file has it. Poses are 4 × 4 matrices, rows first, in the frame of the arm's base link; lengths are
 /// metres, angles radians, times seconds. The robot's description and the object's mesh are named with their hashes,
@@ -46,6 +49,9 @@ pub struct TrajectoryFile {
     pub obstacles: Vec<ObstacleRecord>,
     /// Which grasp is carried out: its place in the file of grasps, from 0.
     pub grasp: Option<usize>,
+    /// What was found or assumed, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// The robot of a [`TrajectoryFile`].
@@ -163,7 +169,8 @@ pub enum ShapeRecord {
 }
 
 impl TrajectoryFile {
-    /// The file of a motion that will stand in `folder`. Reads the robot's description for its hash.
+    /// The file of a motion that will stand in `folder`. Reads the robot's description for its hash. An object without a
+    /// file is named [`OBJECT_FILE`].
     ///
     /// # Errors
     /// [`semfm_geom::Error::Io`] where the description cannot be read; [`Error::Invalid`] for an obstacle that is the
@@ -177,13 +184,17 @@ impl TrajectoryFile {
             robot: MotionRobotRecord::new(robot, folder)?,
             hand: hand.as_ref().map(MountedHandRecord::new),
             object: object.as_ref().map(|object| MotionObjectRecord {
-                file: relative(&object.file, folder),
+                file: object
+                    .file
+                    .as_ref()
+                    .map_or_else(|| OBJECT_FILE.into(), |file| relative(file, folder)),
                 mesh: MeshIdentity::of(&object.mesh),
                 scale: object.scale,
                 base_from_object: rows(object.base_from_object),
             }),
             obstacles: obstacles.iter().map(ObstacleRecord::new).collect::<Result<_>>()?,
             grasp: motion.grasp,
+            notes: motion.notes.clone(),
         })
     }
 
@@ -234,6 +245,7 @@ pub fn read_motion(path: &Path) -> Result<PlannedMotion> {
         scene: MotionScene { robot, hand, object, obstacles: obstacles? },
         trajectory: Trajectory { joint_names: file.joint_names, segments: file.segments },
         grasp: file.grasp,
+        notes: file.notes,
     })
 }
 
@@ -354,7 +366,12 @@ impl MotionObjectRecord {
         let mesh = read_mesh(&file)?.mesh;
         self.mesh.check(&mesh).map_err(|error| error.in_file(path))?;
         let base_from_object = pose(path, "object.base_from_object", self.base_from_object)?;
-        Ok(MotionObject { mesh: Arc::new(mesh), file, scale: self.scale, base_from_object })
+        Ok(MotionObject {
+            mesh: Arc::new(mesh),
+            file: Some(file),
+            scale: self.scale,
+            base_from_object,
+        })
     }
 }
 
@@ -454,8 +471,7 @@ fn check_finite(path: &Path, place: &str, numbers: &[f64]) -> Result<()> {
 /// A rotation and a translation.
 fn pose(path: &Path, place: &str, rows: MatrixRows) -> Result<Pose> {
     let expected = "rows of a rotation and a translation";
-    let pose = rigid_pose(rows, WRITTEN_SCALE_TOLERANCE);
-    Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
+    Ok(rigid_pose(rows).map_err(|found| FormatError::new(path, place, expected, found))?)
 }
 
 fn hash_of(bytes: &[u8]) -> MeshHash {

@@ -1,7 +1,7 @@
 // Hands at the object: one grasp after the other, with the terms of its score, or the best few together.
 // Matrices are 3 × 4, rows one after the other. Data of a group: {parts: [{carrier, kind, positions,
-// faces}], grasps: [{place, closed, open, width, opening, score, terms, contacts}], arrow, ball, table,
-// colors, ranks, opacity}: see `hands.rs`.
+// faces}], grasps: [{place, closed, open, width, opening, closingTurn, score, terms, contacts}], arrow, ball,
+// table, colors, ranks, opacity, retreat, lift}: see `hands.rs`.
 
 // What 1 means for each term of a score.
 const TERMS = {
@@ -30,8 +30,6 @@ function moved(m, [x, y, z]) {
   return [0, 4, 8].map(r => m[r] * x + m[r + 1] * y + m[r + 2] * z + m[r + 3]);
 }
 
-const AT_REST = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
-
 class Hands {
   constructor(data) {
     this.data = data;
@@ -42,7 +40,13 @@ class Hands {
     this.at = 0;
     this.isOpen = false;
     this.isTogether = false;
+    // The grasp over time, while it is shown so.
+    this.grasping = null;
   }
+
+  // How far the object is lifted, and how much smaller everything is drawn to make room for that.
+  lift() { return this.grasping ? this.grasping.lift() : [0, 0, 0]; }
+  get reduction() { return this.grasping ? 0.72 : 1; }
 
   // How many are drawn together: each has a colour of its own.
   get nTogether() { return Math.min(this.data.ranks.length, this.data.grasps.length); }
@@ -60,14 +64,16 @@ class Hands {
   // What is drawn beside the object: solid things, then translucent ones.
   items() {
     const { colors, grasps, table } = this.data, items = [];
-    if (table) items.push({ shape: table, place: AT_REST, color: colors.table, alpha: 1, isTable: true });
-    if (this.isTogether) {
+    // The object stands still in the frame of the panel; lifted, it leaves the table below.
+    const [dx, dy, dz] = this.lift(), tablePlace = [1, 0, 0, -dx, 0, 1, 0, -dy, 0, 0, 1, -dz];
+    if (table) items.push({ shape: table, place: tablePlace, color: colors.table, alpha: 1, isTable: true });
+    if (this.isTogether && !this.grasping) {
       for (let rank = this.nTogether - 1; rank >= 0; rank--) this.addHand(items, grasps[rank], this.data.ranks[rank]);
       return items;
     }
     const grasp = grasps[this.at];
-    items.push({ shape: this.data.arrow, place: grasp.place, color: colors.approach, alpha: 1 });
-    for (const [x, y, z] of grasp.contacts) {
+    if (!this.grasping) items.push({ shape: this.data.arrow, place: grasp.place, color: colors.approach, alpha: 1 });
+    if (!this.grasping || this.grasping.isTouching) for (const [x, y, z] of grasp.contacts) {
       items.push({ shape: this.data.ball, place: [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z], color: colors.contact, alpha: 1 });
     }
     this.addHand(items, grasp, colors);
@@ -75,9 +81,10 @@ class Hands {
   }
 
   addHand(items, grasp, colors) {
-    const poses = this.isOpen ? grasp.open : grasp.closed;
+    const moving = this.grasping, place = moving ? moving.place(grasp) : grasp.place;
+    const poses = moving ? moving.poses(grasp) : this.isOpen ? grasp.open : grasp.closed;
     for (const part of this.data.parts) {
-      items.push({ shape: part, place: chain(grasp.place, poses[part.carrier]), color: colors[part.kind], alpha: this.data.opacity });
+      items.push({ shape: part, place: chain(place, poses[part.carrier]), color: colors[part.kind], alpha: this.data.opacity });
     }
   }
 }
@@ -93,6 +100,7 @@ class HandControls {
     this.terms = element("div", null, "terms");
     this.bars = grasps.map((grasp, i) => this.scoreBar(grasp, i));
     const steps = [button("‹ previous", () => this.step(-1)), this.title, button("next ›", () => this.step(1))];
+    this.grasping = new GraspingControls(panel, hands);
     const few = `the best ${hands.nTogether} together, the better the darker`;
     this.element = element("aside", [
       element("h3", "Grasps, best first"),
@@ -100,7 +108,7 @@ class HandControls {
       element("div", grasps.length > 1 ? this.bars : [], "all"),
       this.checkbox("hand open, as it comes", on => { hands.isOpen = on; }),
       ...(hands.nTogether > 1 ? [this.checkbox(few, on => { hands.isTogether = on; })] : []),
-      this.numbers, this.terms, this.legend(),
+      this.grasping.element, this.numbers, this.terms, this.legend(),
     ], "grasps");
     this.show(0);
   }
@@ -108,15 +116,15 @@ class HandControls {
   scoreBar({ score }, i) {
     const bar = element("i"), made = button(bar, () => this.show(i));
     bar.style.height = `${Math.max(4, 100 * score)}%`;
-    made.setAttribute("aria-label", `grasp ${i + 1}, score ${score.toFixed(2)}`);
-    made.title = `grasp ${i + 1}, score ${score.toFixed(2)}`;
+    made.setAttribute("aria-label", `grasp ${i}, score ${score.toFixed(2)}`);
+    made.title = `grasp ${i}, score ${score.toFixed(2)}`;
     return made;
   }
 
   checkbox(text, answer) {
     const box = element("input");
     box.type = "checkbox";
-    box.addEventListener("change", () => { answer(box.checked); this.panel.draw(); });
+    box.addEventListener("change", () => { this.grasping.leave(); answer(box.checked); this.panel.moved(); });
     return element("label", [box, ` ${text}`]);
   }
 
@@ -135,12 +143,13 @@ class HandControls {
   show(i) {
     const grasp = this.hands.data.grasps[i], millimetres = x => `${(1e3 * x).toFixed(1)} mm`;
     this.hands.at = i;
-    this.title.textContent = `grasp ${i + 1} of ${this.bars.length}`;
+    this.grasping.leave();
+    this.title.textContent = `grasp ${i}, of 0 to ${this.bars.length - 1}`;
     this.bars.forEach((bar, k) => bar.setAttribute("aria-pressed", String(k === i)));
-    const numbers = [["score", grasp.score.toFixed(3)], ["between the pads", millimetres(grasp.width)], ["on the way in", millimetres(grasp.opening)]];
+    const numbers = [["score", grasp.score.toFixed(3)], ["between the pads", millimetres(grasp.width)], ["on the way in", millimetres(grasp.opening)], ["turn while closing", `${(180 / Math.PI * grasp.closingTurn).toFixed(1)}°`]];
     this.numbers.replaceChildren(...numbers.flatMap(([name, value]) => [element("dt", name), element("dd", value)]));
     this.terms.replaceChildren(...grasp.terms.flatMap(([name, value]) => this.term(name, value)));
-    this.panel.draw();
+    this.panel.moved();
   }
 
   term(name, value) {

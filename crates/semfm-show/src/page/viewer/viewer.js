@@ -1,5 +1,5 @@
 // The page: groups of panels side by side, in one of several layers of colour. Data: {plain, marked,
-// groups: [{title, facts: [{name, value}], layers: [{name, kind, legend: [{color, text}]}], panels: [{name,
+// groups: [{title, facts: [{name, value}], notes: [text], layers: [{name, kind, legend: [{color, text}]}], panels: [{name,
 // note, n, step, positions, faces, upright, yaw, pitch, colors}], sourceOf, pictures: [{name, png, yaw,
 // pitch}], hands, motion}]}. Arrays are read by `decode.js`, hands by `hands.js`, motions by `motion.js`.
 
@@ -109,6 +109,13 @@ function factsList(facts) {
   return element("ul", facts.map(fact => element("li", [`${fact.name} `, element("b", fact.value, verdictClass(fact))])), "facts");
 }
 
+// What was assumed, folded away.
+function notesList(notes) {
+  if (!notes.length) return [];
+  const title = notes.length > 1 ? `${notes.length} notes: what was found or assumed` : "1 note: what was found or assumed";
+  return [element("details", [element("summary", title), element("ul", notes.map(note => element("li", note)))], "notes")];
+}
+
 // A colour, three numbers from 0 to 1, and what it stands for.
 function swatch(color, text) {
   const made = element("i");
@@ -175,6 +182,7 @@ async function addGroup(painter, group, weightColors) {
   document.getElementById("main").append(element("section", [
     element("h2", group.title),
     factsList(group.facts),
+    ...notesList(group.notes),
     element("div", [...buttons, cameraControls(panels)], "controls"),
     legend,
     ...figures(group, panels, hands),
