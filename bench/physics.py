@@ -20,7 +20,7 @@ help to hold. The pads begin 3 mm off the object and close at a constant speed u
 
 **Trial.** The hand stands still and gravity moves, which by the equivalence of both is the same for every
 acceleration; centrifugal forces of the slow tilt are left out. Weight comes on, the hand lifts with 4 m/s²,
-is shaken along three axes (5 m/s², 5 Hz) and tilted: the weight goes around a cone of 45°. Where the file
+is shaken once along each of three axes (5 m/s², 6.7 Hz) and tilted: the weight goes around a cone of 45°. Where the file
 names a table its normal is up, otherwise the hand comes from above.
 
 Each seed moves hand and object against each other by 1 mm and 1.5° (standard deviations). A trial tells
@@ -382,7 +382,7 @@ class Bench:
 class Schedule:
     """Gravity in the hand's frame over time, less the hand's own acceleration."""
 
-    LIFT, SHAKE, TILT = 0.3, 0.6, 0.8
+    LIFT, SHAKE, TILT = 0.25, 0.45, 0.6
 
     def __init__(self, down: np.ndarray):
         self.down = down / np.linalg.norm(down)
@@ -399,13 +399,13 @@ class Schedule:
         if t < 0:
             return np.zeros(3)
         if t < self.LIFT:
-            weight = G * min(1.0, t / 0.1)
-            lift = 4.0 * np.sign(0.2 - t) if t > 0.1 else 0.0
+            weight = G * min(1.0, t / 0.05)
+            lift = 4.0 * np.sign(0.15 - t) if t > 0.05 else 0.0
             return (weight + lift) * self.down
         t -= self.LIFT
         if t < self.SHAKE:
             axis = np.eye(3)[int(3 * t / self.SHAKE)]
-            return G * self.down + 5.0 * np.sin(2 * np.pi * 5 * t) * axis
+            return G * self.down + 5.0 * np.sin(2 * np.pi * 3 * t / self.SHAKE) * axis
         s = (t - self.SHAKE) / self.TILT
         angle = np.radians(45) * min(1.0, 5 * s, max(0.0, 5 * (1 - s)))
         around = 2 * np.pi * np.clip((s - 0.2) / 0.6, 0, 1)

@@ -29,6 +29,12 @@ const MOST_PAIRS: usize = 4;
 /// Share of half the pad's length by which the contacts may lie off its middle.
 const OFF_CENTRE: f64 = 0.7;
 
+/// Pads longer than this, metres, also hold with their tips alone: what is short to hold on leaves no room for all of one.
+const LONG_PAD: f64 = 0.03;
+
+/// The part of a pad's length that is its tip.
+const TIP: f64 = 0.3;
+
 /// Points nearer than this (metres) are one surface.
 const SAME_SURFACE: f64 = 1e-5;
 
@@ -42,7 +48,7 @@ pub(crate) fn antipodal(
     rng: &mut impl Rng,
     out: &mut Vec<Candidate>,
 ) {
-    let Surface::Mesh { normals, .. } = object.surface() else { return };
+    let Surface::Mesh { normals, .. } = &object.touched().surface else { return };
     if seed.normal == DVec3::ZERO {
         return;
     }
@@ -57,7 +63,7 @@ pub(crate) fn antipodal(
         // Known inside: into it. Otherwise the face may be wound either way.
         let direction = if object.is_signed() || rng.random::<bool>() { tilted } else { -tilted };
         // Beyond the opening too: that the object is there, but too thick, is an answer.
-        let hits = object.obstacle().crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
+        let hits = object.touched().tree.crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
         let opposite = hits
             .iter()
             .filter(|(_, face)| *face != seed.item)
@@ -93,8 +99,13 @@ fn pair(
     for k in 0..APPROACHES {
         let angle = TAU * (k as f64 + start) / APPROACHES as f64;
         let approach = DQuat::from_axis_angle(closing, angle) * across;
-        // Every other one holds with the middle of the pads, the rest anywhere along them.
-        let off = if k % 2 == 0 { 0.0 } else { OFF_CENTRE * (rng.random::<f64>() - 0.5) };
+        // Every other one holds with the middle of the pads, the rest anywhere along them; long pads with their tips, too.
+        let share = rng.random::<f64>();
+        let off = match k % 4 {
+            0 | 2 => 0.0,
+            1 if gripper.pad()[1] > LONG_PAD => -0.5 + TIP * (0.2 + 0.8 * share),
+            _ => OFF_CENTRE * (share - 0.5),
+        };
         let place = middle + approach * (off * gripper.pad()[1]);
         let tcp = Pose::from_parts(place, rotation(closing, approach));
         out.push(Candidate { tcp, seed: [-t / 2.0, t / 2.0] });

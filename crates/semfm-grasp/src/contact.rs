@@ -7,13 +7,19 @@ use semfm_geom::math::{DMat3, DVec3};
 
 use crate::clip::Polygon;
 use crate::gripper_geometry::GripperGeometry;
-use crate::object::{GraspObject, Region, Surface};
+use crate::object::{Body, Surface};
+#[cfg(test)]
+use crate::object::{GraspObject, Region};
 use crate::solid::Solid;
 
 /// Each pad stops this far before the object's first point (metres), and the rest of the gripper stays
 /// away by half of it: far above rounding, in this program or another, and far below what a robot
 /// can place.
 pub(crate) const TOUCH_GAP: f64 = 1e-4;
+
+/// On a rough surface the normal at a contact is the mean within this of it, metres: a fingertip's pad gives way over
+/// about as much.
+const NORMAL_RADIUS: f64 = 3e-3;
 
 /// The object between closed pads.
 #[derive(Clone, Debug)]
@@ -51,18 +57,34 @@ struct Piece {
     item: u32,
     /// Whether it reaches beyond the prism, so that only a part of it counts.
     cut: bool,
+    /// Whether `low` and `high` are those of the part inside; else they enclose them. Cutting is most of the work,
+    /// and what lies within the held stretch as a whole need not be cut to know that.
+    settled: bool,
     low: f64,
     high: f64,
 }
 
-/// Closes the pads on what lies between them.
-///
-/// `tcp` is object_from_tcp; `seed` an interval along its y axis that the grasp is to hold. The held
-/// part grows from the seed over every gap too narrow for a finger, and may be wider than the gripper
-/// opens. `None` where there is nothing to hold.
+/// [`close_on`] the surface on which contacts are sought.
+#[cfg(test)]
 pub(crate) fn close(
     object: &GraspObject,
     region: &Region,
+    gripper: &GripperGeometry,
+    tcp: &Pose,
+    seed: [f64; 2],
+    compliance: f64,
+) -> Option<Closing> {
+    close_on(object.touched(), region.touched(), gripper, tcp, seed, compliance)
+}
+
+/// Closes the pads on what lies between them.
+///
+/// `weights` has one number for each vertex or point of the body; `tcp` is object_from_tcp; `seed` an
+/// interval along its y axis that the grasp is to hold. The held part grows from the seed over every gap
+/// too narrow for a finger, and may be wider than the gripper opens. `None` where there is nothing to hold.
+pub(crate) fn close_on(
+    body: &Body,
+    weights: &[f64],
     gripper: &GripperGeometry,
     tcp: &Pose,
     seed: [f64; 2],
@@ -78,8 +100,8 @@ pub(crate) fn close(
     let (mut reach, far) = (half + 1.01 * gap, half.max(widest));
     let (prism, pieces, [low, high]) = loop {
         let prism = Prism::new(&seeded, DVec3::new(x, reach, z));
-        let pieces = prism.pieces(object);
-        let held = held_interval(&pieces, half, gap)?;
+        let mut pieces = prism.pieces(body);
+        let held = prism.held_interval(&mut pieces, half, gap)?;
         if reach >= far || held[1].max(-held[0]) <= reach - gap {
             break (prism, pieces, held);
         }
@@ -87,15 +109,35 @@ pub(crate) fn close(
     };
     let centred = Pose::from_parts(seeded * DVec3::new(0.0, (low + high) / 2.0, 0.0), tcp.rotation);
     let shift = (low + high) / 2.0;
-    let depth = match object.surface() {
+    let depth = match body.surface {
         Surface::Mesh { .. } => compliance,
-        Surface::Cloud { spacing, .. } => compliance.max(*spacing),
+        Surface::Cloud { spacing, .. } => compliance.max(spacing),
     };
-    let left = prism.gather(&pieces, [-1.0, low], depth, object, region)?;
-    let right = prism.gather(&pieces, [1.0, high], depth, object, region)?;
+    let left = prism.gather(&pieces, [-1.0, low], depth, body, weights)?;
+    let right = prism.gather(&pieces, [1.0, high], depth, body, weights)?;
     let aim = (left.centre + right.centre) / 2.0;
-    let patches = [left, right].map(|patch| patch.into_patch(aim, shift, &centred));
+    let patches = [left, right].map(|patch| patch.into_patch(aim, shift, &centred, body.is_rough));
     Some(Closing { tcp: centred, width: high - low, patches })
+}
+
+/// The pads closed on `working`, moved apart to where the first points of another surface of the same object
+/// stop them: `exact` lies within `reach` (metres) of the working one. Contacts and patches stay.
+pub(crate) fn widened(
+    closing: Closing,
+    exact: &Body,
+    gripper: &GripperGeometry,
+    reach: f64,
+) -> Closing {
+    let [x, z] = gripper.pad().map(|extent| extent / 2.0);
+    let half = closing.width / 2.0;
+    let ends = [-1.0, 1.0].map(|side| {
+        let frame = closing.tcp * Pose::from_translation(side * half * DVec3::Y);
+        let slab = Prism::new(&frame, DVec3::new(x, reach, z));
+        let outermost = slab.outermost(exact, side);
+        side * half + side * outermost.unwrap_or(0.0)
+    });
+    let shift = Pose::from_translation(DVec3::Y * (ends[0] + ends[1]) / 2.0);
+    Closing { tcp: closing.tcp * shift, width: ends[1] - ends[0], ..closing }
 }
 
 /// The space that the pads sweep, around the seed.
@@ -112,30 +154,49 @@ impl Prism {
         Self { solid: Solid::oriented_box(*frame, half), half, turn }
     }
 
-    fn pieces(&self, object: &GraspObject) -> Vec<Piece> {
-        let mut pieces = Vec::with_capacity(128);
-        for item in object.obstacle().near(&self.solid, 0.0) {
-            let corners = object.obstacle().corners(item);
-            let corners @ [a, b, c] = corners.map(|p| self.solid.local(p));
+    fn pieces(&self, body: &Body) -> Vec<Piece> {
+        let mut pieces = Vec::with_capacity(256);
+        for item in body.tree.near(&self.solid, 0.0) {
+            let corners @ [a, b, c] = body.tree.corners(item).map(|p| self.solid.local(p));
             let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             if (low.cmpgt(self.half) | high.cmplt(-self.half)).any() {
                 continue;
             }
             let cut = (high.cmpgt(self.half) | low.cmplt(-self.half)).any();
-            let [low, high] =
-                if cut { self.extent(corners, [low.y, high.y]) } else { [low.y, high.y] };
-            if low <= high {
-                pieces.push(Piece { corners, item, cut, low, high });
-            }
+            let (low, high) = (low.y.max(-self.half.y), high.y.min(self.half.y));
+            pieces.push(Piece { corners, item, cut, settled: !cut, low, high });
         }
         pieces
+    }
+
+    /// How far along `side` (-1 or +1) the surface reaches, in the prism's frame; `None` where nothing is inside.
+    fn outermost(&self, body: &Body, side: f64) -> Option<f64> {
+        let mut most = None;
+        for mut piece in self.pieces(body) {
+            let end = |piece: &Piece| if side < 0.0 { -piece.low } else { piece.high };
+            if most.is_none_or(|most| end(&piece) > most) {
+                self.settle(&mut piece);
+                if piece.low <= piece.high && most.is_none_or(|most| end(&piece) > most) {
+                    most = Some(end(&piece));
+                }
+            }
+        }
+        most
+    }
+
+    /// Cuts a piece, so that its extent is that of the part inside: empty (low above high) where there is none.
+    fn settle(&self, piece: &mut Piece) {
+        if !piece.settled {
+            [piece.low, piece.high] = self.extent(piece.corners, [piece.low, piece.high]);
+            piece.settled = true;
+        }
     }
 
     /// Extent along y of the triangle's part inside; empty (low above high) where there is none.
     fn extent(&self, corners: [DVec3; 3], whole: [f64; 2]) -> [f64; 2] {
         let is_beside = corners.iter().any(|p| p.x.abs() > self.half.x || p.z.abs() > self.half.z);
         if !is_beside {
-            return [whole[0].max(-self.half.y), whole[1].min(self.half.y)];
+            return whole;
         }
         let inside = self.inside(corners, [0.0; 3]);
         inside
@@ -153,6 +214,51 @@ impl Prism {
         polygon
     }
 
+    /// The stretch of surface around [-half, half] that no gap wider than `gap` interrupts.
+    fn held_interval(&self, pieces: &mut [Piece], half: f64, gap: f64) -> Option<[f64; 2]> {
+        // A seed may lie a rounding error beside its own surface, or wholly inside of something solid.
+        let mut held = self
+            .extent_near(pieces, half + 1e-6)
+            .or_else(|| self.extent_near(pieces, half + gap))?;
+        loop {
+            let before = held;
+            for piece in pieces.iter_mut() {
+                let is_within = piece.low >= held[0] && piece.high <= held[1];
+                let is_near =
+                    |piece: &Piece| piece.low <= held[1] + gap && piece.high >= held[0] - gap;
+                if is_within || !is_near(piece) {
+                    continue;
+                }
+                self.settle(piece);
+                if is_near(piece) {
+                    held = [held[0].min(piece.low), held[1].max(piece.high)];
+                }
+            }
+            if held == before {
+                return Some(held);
+            }
+        }
+    }
+
+    /// Extent along y of the pieces that reach into [-half, half]; `None` where none does.
+    fn extent_near(&self, pieces: &mut [Piece], half: f64) -> Option<[f64; 2]> {
+        let reaches_in = |piece: &Piece| piece.low <= half && piece.high >= -half;
+        let mut held = [f64::INFINITY, f64::NEG_INFINITY];
+        for settled in [true, false] {
+            for piece in pieces.iter_mut().filter(|piece| piece.settled == settled) {
+                let is_within = piece.low >= held[0] && piece.high <= held[1];
+                if is_within || !reaches_in(piece) {
+                    continue;
+                }
+                self.settle(piece);
+                if reaches_in(piece) {
+                    held = [held[0].min(piece.low), held[1].max(piece.high)];
+                }
+            }
+        }
+        (held[0] <= held[1]).then_some(held)
+    }
+
     /// What lies within `compliance` of the pad at `end`; `side` is -1 or +1. `None` where nothing
     /// shows the pad any area.
     fn gather(
@@ -160,8 +266,8 @@ impl Prism {
         pieces: &[Piece],
         [side, end]: [f64; 2],
         compliance: f64,
-        object: &GraspObject,
-        region: &Region,
+        body: &Body,
+        weights: &[f64],
     ) -> Option<Gathered> {
         let mut sum = Gathered::new(side);
         for piece in pieces {
@@ -170,15 +276,15 @@ impl Prism {
                 continue;
             }
             let item = piece.item as usize;
-            let normal = self.turn * object.surface().normal(item);
+            let normal = self.turn * body.surface.normal(item);
             let faces = normal.y * side;
-            if faces == 0.0 || (object.is_signed() && faces < 0.0) {
+            if faces == 0.0 || (body.is_signed && faces < 0.0) {
                 continue;
             }
             let normal = normal * faces.signum();
-            match object.surface() {
+            match &body.surface {
                 Surface::Mesh { mesh, .. } => {
-                    let weights = mesh.faces()[item].map(|id| region.weight(id as usize));
+                    let weights = mesh.faces()[item].map(|id| weights[id as usize]);
                     let mut polygon = if piece.cut {
                         self.inside(piece.corners, weights)
                     } else {
@@ -191,7 +297,7 @@ impl Prism {
                     }
                 }
                 Surface::Cloud { area, .. } => {
-                    sum.add(piece.corners, area * faces.abs(), normal, region.weight(item));
+                    sum.add(piece.corners, area * faces.abs(), normal, weights[item]);
                 }
             }
         }
@@ -199,32 +305,11 @@ impl Prism {
     }
 }
 
-/// The stretch of surface around [-half, half] that no gap wider than `gap` interrupts.
-fn held_interval(pieces: &[Piece], half: f64, gap: f64) -> Option<[f64; 2]> {
-    // A seed may lie a rounding error beside its own surface, or wholly inside of something solid.
-    let mut held = extent_near(pieces, half + 1e-6).or_else(|| extent_near(pieces, half + gap))?;
-    loop {
-        let before = held;
-        for piece in pieces {
-            if piece.low <= held[1] + gap && piece.high >= held[0] - gap {
-                held = [held[0].min(piece.low), held[1].max(piece.high)];
-            }
-        }
-        if held == before {
-            return Some(held);
-        }
-    }
-}
-
-/// Extent along y of the pieces that reach into [-half, half]; `None` where none does.
-fn extent_near(pieces: &[Piece], half: f64) -> Option<[f64; 2]> {
-    let held = pieces
-        .iter()
-        .filter(|piece| piece.low <= half && piece.high >= -half)
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], piece| {
-            [low.min(piece.low), high.max(piece.high)]
-        });
-    (held[0] <= held[1]).then_some(held)
+/// How far `aim` lies from the box around a triangle as a pad sees it: no point of the triangle is nearer.
+fn distance_to_box([a, b, c]: &[DVec3; 3], aim: DVec3) -> f64 {
+    let (low, high) = (a.min(*b).min(*c), a.max(*b).max(*c));
+    let outside = (low - aim).max(aim - high).max(DVec3::ZERO);
+    outside.x.hypot(outside.z)
 }
 
 /// A point as a pad sees it, along the closing axis.
@@ -282,11 +367,14 @@ impl Gathered {
     }
 
     /// Chooses the patch's point that lies nearest to `aim` as the pad sees it, and turns everything
-    /// into the object's frame.
-    fn into_patch(self, aim: DVec3, shift: f64, tcp: &Pose) -> Patch {
+    /// into the object's frame. On a rough surface the normal there is the mean around it.
+    fn into_patch(self, aim: DVec3, shift: f64, tcp: &Pose, is_rough: bool) -> Patch {
         let mut best = (f64::INFINITY, f64::INFINITY, DVec3::ZERO, DVec3::ZERO);
         for (corners, normal) in &self.facets {
             let [a, b, c] = *corners;
+            if distance_to_box(corners, aim) > best.0 + 1e-9 {
+                continue;
+            }
             let point = if a == b && b == c {
                 a
             } else {
@@ -301,7 +389,9 @@ impl Gathered {
                 best = (key.0, key.1, point, *normal);
             }
         }
-        let (_, _, point, local_normal) = best;
+        let (_, _, point, facet_normal) = best;
+        let local_normal =
+            if is_rough { self.normal_around(point, facet_normal) } else { facet_normal };
         Patch {
             contact: *tcp * (point - DVec3::Y * shift),
             normal: tcp.rotation * self.normal.normalize_or(self.side * DVec3::Y),
@@ -310,6 +400,18 @@ impl Gathered {
             region: self.region,
             depth: self.depth,
         }
+    }
+
+    /// Mean normal of the patch within [`NORMAL_RADIUS`] of a point, by area; `own` where nothing is there.
+    fn normal_around(&self, point: DVec3, own: DVec3) -> DVec3 {
+        let near = self.facets.iter().filter(|(corners, _)| {
+            let [a, b, c] = *corners;
+            ((a + b + c) / 3.0).distance(point) <= NORMAL_RADIUS
+        });
+        let sum = near.fold(DVec3::ZERO, |sum, ([a, b, c], normal)| {
+            sum + (*b - *a).cross(*c - *a).length() * *normal
+        });
+        sum.normalize_or(own)
     }
 }
 

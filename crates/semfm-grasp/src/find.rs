@@ -14,8 +14,8 @@ use crate::object::{GraspObject, Region};
 use crate::rejection::{Miss, Rejected};
 use crate::scene::Scene;
 use crate::search::{Found, Search};
-use crate::select::diverse;
-use crate::settings::GraspSettings;
+use crate::select::{diverse, drawn};
+use crate::settings::{GraspSettings, Selection};
 use semfm_robot::Gripper;
 
 /// Grasps of one region by one gripper in one scene, and what became of the other candidates.
@@ -25,8 +25,8 @@ pub struct Grasps {
     pub grasps: Vec<Grasp>,
     /// Candidates refused, by the first thing that each failed.
     pub rejected: Rejected,
-    /// Of the refused candidates the one that came farthest, and of those the one that missed by
-    /// least.
+    /// Of the candidates refused for the main reason (the stage that let the smallest share of those that reached it
+    /// through) the one that missed by least.
     pub nearest_miss: Option<Miss>,
     /// Gripper poses examined.
     pub n_candidates: usize,
@@ -93,13 +93,21 @@ pub fn find_grasps_with(
     let prepared = start.elapsed();
     let sampled = search.run(task)?;
     let examined = start.elapsed();
-    let Found { kept, n_survivors, sampled } = search.add_neighbours(sampled, task)?;
+    let found = match settings.selection {
+        Selection::Best => search.climb(search.add_neighbours(sampled, task)?, task)?,
+        Selection::Random => sampled.into_found(),
+    };
+    let all = settings.selection == Selection::Random;
+    let Found { kept, n_survivors, mut sampled } = search.on_exact_surface(found, all, task)?;
     let spread = start.elapsed();
-    let grasps = diverse(kept, settings.top, settings.diversity, object.radius());
+    let grasps = match settings.selection {
+        Selection::Best => diverse(kept, settings.top, settings.diversity, object.radius()),
+        Selection::Random => drawn(kept, settings.top, settings.seed),
+    };
     Ok(Grasps {
         grasps,
+        nearest_miss: sampled.nearest().map(|near| search.miss(near)),
         rejected: sampled.rejected,
-        nearest_miss: sampled.nearest.map(|near| search.miss(near)),
         n_candidates: sampled.n_candidates,
         n_survivors,
         stages_ms: vec![
@@ -142,7 +150,7 @@ pub fn examine_poses(
     let examined = poses.par_iter().map(|pose| {
         let seed = [-pose.width / 2.0, pose.width / 2.0];
         let candidate = Candidate { tcp: pose.object_from_tcp, seed };
-        search.examine(&candidate).map_err(|near| Box::new(search.miss(*near)))
+        search.examine_pose(&candidate).map_err(|near| Box::new(search.miss(*near)))
     });
     Ok(examined.collect())
 }

@@ -26,6 +26,13 @@ const TILTS: [f64; 3] = [0.0, -0.5, 0.5];
 /// The gripper must enclose this share of the pad's length before a placement counts (initial bite).
 const INITIAL_BITE: f64 = 0.3;
 
+/// ... but at most this, metres: the tips of long pads hold, too.
+const LONGEST_BITE: f64 = 6e-3;
+
+/// Pads longer than this, metres, are also tried with their tips alone, this deep.
+const LONG_PAD: f64 = 0.03;
+const TIP_BITE: f64 = 0.012;
+
 /// Placements of the gripper along its closing axis, over the width of its opening.
 const PLACEMENTS: usize = 9;
 
@@ -52,6 +59,10 @@ pub(crate) struct Gpg<'a> {
     least_cosine: f64,
     /// Samples near the seed, from the seed, with their normals.
     points: Vec<(DVec3, DVec3)>,
+    /// The same points in single precision, by coordinate.
+    coordinates: [Vec<f32>; 3],
+    /// How far each lies from the plane of the fingers.
+    beside: Vec<f32>,
     /// Those that the fingers meet, in the gripper's frame, each with its normal's part along y.
     slab: Vec<(DVec3, f64)>,
     /// For each bin along the closing axis, the least z of the surface in it.
@@ -66,7 +77,8 @@ impl<'a> Gpg<'a> {
     ) -> Self {
         let least_cosine = (friction.atan() + NORMAL_SLACK).cos();
         let (points, slab, first) = (Vec::new(), Vec::new(), Vec::new());
-        Self { object, gripper, least_cosine, points, slab, first }
+        let (coordinates, beside) = Default::default();
+        Self { object, gripper, least_cosine, points, coordinates, beside, slab, first }
     }
 
     /// Adds the placements around `seed` whose ends can oppose each other, and returns how many
@@ -84,6 +96,10 @@ impl<'a> Gpg<'a> {
                 .points_within(seed.point, radius)
                 .map(|i| (samples.points[i as usize] - seed.point, samples.normals[i as usize])),
         );
+        for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
+            coordinates.clear();
+            coordinates.extend(self.points.iter().map(|(p, _)| p[axis] as f32));
+        }
         let Some((normal, axis)) = self.darboux(seed) else { return 0 };
         let sides: &[f64] = if self.object.is_signed() { &[1.0] } else { &[1.0, -1.0] };
         for side in sides {
@@ -130,7 +146,7 @@ impl<'a> Gpg<'a> {
         let opening = *self.gripper.opening().end();
         let span = opening / 2.0 + reach.outer; // the farthest a finger gets
         self.gather(turn, span, reach);
-        let bite = INITIAL_BITE * self.gripper.pad()[1];
+        let bite = (INITIAL_BITE * self.gripper.pad()[1]).min(LONGEST_BITE);
         let (mut last, mut refused) = (None, 0);
         for k in 0..PLACEMENTS {
             let offset = opening * ((k as f64 + 0.5) / PLACEMENTS as f64 - 0.5);
@@ -144,10 +160,13 @@ impl<'a> Gpg<'a> {
             if !(front.is_finite() && tip - front >= bite) {
                 continue;
             }
-            // Deepest, and with the pads just filled.
+            // Deepest, with the pads just filled, and with the tips of long pads.
             let shallow = (front + (reach.tip + self.gripper.pad()[1] / 2.0)).min(tip);
             let deeper = tip - shallow > bite;
-            for tip in [Some(tip), deeper.then_some(shallow)].into_iter().flatten() {
+            let tips = front + TIP_BITE;
+            let with_tips = self.gripper.pad()[1] > LONG_PAD && tip.min(shallow) - tips > bite;
+            let depths = [Some(tip), deeper.then_some(shallow), with_tips.then_some(tips)];
+            for tip in depths.into_iter().flatten() {
                 let middle = tip - reach.tip;
                 let Some((held, opposed)) = self.held([left, right], middle) else { continue };
                 let key = [held[0], held[1], middle.max(-span)].map(|y| self.bin(span, y));
@@ -203,7 +222,16 @@ impl<'a> Gpg<'a> {
         let back = DMat3::from_quat(turn.inverse());
         let half_width = reach.finger_width / 2.0;
         let (across, along, ahead) = (back.row(0), back.row(1), back.row(2));
-        for (p, n) in &self.points {
+        // Most points lie beside the fingers: those are told apart first, many at once, in single precision.
+        let [xs, ys, zs] = &self.coordinates;
+        let axis = across.as_vec3();
+        self.beside.clear();
+        self.beside.extend(
+            (xs.iter().zip(ys).zip(zs)).map(|((x, y), z)| axis.x * x + axis.y * y + axis.z * z),
+        );
+        let wider = (half_width + 1e-6) as f32;
+        let near = self.beside.iter().zip(&self.points).filter(|(beside, _)| beside.abs() <= wider);
+        for (_, (p, n)) in near {
             let y = along.dot(*p);
             let x = across.dot(*p);
             if x.abs() <= half_width && y.abs() < span {

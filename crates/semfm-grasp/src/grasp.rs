@@ -23,6 +23,9 @@ pub struct Grasp {
     /// Ferrari & Canny's ε: the least wrench that the grasp cannot resist, for a unit of grip force,
     /// torques about the centre of mass divided by the object's radius around it.
     pub epsilon: f64,
+    /// Angle by which the object turns while the pads close, until friction holds it, radians: above zero where
+    /// pads that give way press it off the line between its first points.
+    pub closing_turn: f64,
     /// The weighted mean of the named terms, in [0, 1].
     pub score: f64,
     /// Name and value of each term of the score, each in [0, 1].

@@ -5,8 +5,10 @@
 //! closing direction; lengths are metres.
 
 mod antipodal;
+mod box_tree;
 mod candidate;
 mod clip;
+mod closing_turn;
 mod collision;
 mod contact;
 mod error;
@@ -21,7 +23,10 @@ mod gripper_geometry;
 mod neighbours;
 mod object;
 mod obstacle;
+mod pad_view;
 mod pose_grid;
+mod pressure;
+mod refine;
 mod rejection;
 mod scene;
 mod score;
@@ -31,6 +36,7 @@ mod settings;
 mod solid;
 #[cfg(test)]
 mod test_meshes;
+mod working_surface;
 mod wrench_hull;
 
 pub use error::{Error, Result};
@@ -43,7 +49,8 @@ pub use rejection::{Miss, Reason, Rejected};
 pub use scene::{Scene, Table};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use semfm_robot::Pose;
-pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Separation, TERMS};
+pub use working_surface::{SurfaceReport, SurfaceSettings};
+pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Selection, Separation, TERMS};
 
 #[cfg(test)]
 mod tests {

@@ -19,19 +19,7 @@ pub(crate) fn neighbours(
     kept: &[Grasp],
     separation: Separation,
 ) -> Vec<Candidate> {
-    let (step, turn) = (BEYOND * separation.translation, BEYOND * separation.rotation);
-    let moves: Vec<Pose> = [-1.0, 1.0]
-        .into_iter()
-        .flat_map(|sign| {
-            [
-                Pose::from_translation(sign * step * DVec3::X),
-                Pose::from_translation(sign * step * DVec3::Z),
-                turned(sign * turn, DVec3::Y),
-                turned(sign * turn, DVec3::X),
-                turned(sign * turn, DVec3::Z),
-            ]
-        })
-        .collect();
+    let moves = steps(BEYOND * separation.translation, BEYOND * separation.rotation);
     let mut grid = PoseGrid::new(separation);
     kept.iter().for_each(|grasp| grid.insert(&grasp.object_from_tcp));
     let mut proposed = Vec::new();
@@ -46,6 +34,22 @@ pub(crate) fn neighbours(
         }
     }
     proposed
+}
+
+/// A step (metres) both ways along both axes that closing leaves free, and a turn (radians) both ways about all three.
+pub(crate) fn steps(step: f64, turn: f64) -> Vec<Pose> {
+    [-1.0, 1.0]
+        .into_iter()
+        .flat_map(|sign| {
+            [
+                Pose::from_translation(sign * step * DVec3::X),
+                Pose::from_translation(sign * step * DVec3::Z),
+                turned(sign * turn, DVec3::Y),
+                turned(sign * turn, DVec3::X),
+                turned(sign * turn, DVec3::Z),
+            ]
+        })
+        .collect()
 }
 
 fn turned(angle: f64, axis: DVec3) -> Pose {
@@ -66,6 +70,7 @@ mod tests {
             contacts: [DVec3::ZERO; 2],
             normals: [DVec3::NEG_Y, DVec3::Y],
             epsilon: 0.0,
+            closing_turn: 0.0,
             score: 1.0,
             terms: Vec::new(),
         }

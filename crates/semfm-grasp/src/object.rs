@@ -11,6 +11,7 @@ use semfm_geom::{Mesh, PointIndex, without_repeated_faces};
 
 use crate::obstacle::Obstacle;
 use crate::settings::direction;
+use crate::working_surface::{SurfaceReport, SurfaceSettings, WorkingSurface, report_of_exact};
 use crate::{Error, Result};
 
 /// Distance between the samples that stand for a mesh where candidates are grown, metres: a tenth
@@ -29,13 +30,31 @@ const NORMAL_NEIGHBOURS: usize = 16;
 /// Nothing is asked of a mesh: components, holes, non-manifold edges and faces wound any way are
 /// allowed. Where it is watertight and wound consistently, its inside is known and used.
 pub struct GraspObject {
-    surface: Surface,
-    obstacle: Obstacle,
+    /// As it is: what must not be run into.
+    exact: Body,
+    /// Where contacts are sought, if that is another surface.
+    working: Option<Working>,
     samples: Samples,
-    /// Whether normals are known to point outwards.
-    signed: bool,
+    report: SurfaceReport,
     centre_of_mass: DVec3,
     radius: f64,
+}
+
+/// A surface with its triangles or points under a tree.
+pub(crate) struct Body {
+    pub(crate) surface: Surface,
+    pub(crate) tree: Obstacle,
+    /// Whether normals are known to point outwards.
+    pub(crate) is_signed: bool,
+    /// Whether single triangles may be turned anywhere, so that normals are means.
+    pub(crate) is_rough: bool,
+}
+
+/// A surface that stands for the exact one where contacts are sought.
+pub(crate) struct Working {
+    body: Body,
+    /// For each of its vertices that of the exact mesh.
+    to_given: Vec<u32>,
 }
 
 /// The surface itself.
@@ -63,12 +82,22 @@ pub(crate) struct Samples {
 }
 
 impl GraspObject {
-    /// An object from a mesh in any unit; `scale` makes metres of it.
+    /// An object from a mesh in any unit; `scale` makes metres of it. Contacts on a mesh of very many triangles,
+    /// or a noisy one, are sought on a working surface: see [`GraspObject::with_surface`].
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a scale that is not positive; [`semfm_geom::Error::NoArea`]
     /// for a mesh without area.
     pub fn from_mesh(mesh: &Mesh, scale: f64) -> Result<Self> {
+        Self::with_surface(mesh, scale, SurfaceSettings::default())
+    }
+
+    /// [`GraspObject::from_mesh`], told on which surface contacts are sought. Collisions are with the mesh as it
+    /// is, always.
+    ///
+    /// # Errors
+    /// As [`GraspObject::from_mesh`].
+    pub fn with_surface(mesh: &Mesh, scale: f64, settings: SurfaceSettings) -> Result<Self> {
         if !(scale > 0.0 && scale.is_finite()) {
             let expected = "a positive number of metres for a unit of the mesh".into();
             return Err(Error::OutOfRange { what: "scale", expected, found: scale.to_string() });
@@ -77,28 +106,19 @@ impl GraspObject {
         let mesh = Mesh::new(vertices, mesh.faces().to_vec())?;
         // Of a pile of coincident triangles one is enough to touch, and all of them together are no surface of a body.
         let mesh = without_repeated_faces(&mesh).unwrap_or(mesh);
-        let report = MeshReport::new(&mesh);
-        let signed = report.watertight && report.oriented;
-        let outward = if signed { outward_signs(&mesh) } else { vec![1.0; mesh.n_faces()] };
-        let normals: Vec<DVec3> = (0..mesh.n_faces())
-            .map(|face| mesh.face_normal_scaled(face).normalize_or_zero() * outward[face])
-            .collect();
-        let wanted = mesh.area() / (SAMPLE_SPACING * SAMPLE_SPACING);
-        let n_samples = wanted.clamp(SAMPLE_COUNTS.0, SAMPLE_COUNTS.1) as usize;
-        let (points, sample_normals) = sample_uniform(&mesh, n_samples, 0)?
-            .iter()
-            .map(|sample| (sample.point, normals[sample.face as usize]))
-            .unzip();
-        let samples = Samples::new(points, sample_normals);
-        let centre_of_mass = centre_of_mass(&mesh, signed.then_some(&outward));
-        Ok(Self {
-            radius: radius(mesh.vertices(), centre_of_mass),
-            obstacle: Obstacle::of_mesh(&mesh),
-            surface: Surface::Mesh { mesh, normals },
-            samples,
-            signed,
-            centre_of_mass,
-        })
+        let signs = outward_signs(&mesh);
+        let centre_of_mass = centre_of_mass(&mesh, signs.as_ref());
+        let radius = radius(mesh.vertices(), centre_of_mass);
+        let working = WorkingSurface::of(&mesh, settings)?;
+        let report =
+            working.as_ref().map_or_else(|| report_of_exact(&mesh), |working| working.report);
+        let working = working.map(|WorkingSurface { mesh, to_given, report }| {
+            let signs = outward_signs(&mesh);
+            Working { body: Body::of_mesh(mesh, signs, report.smoothing_steps > 0), to_given }
+        });
+        let exact = Body::of_mesh(mesh, signs, false);
+        let samples = working.as_ref().map_or(&exact, |working| &working.body).samples()?;
+        Ok(Self { exact, working, samples, report, centre_of_mass, radius })
     }
 
     /// An object from surface points in metres. Normals (one per point, any length) are estimated
@@ -143,26 +163,42 @@ impl GraspObject {
         let centre_of_mass = points.iter().sum::<DVec3>() / points.len() as f64;
         Ok(Self {
             radius: radius(points, centre_of_mass),
-            obstacle: Obstacle::of_points(points.to_vec(), 0.0),
             samples: Samples::new(points.to_vec(), normals.clone()),
-            surface: Surface::Cloud {
-                points: points.to_vec(),
-                normals,
-                // Points at distance s on a hexagonal lattice stand for √3/2 s² each.
-                area: 0.866 * spacing * spacing,
-                spacing,
+            exact: Body {
+                tree: Obstacle::of_points(points.to_vec(), 0.0),
+                surface: Surface::Cloud {
+                    points: points.to_vec(),
+                    normals,
+                    // Points at distance s on a hexagonal lattice stand for √3/2 s² each.
+                    area: 0.866 * spacing * spacing,
+                    spacing,
+                },
+                is_signed: viewpoint.is_some(),
+                is_rough: false,
             },
-            signed: viewpoint.is_some(),
+            working: None,
+            report: SurfaceReport {
+                n_triangles: 0,
+                is_simplified: false,
+                noise: 0.0,
+                smoothing_steps: 0,
+                deviation: 0.0,
+            },
             centre_of_mass,
         })
     }
 
     /// Number of vertices or points: a region has one weight for each.
     pub fn n_weights(&self) -> usize {
-        match &self.surface {
+        match &self.exact.surface {
             Surface::Mesh { mesh, .. } => mesh.n_vertices(),
             Surface::Cloud { points, .. } => points.len(),
         }
+    }
+
+    /// The surface on which contacts are sought.
+    pub fn surface_report(&self) -> SurfaceReport {
+        self.report
     }
 
     /// Centre of the volume where the mesh is watertight, otherwise of the area, or of the points.
@@ -175,20 +211,78 @@ impl GraspObject {
         self.radius
     }
 
-    pub(crate) fn surface(&self) -> &Surface {
-        &self.surface
+    /// The object as it is.
+    pub(crate) fn exact(&self) -> &Body {
+        &self.exact
     }
 
+    /// Where contacts are sought.
+    pub(crate) fn touched(&self) -> &Body {
+        self.working.as_ref().map_or(&self.exact, |working| &working.body)
+    }
+
+    /// How far (metres) the object as it is reaches beyond the surface on which contacts are sought; `None` where
+    /// the two are one.
+    pub(crate) fn deviation(&self) -> Option<f64> {
+        self.working.as_ref().map(|_| self.report.deviation.max(1e-4))
+    }
+
+    /// The surface on which contacts are sought.
+    pub(crate) fn surface(&self) -> &Surface {
+        &self.touched().surface
+    }
+
+    /// Whether it is another surface than the mesh as it is, but as near as a pad feels: what is found is then to be
+    /// examined on the mesh itself.
+    pub(crate) fn is_simplified(&self) -> bool {
+        self.report.is_simplified && self.report.smoothing_steps == 0
+    }
+
+    /// What the gripper must not run into.
     pub(crate) fn obstacle(&self) -> &Obstacle {
-        &self.obstacle
+        &self.exact.tree
     }
 
     pub(crate) fn samples(&self) -> &Samples {
         &self.samples
     }
 
+    /// Whether normals are known to point outwards where contacts are sought.
     pub(crate) fn is_signed(&self) -> bool {
-        self.signed
+        self.touched().is_signed
+    }
+}
+
+impl Body {
+    /// `signs` turns each face's normal outwards, where that is known.
+    fn of_mesh(mesh: Mesh, signs: Option<Vec<f64>>, is_rough: bool) -> Self {
+        let sign = |face: usize| signs.as_ref().map_or(1.0, |signs| signs[face]);
+        let normals: Vec<DVec3> = (0..mesh.n_faces())
+            .map(|face| mesh.face_normal_scaled(face).normalize_or_zero() * sign(face))
+            .collect();
+        Self {
+            tree: Obstacle::of_mesh(&mesh),
+            surface: Surface::Mesh { mesh, normals },
+            is_signed: signs.is_some(),
+            is_rough,
+        }
+    }
+
+    /// Points spread over a mesh, or those of the cloud.
+    fn samples(&self) -> Result<Samples> {
+        let (mesh, normals) = match &self.surface {
+            Surface::Mesh { mesh, normals } => (mesh, normals),
+            Surface::Cloud { points, normals, .. } => {
+                return Ok(Samples::new(points.clone(), normals.clone()));
+            }
+        };
+        let wanted = mesh.area() / (SAMPLE_SPACING * SAMPLE_SPACING);
+        let n_samples = wanted.clamp(SAMPLE_COUNTS.0, SAMPLE_COUNTS.1) as usize;
+        let (points, normals) = sample_uniform(mesh, n_samples, 0)?
+            .iter()
+            .map(|sample| (sample.point, normals[sample.face as usize]))
+            .unzip();
+        Ok(Samples::new(points, normals))
     }
 }
 
@@ -197,7 +291,8 @@ impl fmt::Debug for GraspObject {
         f.debug_struct("GraspObject")
             .field("n_weights", &self.n_weights())
             .field("n_samples", &self.samples.points.len())
-            .field("signed", &self.signed)
+            .field("signed", &self.is_signed())
+            .field("surface", &self.report)
             .field("centre_of_mass", &self.centre_of_mass)
             .field("radius", &self.radius)
             .finish_non_exhaustive()
@@ -214,7 +309,9 @@ impl Samples {
 /// A region on an object: a weight in [0, 1] for each vertex or point, and where to draw seeds.
 pub(crate) struct Region {
     weights: Vec<f64>,
-    /// Running sums of area times weight over faces or points.
+    /// The same on the working surface, if there is one.
+    working: Option<Vec<f64>>,
+    /// Running sums of area times weight over the faces or points that are touched.
     cumulative: Vec<f64>,
 }
 
@@ -243,11 +340,16 @@ impl Region {
             return Error::out_of_range(WHAT, "at least one above 0", "only zeros");
         }
         let weights: Vec<f64> = weights.iter().map(|w| w / most).collect();
+        let working: Option<Vec<f64>> = object
+            .working
+            .as_ref()
+            .map(|working| working.to_given.iter().map(|&id| weights[id as usize]).collect());
+        let touched = working.as_ref().unwrap_or(&weights);
         let mut total = 0.0;
-        let mut cumulative: Vec<f64> = match &object.surface {
+        let mut cumulative: Vec<f64> = match &object.touched().surface {
             Surface::Mesh { mesh, .. } => (0..mesh.n_faces())
                 .map(|face| {
-                    let mean = mesh.faces()[face].iter().map(|&v| weights[v as usize]).sum::<f64>();
+                    let mean = mesh.faces()[face].iter().map(|&v| touched[v as usize]).sum::<f64>();
                     mesh.face_area(face) * mean / 3.0
                 })
                 .collect(),
@@ -261,12 +363,17 @@ impl Region {
             let found = format!("area times weight {total}");
             return Error::out_of_range(WHAT, "a region with an area", found);
         }
-        Ok(Self { weights, cumulative })
+        Ok(Self { weights, working, cumulative })
     }
 
-    /// Weight (0 to 1) of a vertex or point.
-    pub(crate) fn weight(&self, id: usize) -> f64 {
-        self.weights[id]
+    /// Weights (0 to 1) of the vertices or points as given.
+    pub(crate) fn given(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Weights (0 to 1) where contacts are sought.
+    pub(crate) fn touched(&self) -> &[f64] {
+        self.working.as_ref().unwrap_or(&self.weights)
     }
 
     /// A point of the region: triangles or points by area times weight, uniform within.
@@ -275,7 +382,7 @@ impl Region {
         let pick = rng.random::<f64>() * total;
         let item = self.cumulative.partition_point(|&sum| sum <= pick);
         let item = item.min(self.cumulative.len() - 1);
-        match &object.surface {
+        match &object.touched().surface {
             Surface::Mesh { mesh, normals } => {
                 let [a, b, c] = mesh.corners(item);
                 let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
@@ -290,8 +397,12 @@ impl Region {
 }
 
 /// +1 or -1 for each face: the sign of the volume that its component bounds, so that a component
-/// wound inside out is turned.
-fn outward_signs(mesh: &Mesh) -> Vec<f64> {
+/// wound inside out is turned. `None` where the mesh bounds nothing or is wound inconsistently.
+fn outward_signs(mesh: &Mesh) -> Option<Vec<f64>> {
+    let report = MeshReport::new(mesh);
+    if !(report.watertight && report.oriented) {
+        return None;
+    }
     let parts = components(mesh);
     let mut volumes = vec![0.0; parts.count];
     let part_of_face: Vec<usize> =
@@ -300,7 +411,8 @@ fn outward_signs(mesh: &Mesh) -> Vec<f64> {
     for (face, &part) in part_of_face.iter().enumerate() {
         volumes[part] += cone_volume(mesh, face, origin);
     }
-    part_of_face.iter().map(|&part| if volumes[part] < 0.0 { -1.0 } else { 1.0 }).collect()
+    let sign = |&part: &usize| if volumes[part] < 0.0 { -1.0 } else { 1.0 };
+    Some(part_of_face.iter().map(sign).collect())
 }
 
 /// Signed volume of the cone from `apex` over a face.

@@ -1,11 +1,11 @@
 //! What a gripper must not run into: triangles or points under a tree of boxes.
 
-use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use glam::Vec3A;
 use semfm_geom::Mesh;
 use semfm_geom::connectivity::MeshReport;
 use semfm_geom::math::DVec3;
 
+use crate::box_tree::{Bounds, BoxTree};
 use crate::solid::Solid;
 
 /// Directions of the rays that decide between inside and outside: none lies along an axis or a
@@ -19,7 +19,7 @@ const INSIDE_RAYS: [DVec3; 3] = [
 /// A surface of triangles or a set of points with a radius.
 pub(crate) struct Obstacle {
     items: Items,
-    tree: Bvh,
+    tree: BoxTree,
     /// Whether the triangles bound a volume, so that a body can be inside without touching.
     closed: bool,
 }
@@ -34,18 +34,16 @@ impl Obstacle {
     pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
         let triangles: Vec<[DVec3; 3]> =
             (0..mesh.n_faces()).map(|face| mesh.corners(face)).collect();
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .map(|&[a, b, c]| Aabb::new(a.min(b).min(c), a.max(b).max(c)))
-            .collect();
+        let boxes = triangles.iter().map(|&[a, b, c]| (a.min(b).min(c), a.max(b).max(c)));
+        let tree = BoxTree::new(boxes);
         let closed = MeshReport::new(mesh).watertight;
-        Self { items: Items::Triangles(triangles), tree: tree(&boxes), closed }
+        Self { items: Items::Triangles(triangles), tree, closed }
     }
 
     /// Balls of one radius around points (at least one).
     pub(crate) fn of_points(points: Vec<DVec3>, radius: f64) -> Self {
-        let boxes: Vec<Aabb> = points.iter().map(|&p| Aabb::new(p, p)).collect();
-        Self { tree: tree(&boxes), items: Items::Points { points, radius }, closed: false }
+        let tree = BoxTree::new(points.iter().map(|&p| (p, p)));
+        Self { tree, items: Items::Points { points, radius }, closed: false }
     }
 
     /// Whether `solid`, grown by `margin`, touches anything.
@@ -67,8 +65,7 @@ impl Obstacle {
             Items::Triangles(triangles) => {
                 for i in self.near(solid, cap) {
                     let corners = &triangles[i as usize];
-                    let [a, b, c] = *corners;
-                    if solid.grown(least).overlaps(a.min(b).min(c), a.max(b).max(c)) {
+                    if solid.may_be_nearer(corners, least) {
                         least = solid.distance(corners, least).min(least);
                     }
                 }
@@ -90,7 +87,7 @@ impl Obstacle {
         margin: f64,
     ) -> impl Iterator<Item = u32> + use<'a> {
         let grown = solid.grown(margin);
-        self.tree.leaves(move |node: &BvhNode| grown.overlaps(node.mins(), node.maxs()))
+        self.tree.passing(move |bounds| grown.overlaps(bounds))
     }
 
     /// Corners of a triangle, or a point three times.
@@ -107,11 +104,13 @@ impl Obstacle {
         centre: DVec3,
         radius: f64,
     ) -> impl Iterator<Item = u32> + '_ {
-        let reach = radius * radius;
-        self.tree.leaves(move |node: &BvhNode| {
-            let outside = (node.mins() - centre).max(centre - node.maxs()).max(DVec3::ZERO);
-            outside.length_squared() <= reach
-        })
+        let middle = centre.as_vec3a();
+        let wider = (radius + 1e-5 * (radius + centre.abs().max_element())) as f32;
+        let found = self.tree.passing(move |bounds| {
+            let outside = (bounds.low - middle).max(middle - bounds.high).max(Vec3A::ZERO);
+            outside.length_squared() <= wider * wider
+        });
+        found.filter(move |&i| self.corners(i)[0].distance_squared(centre) <= radius * radius)
     }
 
     /// Where the line `origin + t · direction`, t in (`near`, `far`), crosses triangles: t and the
@@ -126,7 +125,7 @@ impl Obstacle {
         let Items::Triangles(triangles) = &self.items else { return Vec::new() };
         let mut hits: Vec<(f64, u32)> = self
             .tree
-            .leaves(|node: &BvhNode| meets_box(node, origin, direction, [near, far]))
+            .passing(|bounds| meets_box(bounds, origin, direction, [near, far]))
             .filter_map(|i| Some((crossing(&triangles[i as usize], origin, direction)?, i)))
             .filter(|&(t, _)| t > near && t < far)
             .collect();
@@ -137,8 +136,9 @@ impl Obstacle {
     /// Whether a closed surface encloses the point, by a majority of three rays; an open surface
     /// encloses nothing.
     pub(crate) fn encloses(&self, point: DVec3) -> bool {
-        let bounds = self.tree.root_aabb();
-        if !self.closed || point.cmplt(bounds.mins).any() || point.cmpgt(bounds.maxs).any() {
+        let Bounds { low, high } = self.tree.bounds();
+        let outside = point.cmplt(low.as_dvec3()).any() || point.cmpgt(high.as_dvec3()).any();
+        if !self.closed || outside {
             return false;
         }
         let says_inside = INSIDE_RAYS
@@ -148,14 +148,11 @@ impl Obstacle {
     }
 }
 
-fn tree(boxes: &[Aabb]) -> Bvh {
-    Bvh::from_leaves(BvhBuildStrategy::Binned, boxes)
-}
-
-/// Whether the line `origin + t · direction`, t in `[near, far]`, meets the node's box (the slab test
+/// Whether the line `origin + t · direction`, t in `[near, far]`, meets the box (the slab test
 /// of Kay & Kajiya 1986).
-fn meets_box(node: &BvhNode, origin: DVec3, direction: DVec3, [near, far]: [f64; 2]) -> bool {
-    let (low, high) = ((node.mins() - origin) / direction, (node.maxs() - origin) / direction);
+fn meets_box(bounds: &Bounds, origin: DVec3, direction: DVec3, [near, far]: [f64; 2]) -> bool {
+    let [low, high] =
+        [bounds.low, bounds.high].map(|corner| (corner.as_dvec3() - origin) / direction);
     // A direction with a zero makes infinities (right) or, on a face of the box, NaN, which min and
     // max of f64 leave out.
     let (enter, leave) = (0..3).fold((near, far), |(enter, leave), axis| {

@@ -2,16 +2,28 @@
 
 use semfm_geom::math::DVec3;
 
+use crate::closing_turn::{Settled, settle};
 use crate::collision::{FAR, Fit};
 use crate::contact::{Closing, Patch};
 use crate::force_closure::{SoftContact, ferrari_canny};
 use crate::gripper_geometry::GripperGeometry;
 use crate::object::GraspObject;
+use crate::pad_view::PadView;
+use crate::pressure::Pressure;
 use crate::settings::GraspSettings;
 
 /// A patch of this share of the pad counts as full contact: a cylinder of 2 cm radius gives .8 of a
 /// pad of 18 mm, a ball of 2 cm .6.
 const FULL_CONTACT: f64 = 0.6;
+
+/// Kilograms where nothing is known: half of the YCB objects weigh less.
+const UNKNOWN_MASS: f64 = 0.3;
+
+/// What lifting and shaking ask of the grip, m/s²: half as much again as standing still.
+const LOAD: f64 = 1.5 * 9.81;
+
+/// An object that turns by this much while the pads close is not held where it was planned, radians.
+const FULL_TURN: f64 = 0.26; // 15°
 
 /// Turns measurements of a grasp into terms in [0, 1] and their weighted mean.
 ///
@@ -28,6 +40,7 @@ const FULL_CONTACT: f64 = 0.6;
 /// | `region` | all contact is at full weight | none is in the region |
 pub(crate) struct Scorer<'a> {
     object: &'a GraspObject,
+    gripper: &'a GripperGeometry,
     settings: &'a GraspSettings,
     /// Direction of gravity, where known.
     down: Option<DVec3>,
@@ -40,13 +53,15 @@ pub(crate) struct Scorer<'a> {
 pub(crate) struct Score {
     pub(crate) score: f64,
     pub(crate) epsilon: f64,
+    /// Radians.
+    pub(crate) closing_turn: f64,
     pub(crate) terms: Vec<(&'static str, f64)>,
 }
 
 impl<'a> Scorer<'a> {
     pub(crate) fn new(
         object: &'a GraspObject,
-        gripper: &GripperGeometry,
+        gripper: &'a GripperGeometry,
         settings: &'a GraspSettings,
         down: Option<DVec3>,
     ) -> Self {
@@ -58,7 +73,7 @@ impl<'a> Scorer<'a> {
         });
         let best_epsilon = ferrari_canny(&ideal, settings.friction, object.radius());
         let down = settings.gravity.or(down).map(DVec3::normalize);
-        Self { object, settings, down, pad, best_epsilon }
+        Self { object, gripper, settings, down, pad, best_epsilon }
     }
 
     /// Scores a grasp whose widest contact angle (radians, see `force_closure`) is `angle`.
@@ -74,14 +89,33 @@ impl<'a> Scorer<'a> {
         let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
         let arm = com - left.contact.midpoint(right.contact);
         let weights = &self.settings.weights;
+        let settled = self.settled(closing);
+        let [one, other] = settled.pressures;
+        let force = self.settings.grip_force;
+        let weight = self.settings.mass.unwrap_or(UNKNOWN_MASS) * LOAD;
+        let torsion = friction * force * (one.radius + other.radius);
+        let apart = one.centre - other.centre;
+        let off_axis = apart.x.hypot(apart.z) / (friction * apart.y.abs()).max(1e-9);
+        let even = one.area.min(other.area) / (self.pad[0] * self.pad[1]);
+        let off = |p: &Pressure| {
+            (2.0 * p.centre.x.abs() / self.pad[0]).max(2.0 * p.centre.z.abs() / self.pad[1])
+        };
+        let turning = self.turning_arm(closing, arm);
         let mut weighted = vec![
             ("contact", weights.contact, self.pad_share(closing) / FULL_CONTACT),
             ("friction", weights.friction, 1.0 - angle / friction.atan()),
             ("epsilon", weights.epsilon, epsilon / self.best_epsilon.max(1e-12)),
+            ("gravity", weights.gravity, torsion / (torsion + weight * turning)),
+            ("arm", 0.0, 1.0 / (1.0 + turning / self.pad[1])),
+            ("weight", 0.0, 2.0 * friction * force / (2.0 * friction * force + weight)),
+            ("closing", 0.0, 1.0 - settled.turn / FULL_TURN),
+            ("cone", 0.0, 1.0 - off_axis),
+            ("even", 0.0, even),
+            ("centred", 0.0, 1.0 - off(&one).max(off(&other))),
             (
-                "gravity",
-                weights.gravity,
-                1.0 / (1.0 + self.turning_arm(closing, arm) / self.pad[1]),
+                "hang",
+                0.0,
+                0.5 + 0.5 * arm.dot(closing.tcp.rotation * DVec3::Z) / self.object.radius(),
             ),
             ("lever", weights.lever, 1.0 - arm.length() / self.object.radius()),
             ("clearance", weights.clearance, fit.clearance / FAR),
@@ -99,8 +133,20 @@ impl<'a> Scorer<'a> {
         Score {
             score,
             epsilon,
+            closing_turn: settled.turn,
             terms: weighted.into_iter().map(|(n, _, value)| (n, value)).collect(),
         }
+    }
+
+    /// The object at rest between the pads; where a pad meets less than a cell of its grid, it meets a point.
+    fn settled(&self, closing: &Closing) -> Settled {
+        let view = PadView::new(self.object, self.gripper, closing);
+        let GraspSettings { friction, grip_force, .. } = *self.settings;
+        settle(&view, friction, grip_force).unwrap_or_else(|| {
+            let points = closing.patches.map(|patch| closing.tcp.inverse() * patch.contact);
+            let pressures = points.map(|point| Pressure::of_point(point, view.cell_area));
+            Settled { turn: 0.0, pressures }
+        })
     }
 
     /// Share of the pad's length that a patch fills.

@@ -15,13 +15,14 @@ use crate::Result;
 use crate::antipodal::antipodal;
 use crate::candidate::Candidate;
 use crate::collision::{Collision, Fit};
-use crate::contact::{Closing, TOUCH_GAP, close};
+use crate::contact::{Closing, TOUCH_GAP, close_on, widened};
 use crate::force_closure::widest_angle;
 use crate::gpg::Gpg;
 use crate::grasp::Grasp;
 use crate::gripper_geometry::GripperGeometry;
 use crate::neighbours::neighbours;
-use crate::object::{GraspObject, Region, Surface};
+use crate::refine::main_reason;
+use crate::object::{Body, GraspObject, Region, Surface};
 use crate::rejection::{Miss, Reason, Refusal, Rejected};
 use crate::scene::Scene;
 use crate::score::Scorer;
@@ -37,7 +38,8 @@ const CONE_SHARE: f64 = 0.97;
 pub(crate) struct Sampled {
     grasps: Vec<Grasp>,
     pub(crate) rejected: Rejected,
-    pub(crate) nearest: Option<Near>,
+    /// By reason, what missed by least.
+    nearest: [Option<Near>; Reason::ALL.len()],
     pub(crate) n_candidates: usize,
 }
 
@@ -83,6 +85,14 @@ impl<'a> Search<'a> {
         let scorer = Scorer::new(object, gripper, settings, down);
         let collision = Collision::new(object, scene, gripper, settings);
         Self { object, region, gripper, settings, collision, scorer }
+    }
+
+    pub(crate) fn object(&self) -> &GraspObject {
+        self.object
+    }
+
+    pub(crate) fn settings(&self) -> &GraspSettings {
+        self.settings
     }
 
     pub(crate) fn run(&self, task: &Task) -> Result<Sampled> {
@@ -165,17 +175,49 @@ impl<'a> Search<'a> {
     /// The stages, cheap ones first.
     pub(crate) fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
         self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
-        let compliance = self.settings.compliance;
-        let Candidate { tcp, seed } = candidate;
-        let closing = close(self.object, self.region, self.gripper, tcp, *seed, compliance)
-            .ok_or_else(|| Near::boxed(Reason::NoContact.into(), candidate, None))?;
-        self.examine_closed(&closing)
+        let mut closing = self.closed(candidate, self.object.touched(), self.region.touched())?;
+        let refused = |refusal, closing: &Closing| Near::boxed(refusal, candidate, Some(closing));
+        let angle = self.contacts(&closing).map_err(|refusal| refused(refusal, &closing))?;
+        if let Some(reach) = self.object.deviation() {
+            closing = widened(closing, self.object.exact(), self.gripper, reach);
+        }
+        self.examine_closed(&closing, angle).map_err(|refusal| refused(refusal, &closing))
+    }
+
+    /// The stages on the surface that answers are of.
+    pub(crate) fn examine_pose(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
+        if self.object.is_simplified() { self.examine_as_is(candidate) } else { self.examine(candidate) }
+    }
+
+    /// The stages on the object as it is, for a grasp that was found on a simpler surface.
+    pub(crate) fn examine_exactly(&self, grasp: &Grasp) -> std::result::Result<Grasp, Box<Near>> {
+        let ends = grasp.contacts.map(|contact| (grasp.object_from_tcp.inverse() * contact).y);
+        let seed = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        self.examine_as_is(&Candidate { tcp: grasp.object_from_tcp, seed })
+    }
+
+    fn examine_as_is(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
+        self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
+        let closing = self.closed(candidate, self.object.exact(), self.region.given())?;
+        self.contacts(&closing)
+            .and_then(|angle| self.examine_closed(&closing, angle))
             .map_err(|refusal| Near::boxed(refusal, candidate, Some(&closing)))
     }
 
-    /// The stages after the pads have closed.
-    fn examine_closed(&self, closing: &Closing) -> std::result::Result<Grasp, Refusal> {
-        let angle = self.contacts(closing)?;
+    fn closed(
+        &self,
+        candidate: &Candidate,
+        body: &Body,
+        weights: &[f64],
+    ) -> std::result::Result<Closing, Box<Near>> {
+        let compliance = self.settings.compliance;
+        let Candidate { tcp, seed } = candidate;
+        close_on(body, weights, self.gripper, tcp, *seed, compliance)
+            .ok_or_else(|| Near::boxed(Reason::NoContact.into(), candidate, None))
+    }
+
+    /// The stages after the contacts are found good.
+    fn examine_closed(&self, closing: &Closing, angle: f64) -> std::result::Result<Grasp, Refusal> {
         self.width(closing)?;
         self.collision.above_table(closing)?;
         let fit = self.collision.fit(closing)?;
@@ -222,6 +264,7 @@ impl<'a> Search<'a> {
             contacts: closing.patches.map(|patch| patch.contact),
             normals: closing.patches.map(|patch| patch.normal),
             epsilon: score.epsilon,
+            closing_turn: score.closing_turn,
             score: score.score,
             terms: score.terms,
         }
@@ -258,6 +301,7 @@ impl<'a> Search<'a> {
             contacts,
             normals,
             epsilon: 0.0,
+            closing_turn: 0.0,
             score: 0.0,
             terms: Vec::new(),
         };
@@ -277,30 +321,41 @@ impl Sampled {
     fn record(&mut self, result: std::result::Result<Grasp, Box<Near>>) {
         match result {
             Ok(grasp) => self.grasps.push(grasp),
-            Err(near) => {
-                self.rejected.add(near.refusal.reason, 1);
-                self.consider(*near);
-            }
+            Err(near) => self.refuse(*near),
         }
+    }
+
+    pub(crate) fn refuse(&mut self, near: Near) {
+        self.rejected.add(near.refusal.reason, 1);
+        self.consider(near);
+    }
+
+    /// Of the candidates refused for the main reason the one that missed by least.
+    pub(crate) fn nearest(&mut self) -> Option<Near> {
+        let main = main_reason(&self.rejected, self.n_candidates)?;
+        // Seeds without any candidate have the reason but no pose: the next that came far speaks for them.
+        let of_main = self.nearest[main as usize].take();
+        of_main.or_else(|| self.nearest.iter_mut().rev().find_map(Option::take))
     }
 
     fn absorb(&mut self, part: Self) {
         self.grasps.extend(part.grasps);
         self.rejected.merge(&part.rejected);
         self.n_candidates += part.n_candidates;
-        if let Some(near) = part.nearest {
-            self.consider(near);
-        }
+        part.nearest.into_iter().flatten().for_each(|near| self.consider(near));
     }
 
-    /// Keeps what came farthest, of that what missed by least, of that the first.
+    /// All grasps of the samples, near ones too, as the answer.
+    pub(crate) fn into_found(mut self) -> Found {
+        let kept = std::mem::take(&mut self.grasps);
+        Found { n_survivors: kept.len(), kept, sampled: self }
+    }
+
+    /// Keeps, for each reason, what missed by least, of that the first.
     fn consider(&mut self, near: Near) {
-        let nearer = self.nearest.as_ref().is_none_or(|best| {
-            let (this, that) = (near.refusal, best.refusal);
-            this.reason > that.reason || (this.reason == that.reason && this.by < that.by)
-        });
-        if nearer {
-            self.nearest = Some(near);
+        let best = &mut self.nearest[near.refusal.reason as usize];
+        if best.as_ref().is_none_or(|best| near.refusal.by < best.refusal.by) {
+            *best = Some(near);
         }
     }
 }

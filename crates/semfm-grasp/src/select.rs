@@ -1,5 +1,9 @@
 //! From many grasps to a few: the best of each neighbourhood, then a set that differs.
 
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
 use crate::grasp::Grasp;
 use crate::grasp_distance::GraspDistance;
 use crate::pose_grid::PoseGrid;
@@ -20,21 +24,27 @@ pub(crate) fn suppress(mut grasps: Vec<Grasp>, separation: Separation) -> Vec<Gr
     grasps
 }
 
-/// `top` of the grasps (best first): the best, then each time the one whose score and distance to
-/// those chosen add up to most (maximal marginal relevance, Carbonell & Goldstein 1998). `radius` is
-/// the length that counts as far, metres. Best first again.
-pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f64) -> Vec<Grasp> {
-    if grasps.len() <= top {
-        return grasps;
-    }
-    let mut distance = vec![1.0; grasps.len()];
+/// `top` of the grasps (best first), different from each other among the good ones only.
+///
+/// Good are grasps whose score is at least (1 − `diversity`) times that of the `top`-th best, the last that a
+/// plain ranking would return. Of these the best, then each time the one that is farthest from all chosen
+/// (Gonzalez 1985, farthest-first). `radius` is the length that counts as far, metres. Best first again.
+pub(crate) fn diverse(
+    mut grasps: Vec<Grasp>,
+    top: usize,
+    diversity: f64,
+    radius: f64,
+) -> Vec<Grasp> {
+    let Some(last) = top.checked_sub(1).and_then(|last| grasps.get(last)) else { return grasps };
+    let least = (1.0 - diversity) * last.score;
+    grasps.truncate(grasps.partition_point(|grasp| grasp.score >= least));
+    let mut distance = vec![f64::INFINITY; grasps.len()];
     let mut chosen = vec![false; grasps.len()];
     for _ in 0..top {
-        let gain = |i: usize| (1.0 - diversity) * grasps[i].score + diversity * distance[i];
         let left = (0..grasps.len()).filter(|&i| !chosen[i]);
-        let Some(next) = left.max_by(|&a, &b| gain(a).total_cmp(&gain(b)).then(b.cmp(&a))) else {
-            break;
-        };
+        // Of equally far ones the better.
+        let farthest = |&a: &usize, &b: &usize| distance[a].total_cmp(&distance[b]).then(b.cmp(&a));
+        let Some(next) = left.max_by(farthest) else { break };
         chosen[next] = true;
         for (d, grasp) in distance.iter_mut().zip(&grasps) {
             let apart =
@@ -43,6 +53,14 @@ pub(crate) fn diverse(grasps: Vec<Grasp>, top: usize, diversity: f64, radius: f6
         }
     }
     grasps.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(grasp, _)| grasp).collect()
+}
+
+/// `top` of the grasps, each as likely as any other; best first.
+pub(crate) fn drawn(mut grasps: Vec<Grasp>, top: usize, seed: u64) -> Vec<Grasp> {
+    grasps.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    grasps.truncate(top);
+    grasps.sort_by(|a, b| b.score.total_cmp(&a.score));
+    grasps
 }
 
 #[cfg(test)]
@@ -59,6 +77,7 @@ mod tests {
             contacts: [DVec3::ZERO; 2],
             normals: [DVec3::NEG_Y, DVec3::Y],
             epsilon: 0.0,
+            closing_turn: 0.0,
             score,
             terms: Vec::new(),
         }
@@ -77,12 +96,30 @@ mod tests {
     }
 
     #[test]
-    fn diversity_trades_score_for_distance() {
-        let all = vec![grasp(0.0, 0.0, 0.9), grasp(0.011, 0.0, 0.8), grasp(0.1, 1.5, 0.6)];
-        for (diversity, expected) in [(0.0, [0.9, 0.8]), (0.5, [0.9, 0.6])] {
-            let chosen = diverse(all.clone(), 2, diversity, 0.1);
-            assert_eq!(chosen.iter().map(|g| g.score).collect::<Vec<_>>(), expected);
-        }
-        assert_eq!(diverse(all, 9, 0.5, 0.1).len(), 3);
+    fn random_grasps_are_no_better_than_the_others() {
+        let all: Vec<Grasp> = (0..1000).map(|i| grasp(0.0, 0.0, f64::from(i) / 1000.0)).collect();
+        let some = drawn(all.clone(), 200, 5);
+        let mean = some.iter().map(|grasp| grasp.score).sum::<f64>() / 200.0;
+        assert!((mean - 0.5).abs() < 0.06, "{mean}"); // three standard deviations of such a mean
+        assert!(some.is_sorted_by(|a, b| a.score >= b.score));
+        assert_eq!(some, drawn(all, 200, 5));
+    }
+
+    #[test]
+    fn diversity_is_among_the_good_ones() {
+        let all = vec![
+            grasp(0.0, 0.0, 0.9),
+            grasp(0.011, 0.0, 0.8),
+            grasp(0.05, 0.0, 0.75),
+            grasp(0.1, 1.5, 0.3),
+        ];
+        let scores = |diversity: f64| -> Vec<f64> {
+            diverse(all.clone(), 2, diversity, 0.1).iter().map(|g| g.score).collect()
+        };
+        assert_eq!(scores(0.0), [0.9, 0.8], "the plain ranking");
+        assert_eq!(scores(0.1), [0.9, 0.75], "at most a tenth below the second");
+        assert_eq!(scores(1.0), [0.9, 0.3], "the farthest of all");
+        assert_eq!(diverse(all.clone(), 9, 0.5, 0.1).len(), 4);
+        assert!(diverse(Vec::new(), 2, 0.1, 0.1).is_empty());
     }
 }

@@ -19,14 +19,23 @@ pub struct GraspSettings {
     pub seed: u64,
     /// Coulomb friction coefficient μ between pad and object.
     pub friction: f64,
+    /// Force with which each pad presses, newtons.
+    pub grip_force: f64,
+    /// Mass of the object, kilograms, where it is known: the score is then the probability that the grasp
+    /// holds. Without it the score ranks grasps as for an object of .3 kg.
+    pub mass: Option<f64>,
     /// Depth within which the pads give way and touch, metres.
     pub compliance: f64,
     /// How far the gripper comes straight from behind, along its approach, metres.
     pub retreat: f64,
     /// Grasps to return.
     pub top: usize,
-    /// 0 returns the best grasps, 1 those that differ most from each other.
+    /// How much score the returned grasps may give up to differ from each other: each has at least
+    /// (1 − `diversity`) times the score of the last that a plain ranking would return. 0 returns the best
+    /// ones, however near each other.
     pub diversity: f64,
+    /// Which of the grasps that passed every check are returned.
+    pub selection: Selection,
     /// Two grasps are one where they are nearer than this in both place and direction.
     pub separation: Separation,
     /// What a grasp must satisfy.
@@ -38,6 +47,16 @@ pub struct GraspSettings {
     pub gravity: Option<DVec3>,
     /// How much each term counts in the score.
     pub weights: ScoreWeights,
+}
+
+/// Which of the grasps that passed every check are returned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Selection {
+    /// The best ones, of near ones the best, as different as [`GraspSettings::diversity`] says.
+    #[default]
+    Best,
+    /// Drawn at random from all that passed, whatever their score: to measure how good a score is.
+    Random,
 }
 
 /// What a grasp must satisfy to be returned.
@@ -76,7 +95,14 @@ pub struct Separation {
 }
 
 /// Names of the terms of a score, in the order in which they are listed.
-pub const TERMS: [&str; 9] = [
+pub const TERMS: [&str; 16] = [
+    "arm",
+    "weight",
+    "closing",
+    "cone",
+    "even",
+    "centred",
+    "hang",
     "contact",
     "friction",
     "epsilon",
@@ -118,10 +144,13 @@ impl Default for GraspSettings {
             neighbour_rounds: 2,
             seed: 0,
             friction: 0.5,
+            grip_force: 30.0,
+            mass: None,
             compliance: 1.5e-3,
             retreat: 0.1,
             top: 20,
-            diversity: 0.3,
+            diversity: 0.1,
+            selection: Selection::Best,
             separation: Separation { translation: 0.01, rotation: 15f64.to_radians() },
             limits: Limits::default(),
             demonstrated_approach: None,
@@ -178,6 +207,10 @@ impl GraspSettings {
         within("separation.rotation", self.separation.rotation, 0.0, 3.2, "0 to π")?;
         within("compliance", self.compliance, 1e-5, 0.1, "0.01 mm to 0.1 m")?;
         within("friction", self.friction, 1e-3, 10.0, "0.001 to 10")?;
+        within("grip_force", self.grip_force, 0.1, 1e4, "0.1 to 10 000 N")?;
+        if let Some(mass) = self.mass {
+            within("mass", mass, 1e-4, 1e3, "0.1 g to 1000 kg")?;
+        }
         within("n_samples", self.n_samples as f64, 1.0, 1e7, "1 to 10 million")?;
         within("top", self.top as f64, 1.0, f64::MAX, "at least 1")?;
         if let Some(width) = &self.limits.width {

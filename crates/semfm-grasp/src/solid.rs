@@ -1,10 +1,21 @@
 //! Convex bodies at rest or swept along a line, as collision tests want them.
 
+use std::sync::Arc;
+
+use glam::{Mat3A, Vec3A};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::details::intersection_test_cuboid_triangle;
 use parry3d_f64::query::gjk::{self, CsoPoint, GJKResult, VoronoiSimplex};
 use parry3d_f64::shape::{Cuboid, SupportMap, Triangle, TypedShape};
 use semfm_geom::math::{DMat3, DVec3, bounds};
+
+use crate::box_tree::Bounds;
+
+/// Rounding of products and sums of three numbers in single precision, as a share of the largest.
+const ROUNDING: f64 = 2e-6;
+
+/// A rotation whose quaternion's vector is shorter is none: a part of 1 m moves by a nanometre.
+const UNTURNED: f64 = 5e-10;
 
 /// A sweep that leaves a box's axis by less than this (metres) still counts as along the axis.
 const ALONG_AXIS: f64 = 1e-9;
@@ -15,8 +26,32 @@ const ALONG_AXIS: f64 = 1e-9;
 pub(crate) struct Convex {
     centre: DVec3,
     half: DVec3,
-    corners: Option<Vec<DVec3>>,
+    hull: Option<Hull>,
 }
+
+/// The convex hull of some points, and of the same points moved along a path.
+#[derive(Clone, Debug)]
+struct Hull {
+    points: Arc<[DVec3]>,
+    path: DVec3,
+    /// Least and largest value along each of [`SLABS`].
+    slabs: [[f64; 2]; SLABS.len()],
+}
+
+/// Directions between the axes along which hulls are bounded. With them nine triangles of ten that miss a hull but
+/// meet its box are told without a search for the closest points.
+const SLABS: [DVec3; 10] = [
+    DVec3::new(1.0, 1.0, 0.0),
+    DVec3::new(1.0, -1.0, 0.0),
+    DVec3::new(1.0, 0.0, 1.0),
+    DVec3::new(1.0, 0.0, -1.0),
+    DVec3::new(0.0, 1.0, 1.0),
+    DVec3::new(0.0, 1.0, -1.0),
+    DVec3::new(1.0, 1.0, 1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(1.0, -1.0, -1.0),
+];
 
 impl Convex {
     /// The convex pieces of a shape, each with its pose in the shape's frame, or `None` for a shape
@@ -60,26 +95,28 @@ impl Convex {
     fn single_hull(points: &[DVec3]) -> Option<Vec<(Pose, Self)>> {
         let (low, high) = bounds(points)?;
         let (centre, half) = (low.midpoint(high), (high - low) / 2.0);
-        let piece = Self { centre, half, corners: Some(points.to_vec()) };
+        let hull = Some(Hull::new(points.iter().map(|&p| p - centre).collect()));
+        let piece = Self { centre, half, hull };
         Some(vec![(Pose::IDENTITY, piece)])
     }
 
     /// A box as the only piece; `None` where it has no bounds to speak of.
     fn single_box(centre: DVec3, half: DVec3) -> Option<Vec<(Pose, Self)>> {
         (centre.is_finite() && half.is_finite() && half.max_element() < 1e6)
-            .then(|| vec![(Pose::IDENTITY, Self { centre, half, corners: None })])
+            .then(|| vec![(Pose::IDENTITY, Self { centre, half, hull: None })])
     }
 
     /// The box with this centre and these half extents.
     pub(crate) fn cuboid(centre: DVec3, half: DVec3) -> Self {
-        Self { centre, half, corners: None }
+        Self { centre, half, hull: None }
     }
 
     /// Corners of the shape in its own frame.
     fn corners(&self) -> Vec<DVec3> {
-        self.corners
-            .clone()
-            .unwrap_or_else(|| (0..8).map(|i| self.centre + self.half * corner_signs(i)).collect())
+        match &self.hull {
+            Some(hull) => hull.points.iter().map(|&p| p + self.centre).collect(),
+            None => (0..8).map(|i| self.centre + self.half * corner_signs(i)).collect(),
+        }
     }
 
     /// Bounds of the shape at `pose`, in the frame that `pose` leads to.
@@ -91,31 +128,38 @@ impl Convex {
     /// Lowest value of `direction · point` over the shape at `pose`.
     pub(crate) fn lowest(&self, pose: &Pose, direction: DVec3) -> f64 {
         let local = pose.rotation.inverse() * direction;
-        let least = match &self.corners {
-            None => self.centre.dot(local) - self.half.dot(local.abs()),
-            Some(points) => points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min),
+        let least = match &self.hull {
+            None => -self.half.dot(local.abs()),
+            Some(hull) => {
+                hull.points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min)
+            }
         };
+        let least = least + self.centre.dot(local);
         least + pose.translation.dot(direction)
     }
 
     /// The shape at `pose`, at rest.
     pub(crate) fn at(&self, pose: &Pose) -> Solid {
         let frame = *pose * Pose::from_translation(self.centre);
-        let corners = self.corners.as_ref();
-        let local = corners.map(|points| points.iter().map(|&p| p - self.centre).collect());
-        Solid::new(frame, self.half, local)
+        Solid::new(frame, self.half, self.hull.clone())
     }
 
     /// Everything that the shape covers on its way from one pose to the other, if it moves on a
     /// line between them; where it also turns, the convex hull of both ends.
     pub(crate) fn swept(&self, from: &Pose, to: &Pose) -> Solid {
         let motion = from.inv_mul(to);
-        let still = motion.rotation.is_near_identity();
         let path = motion.translation;
         let off_axis = path.abs().element_sum() - path.abs().max_element();
-        if self.corners.is_none() && still && off_axis < ALONG_AXIS {
+        if motion.rotation.xyz().length() < UNTURNED {
+            // The box around both ends is the box around the whole way.
             let frame = *from * Pose::from_translation(self.centre + path / 2.0);
-            return Solid::new(frame, self.half + path.abs() / 2.0, None);
+            let half = self.half + path.abs() / 2.0;
+            let hull = match &self.hull {
+                None if off_axis < ALONG_AXIS => None,
+                None => Some(Hull::new(self.corners_around_centre()).moved(path)),
+                Some(hull) => Some(hull.moved(path)),
+            };
+            return Solid::new(frame, half, hull);
         }
         let start = self.corners();
         let all: Vec<DVec3> =
@@ -123,7 +167,41 @@ impl Convex {
         let (low, high) = bounds(&all).unwrap_or_default();
         let centre = low.midpoint(high);
         let frame = *from * Pose::from_translation(centre);
-        Solid::new(frame, (high - low) / 2.0, Some(all.into_iter().map(|p| p - centre).collect()))
+        let hull = Hull::new(all.into_iter().map(|p| p - centre).collect());
+        Solid::new(frame, (high - low) / 2.0, Some(hull))
+    }
+
+    fn corners_around_centre(&self) -> Vec<DVec3> {
+        (0..8).map(|i| self.half * corner_signs(i)).collect()
+    }
+}
+
+impl Hull {
+    fn new(points: Vec<DVec3>) -> Self {
+        let slabs = SLABS.map(|direction| {
+            let none = [f64::INFINITY, f64::NEG_INFINITY];
+            points.iter().map(|p| p.dot(direction)).fold(none, |[l, h], x| [l.min(x), h.max(x)])
+        });
+        Self { points: points.into(), path: DVec3::ZERO, slabs }
+    }
+
+    /// Of points that are at rest: the same along `path`, seen from the middle of the way.
+    fn moved(&self, path: DVec3) -> Self {
+        let mut slabs = self.slabs;
+        for (slab, direction) in slabs.iter_mut().zip(SLABS) {
+            let half = path.dot(direction).abs() / 2.0;
+            *slab = [slab[0] - half, slab[1] + half];
+        }
+        Self { points: self.points.clone(), path, slabs }
+    }
+
+    /// Whether one of [`SLABS`] shows that the triangle is farther than `margin`.
+    fn is_beside(&self, corners: [DVec3; 3], margin: f64) -> bool {
+        self.slabs.iter().zip(SLABS).any(|([low, high], direction)| {
+            let [a, b, c] = corners.map(|p| p.dot(direction));
+            let wide = margin * direction.length();
+            a.min(b).min(c) > high + wide || a.max(b).max(c) < low - wide
+        })
     }
 }
 
@@ -136,12 +214,12 @@ pub(crate) struct Solid {
     /// box_from_object as a matrix, which turns a triangle faster than a quaternion does.
     turn: DMat3,
     half: DVec3,
-    corners: Option<Vec<DVec3>>,
+    hull: Option<Hull>,
 }
 
 impl Solid {
-    fn new(frame: Pose, half: DVec3, corners: Option<Vec<DVec3>>) -> Self {
-        Self { frame, turn: DMat3::from_quat(frame.rotation).transpose(), half, corners }
+    fn new(frame: Pose, half: DVec3, hull: Option<Hull>) -> Self {
+        Self { frame, turn: DMat3::from_quat(frame.rotation).transpose(), half, hull }
     }
 
     /// An oriented box: its frame in the object's, and its half extents.
@@ -161,10 +239,36 @@ impl Solid {
 
     /// The box, grown by `margin`, as a question to many axis-aligned boxes.
     pub(crate) fn grown(&self, margin: f64) -> GrownBox {
-        let (turn, half) = (self.turn, self.half + margin);
+        let centre = self.frame.translation;
+        // Single precision has 24 bits: what rounding may take away is added first.
+        let rounding = ROUNDING * (centre.abs() + self.half).max_element();
+        let half = self.half + margin + rounding;
+        let turn = self.turn;
         let spread = DMat3::from_cols(turn.x_axis.abs(), turn.y_axis.abs(), turn.z_axis.abs());
         let reach = spread.transpose() * half;
-        GrownBox { centre: self.frame.translation, half, turn, spread, reach }
+        GrownBox {
+            centre: centre.as_vec3a(),
+            half: half.as_vec3a(),
+            turn: Mat3A::from_cols(
+                turn.x_axis.as_vec3a(),
+                turn.y_axis.as_vec3a(),
+                turn.z_axis.as_vec3a(),
+            ),
+            spread: Mat3A::from_cols(
+                spread.x_axis.as_vec3a(),
+                spread.y_axis.as_vec3a(),
+                spread.z_axis.as_vec3a(),
+            ),
+            reach: reach.as_vec3a(),
+        }
+    }
+
+    /// Whether the triangle's box may come nearer to the body's box than `least`.
+    pub(crate) fn may_be_nearer(&self, corners: &[DVec3; 3], least: f64) -> bool {
+        let [a, b, c] = corners.map(|p| self.local(p));
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let outside = (low - self.half).max(-self.half - high).max(DVec3::ZERO);
+        outside.length_squared() < least * least
     }
 
     /// Whether the body, grown by `margin`, meets the triangle (touching counts).
@@ -176,11 +280,13 @@ impl Solid {
             return false;
         }
         let triangle = Triangle::new(a, b, c);
-        match &self.corners {
+        match &self.hull {
             None => {
                 intersection_test_cuboid_triangle(&Pose::IDENTITY, &Cuboid::new(half), &triangle)
             }
-            Some(points) => !separated(&Hull(points), &triangle, margin),
+            Some(hull) => {
+                !hull.is_beside([a, b, c], margin) && !separated(hull, &triangle, margin)
+            }
         }
     }
 
@@ -191,9 +297,9 @@ impl Solid {
         if outside.length_squared() > margin * margin {
             return false;
         }
-        match &self.corners {
+        match &self.hull {
             None => true,
-            Some(points) => !separated(&Hull(points), &Triangle::new(p, p, p), margin),
+            Some(hull) => !separated(hull, &Triangle::new(p, p, p), margin),
         }
     }
 
@@ -201,48 +307,47 @@ impl Solid {
     pub(crate) fn distance(&self, corners: &[DVec3; 3], cap: f64) -> f64 {
         let [a, b, c] = corners.map(|p| self.local(p));
         let triangle = Triangle::new(a, b, c);
-        match &self.corners {
+        match &self.hull {
             None => gap(&Cuboid::new(self.half), &triangle, cap),
-            Some(points) => gap(&Hull(points), &triangle, cap),
+            Some(hull) if hull.is_beside([a, b, c], cap) => cap,
+            Some(hull) => gap(hull, &triangle, cap),
         }
     }
 }
 
-/// An oriented box that many axis-aligned ones are held against.
+/// An oriented box that many axis-aligned ones are held against, in single precision.
 pub(crate) struct GrownBox {
-    centre: DVec3,
-    half: DVec3,
-    turn: DMat3,
+    centre: Vec3A,
+    half: Vec3A,
+    turn: Mat3A,
     /// Absolute values of `turn`.
-    spread: DMat3,
+    spread: Mat3A,
     /// Half extents of the box around it.
-    reach: DVec3,
+    reach: Vec3A,
 }
 
 impl GrownBox {
     /// Whether the two overlap (six of the fifteen separating axes: it may say yes for a near miss,
     /// never no for a hit).
-    pub(crate) fn overlaps(&self, low: DVec3, high: DVec3) -> bool {
-        let (centre, extent) = (low.midpoint(high), (high - low) / 2.0);
+    pub(crate) fn overlaps(&self, bounds: &Bounds) -> bool {
+        let (centre, extent) =
+            ((bounds.low + bounds.high) * 0.5, (bounds.high - bounds.low) * 0.5);
         let offset = self.centre - centre;
         offset.abs().cmple(extent + self.reach).all()
             && (self.turn * offset).abs().cmple(self.half + self.spread * extent).all()
     }
 }
 
-/// The convex hull of some points.
-struct Hull<'a>(&'a [DVec3]);
-
-impl SupportMap for Hull<'_> {
+impl SupportMap for Hull {
     fn local_support_point(&self, direction: Vector) -> Vector {
         let mut best = (f64::NEG_INFINITY, DVec3::ZERO);
-        for &p in self.0 {
+        for &p in &*self.points {
             let along = p.dot(direction);
             if along > best.0 {
                 best = (along, p);
             }
         }
-        best.1
+        best.1 + self.path * (0.5 * self.path.dot(direction).signum())
     }
 }
 
@@ -289,7 +394,7 @@ mod tests {
             let way = turned * DVec3::new(0.0, 4.0, if slanted { 3.0 } else { 0.0 });
             let to = Pose::from_parts(way, turned);
             let solid = cube.swept(&from, &to);
-            assert_eq!(solid.corners.is_some(), slanted);
+            assert_eq!(solid.hull.is_some(), slanted);
             assert!(solid.meets_triangle(&tile(way / 2.0), 0.0));
             assert!(solid.meets_triangle(&tile(way), 0.0));
             assert!(!solid.meets_triangle(&tile(1.5 * way), 0.0));
@@ -300,7 +405,8 @@ mod tests {
     #[test]
     fn a_hull_and_a_box_of_the_same_corners_agree() {
         let plain = Convex::cuboid(DVec3::X, DVec3::new(0.5, 0.2, 0.3));
-        let hull = Convex { corners: Some(plain.corners()), ..plain.clone() };
+        let hull = Hull::new(plain.corners_around_centre());
+        let hull = Convex { hull: Some(hull), ..plain.clone() };
         let pose = Pose::new(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.5, -0.4, 0.2));
         let (a, b) = (plain.at(&pose), hull.at(&pose));
         let mut hits = 0;

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use semfm_geom::Mesh;
 use semfm_geom::math::DVec3;
 
@@ -47,4 +49,14 @@ pub(crate) fn joined(a: &Mesh, b: &Mesh) -> Mesh {
 /// The mesh moved by a map of its points.
 pub(crate) fn moved(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
     Mesh::new(mesh.vertices().iter().map(|&p| map(p)).collect(), mesh.faces().to_vec()).unwrap()
+}
+
+/// The mesh with independent normal noise of deviation `sigma` on each coordinate (twelve uniform numbers less six
+/// have a deviation of 1).
+pub(crate) fn noisy(mesh: &Mesh, sigma: f64, seed: u64) -> Mesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+    let points = mesh.vertices().iter().map(|&p| p + sigma * DVec3::from_array([(); 3].map(|()| normal())));
+    let points: Vec<DVec3> = points.collect();
+    Mesh::new(points, mesh.faces().to_vec()).unwrap()
 }

@@ -240,6 +240,7 @@ mod tests {
             contacts: [DVec3::new(0.0, 0.02, 0.012), DVec3::new(0.0, -0.02, 0.012)],
             normals: [DVec3::Y, -DVec3::Y],
             epsilon: 0.0,
+            closing_turn: 0.0,
             score: 1.0,
             terms: Vec::new(),
         };

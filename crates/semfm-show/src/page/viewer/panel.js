@@ -201,7 +201,7 @@ class Panel {
 
   // Clip space of a point p: scale · axes · (p − centre) + shift, orthographic.
   view() {
-    const aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1), unit = this.zoom / this.extent;
+    const aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1), unit = this.zoom * (this.hands?.reduction ?? 1) / this.extent;
     const [sx, sy] = aspect > 1 ? [unit / aspect, unit] : [unit, unit * aspect];
     const [right, up, back] = this.axes(), depth = -0.4 / this.radius;
     const clip = [], turn = [];
@@ -209,7 +209,7 @@ class Panel {
       clip.push(sx * right[i], sy * up[i], depth * back[i], 0);
       turn.push(right[i], up[i], back[i]);
     }
-    const at = axis => -dot(axis, this.centre);
+    const lift = this.hands?.lift?.() ?? [0, 0, 0], at = axis => dot(axis, lift) - dot(axis, this.centre);
     clip.push(sx * at(right) + this.shift[0], sy * at(up) + this.shift[1], depth * at(back), 1);
     return { clip, turn, spot: this.spot };
   }

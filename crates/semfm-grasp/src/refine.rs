@@ -1,0 +1,146 @@
+//! The best of what was found: moved to where each is best in its neighbourhood, and examined on the object as it is.
+
+use parry3d_f64::math::Pose;
+use rayon::prelude::*;
+use semfm_geom::Task;
+
+use crate::Result;
+use crate::candidate::Candidate;
+use crate::grasp::Grasp;
+use crate::neighbours::steps;
+use crate::rejection::Rejected;
+use crate::search::{Found, Near, Search};
+use crate::select::suppress;
+use crate::settings::Separation;
+
+/// Grasps that climb. With 12 the best grasp of a hammer still depended on the seed, 64 gain nothing more.
+const CLIMBERS: usize = 32;
+
+/// Lengths of the steps, as shares of the distance that makes two grasps two: from half a centimetre to half a
+/// millimetre.
+const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.12, 0.06];
+
+/// Moves at each length at most: a handle of 15 cm is as long as these.
+const MOVES: usize = 12;
+
+/// A move must raise the score by this: what rounding makes of one and the same grasp is less.
+const RISE: f64 = 1e-4;
+
+/// Of grasps found on a simpler surface so many times those asked for are examined on the object itself, and at least
+/// so many.
+const EXAMINED: (usize, usize) = (10, 200);
+
+impl Search<'_> {
+    /// Moves the best grasps to where each is best in its neighbourhood, so that which one is best of all depends on
+    /// the object and not on where the samples fell. Grasps that meet on the way become one.
+    pub(crate) fn climb(&self, found: Found, task: &Task) -> Result<Found> {
+        let Found { mut kept, n_survivors, sampled } = found;
+        if self.settings().neighbour_rounds == 0 {
+            return Ok(Found { kept, n_survivors, sampled });
+        }
+        let climbed: Vec<Grasp> = kept[..kept.len().min(CLIMBERS)]
+            .par_iter()
+            .map(|grasp| task.check().map(|()| self.climbed(grasp)))
+            .collect::<std::result::Result<_, _>>()?;
+        kept.splice(..climbed.len(), climbed);
+        let kept = suppress(kept, self.settings().separation);
+        Ok(Found { kept, n_survivors, sampled })
+    }
+
+    /// The steepest of the neighbours, again and again, with ever shorter steps.
+    fn climbed(&self, start: &Grasp) -> Grasp {
+        let mut best = start.clone();
+        for share in STEPS {
+            let Separation { translation, rotation } = self.settings().separation;
+            let moves = steps(share * translation, share * rotation);
+            for _ in 0..MOVES {
+                let Some(better) = self.best_neighbour(&best, &moves) else { break };
+                best = better;
+            }
+        }
+        best
+    }
+
+    fn best_neighbour(&self, grasp: &Grasp, moves: &[Pose]) -> Option<Grasp> {
+        let seed = [-grasp.width / 2.0, grasp.width / 2.0];
+        let tried = moves.iter().filter_map(|motion| {
+            let tcp = grasp.object_from_tcp * *motion;
+            self.examine(&Candidate { tcp, seed }).ok()
+        });
+        let best = tried.reduce(|a, b| if b.score > a.score { b } else { a })?;
+        (best.score > grasp.score + RISE).then_some(best)
+    }
+
+    /// Where contacts were sought on a simpler surface: the best grasps (`all` of them, or a multiple of those asked
+    /// for), closed and examined on the object as it is. Others are left out.
+    pub(crate) fn on_exact_surface(&self, found: Found, all: bool, task: &Task) -> Result<Found> {
+        if !self.object().is_simplified() {
+            return Ok(found);
+        }
+        let Found { kept, mut n_survivors, mut sampled } = found;
+        let (times, least) = EXAMINED;
+        let wanted =
+            if all { usize::MAX } else { self.settings().top.saturating_mul(times).max(least) };
+        let mut exact = Vec::new();
+        for part in kept.chunks(least) {
+            let results: Vec<std::result::Result<Grasp, Box<Near>>> = part
+                .par_iter()
+                .map(|grasp| task.check().map(|()| self.examine_exactly(grasp)))
+                .collect::<std::result::Result<_, _>>()?;
+            for result in results {
+                match result {
+                    Ok(grasp) => exact.push(grasp),
+                    Err(near) => {
+                        n_survivors -= 1;
+                        sampled.refuse(*near);
+                    }
+                }
+            }
+            if exact.len() >= wanted {
+                break;
+            }
+        }
+        exact.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(Found { kept: exact, n_survivors, sampled })
+    }
+}
+
+/// The stage that kept most candidates from being grasps: of those that reached it, it let the smallest share through.
+///
+/// Each share is that of one more than passed, so that the last stage, which passes none where nothing is found,
+/// counts for little where few came so far.
+pub(crate) fn main_reason(rejected: &Rejected, n_candidates: usize) -> Option<crate::Reason> {
+    let mut reached = n_candidates;
+    let mut main = None;
+    for (reason, count) in rejected.iter() {
+        let passed = reached.saturating_sub(count);
+        let share = (passed + 1) as f64 / (reached + 1) as f64;
+        if main.is_none_or(|(_, least)| share < least) {
+            main = Some((reason, share));
+        }
+        reached = passed;
+    }
+    main.map(|(reason, _)| reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Reason;
+
+    #[test]
+    fn the_main_reason_is_what_keeps_most_back() {
+        let counts = |rows: &[(Reason, usize)]| rows.iter().copied().collect::<Rejected>();
+        // Too thick, but ten that a gripper could span run into the object.
+        let thick = counts(&[
+            (Reason::ForceClosure, 6000),
+            (Reason::Width, 3990),
+            (Reason::Collision, 10),
+        ]);
+        assert_eq!(main_reason(&thick, 10_000), Some(Reason::Width));
+        // Good grasps all of them, but for what is asked last.
+        let near = counts(&[(Reason::ForceClosure, 9000), (Reason::Clearance, 1000)]);
+        assert_eq!(main_reason(&near, 10_000), Some(Reason::Clearance));
+        assert_eq!(main_reason(&Rejected::default(), 0), None);
+    }
+}
