@@ -16,7 +16,7 @@ use clap::{Parser, Subcommand};
 
 use commands::{
     NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, ik, info, plan,
-    region, show, transfer, views,
+    region, remember, show, transfer, views,
 };
 use options::Common;
 pub use process::own_process;
@@ -41,6 +41,7 @@ enum Command {
     Embed(embed::EmbedCommand),
     Region(region::RegionCommand),
     Transfer(Box<transfer::TransferCommand>),
+    Remember(remember::RememberCommand),
     Grasp(Box<grasp::GraspCommand>),
     Show(show::ShowCommand),
     Align(Box<align::AlignCommand>),
@@ -94,6 +95,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Command::Embed(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),
+        Command::Remember(command) => command.run(&common),
         Command::Grasp(command) => command.run(&common),
         Command::Show(command) => command.run(&common),
         Command::Align(command) => command.run(&common),

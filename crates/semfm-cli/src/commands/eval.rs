@@ -7,12 +7,14 @@ use clap::{ArgGroup, Args};
 use semfm::Method;
 use semfm::geom::ShapeCache;
 use semfm::geom::io::StagedFolder;
+use semfm::memory::MemorySettings;
 use semfm_eval::compare::Comparison;
 use semfm_eval::dataset::synthetic::{SyntheticSettings, make};
 use semfm_eval::dataset::{Dataset, folder};
 use semfm_eval::workers::Workers;
 use semfm_eval::{
-    EmbeddingSource, EvalSettings, OutputFolder, Override, Results, Variant, report, table, vlm,
+    EmbeddingSource, EvalSettings, MemoryEvalSettings, OutputFolder, Override, PreparationSettings,
+    Results, Variant, report, run_kinds, run_memory, table, vlm,
 };
 use semfm_synth::Level;
 use serde_json::json;
@@ -36,6 +38,7 @@ use crate::process::CtrlC;
     semfm-cli eval --synthetic -o report\n  \
     semfm-cli eval objects -o report\n  \
     semfm-cli eval objects --encoder google/siglip2-base-patch16-224 --methods fused,nearest,whole,oracle -o report\n  \
+    semfm-cli eval objects --memory 1,2,3,5,10 --distractors 10 -o report\n  \
     semfm-cli eval objects --embeddings embedded -o report --compare earlier/results.json\n\n\
     Exit code 0: measured (failed pairs are named in the results). 2: bad input, or nothing could be measured. 130: interrupted; what is done is kept.")]
 pub struct EvalCommand {
@@ -50,6 +53,8 @@ pub struct EvalCommand {
     features: FeatureOptions,
     #[command(flatten)]
     methods: MethodOptions,
+    #[command(flatten)]
+    memory: MemoryEvalOptions,
     #[command(flatten)]
     work: WorkOptions,
     #[command(flatten)]
@@ -108,6 +113,25 @@ struct MethodOptions {
 }
 
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Several demonstrations, and other kinds")]
+struct MemoryEvalOptions {
+    /// Measure memories of so many demonstrations of the target's kind instead of pairs, by `fused`
+    #[arg(long, value_name = "N,N", value_delimiter = ',', conflicts_with_all = ["methods", "set", "vlm",
+        "compare", "fresh", "no_predictions"])]
+    memory: Vec<usize>,
+    /// Measure, beside the pairs, so many pairs of different categories instead: are they refused?
+    #[arg(long, value_name = "N", conflicts_with_all = ["memory", "methods", "set", "vlm", "compare", "fresh",
+        "no_predictions"])]
+    nonsense: Option<usize>,
+    /// Objects of other kinds in each memory
+    #[arg(long, value_name = "N", requires = "memory", default_value_t = 0)]
+    distractors: usize,
+    /// Demonstrations that are matched, the most similar ones
+    #[arg(long, value_name = "N", requires = "memory", default_value_t = MemorySettings::default().shortlist)]
+    shortlist: usize,
+}
+
+#[derive(Debug, Args)]
 #[command(next_help_heading = "Work")]
 struct WorkOptions {
     /// Pairs at once; 0 takes one for each thread. Results do not depend on it
@@ -159,6 +183,12 @@ impl EvalCommand {
             dataset.notes.iter().for_each(|note| console::message(format_args!("note: {note}")));
         }
         let embeddings = self.embeddings(&dataset, common)?;
+        if !self.memory.memory.is_empty() {
+            return self.evaluate_memory(&dataset, &embeddings, ctrl_c, common);
+        }
+        if let Some(n) = self.memory.nonsense {
+            return self.evaluate_kinds(n, &dataset, &embeddings, ctrl_c, common);
+        }
         let settings = self.settings(common)?;
         self.announce(&dataset, &embeddings, &settings, common);
         let task = console::progress_with_time_left(common.quiet).with_cancel_flag(ctrl_c.flag());
@@ -190,6 +220,81 @@ impl EvalCommand {
         let results = finished.close()?;
         print_results(&results, comparison.as_ref(), &files, common);
         outcome_of(&results, common)
+    }
+
+    /// Memories of several demonstrations in place of pairs.
+    fn evaluate_memory(
+        &self,
+        dataset: &Dataset,
+        embeddings: &EmbeddingSource,
+        ctrl_c: &CtrlC,
+        common: &Common,
+    ) -> Result<Outcome> {
+        let mut settings = MemoryEvalSettings {
+            counts: self.memory.memory.clone(),
+            n_distractors: self.memory.distractors,
+            preparation: self.preparation(common),
+            ..MemoryEvalSettings::default()
+        };
+        settings.memory.shortlist = self.memory.shortlist;
+        let task = console::progress_with_time_left(common.quiet).with_cancel_flag(ctrl_c.flag());
+        let results = run_memory(dataset, embeddings, &settings, &task)?;
+        let staged = StagedFolder::new(&self.output)?;
+        results.write(staged.path())?;
+        let files = staged.put(&["memory.json"], &[])?;
+        if common.json {
+            let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+            console::data(json!({ "summaries": results.summaries, "files": files }));
+        } else {
+            console::data(results.to_markdown());
+            print_files(&files);
+        }
+        match results.rows.iter().find_map(|row| row.failure.as_ref()) {
+            Some(first) if results.summaries.is_empty() => {
+                bail!("no memory could be asked; the first: {}", first.text)
+            }
+            _ => Ok(Outcome::Done),
+        }
+    }
+
+    /// Pairs of different kinds beside those of one.
+    fn evaluate_kinds(
+        &self,
+        n_nonsense: usize,
+        dataset: &Dataset,
+        embeddings: &EmbeddingSource,
+        ctrl_c: &CtrlC,
+        common: &Common,
+    ) -> Result<Outcome> {
+        let task = console::progress_with_time_left(common.quiet).with_cancel_flag(ctrl_c.flag());
+        let settings = self.preparation(common);
+        let results = run_kinds(dataset, embeddings, n_nonsense, &settings, &task)?;
+        let staged = StagedFolder::new(&self.output)?;
+        results.write(staged.path())?;
+        let files = staged.put(&["kinds.json"], &[])?;
+        if common.json {
+            let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+            console::data(
+                json!({ "summaries": results.summaries, "scale": results.scale, "files": files }),
+            );
+        } else {
+            console::data(results.to_markdown());
+            print_files(&files);
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn preparation(&self, common: &Common) -> PreparationSettings {
+        let mut settings = PreparationSettings {
+            seed: self.methods.seed,
+            workers: Workers::new(common.threads, self.work.jobs),
+            cache: if self.work.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
+            ..PreparationSettings::default()
+        };
+        if let Some(n) = self.methods.working_vertices {
+            settings.shape.working_vertices = n;
+        }
+        settings
     }
 
     /// Files where some are named or lie beside the meshes; the simulated encoder for procedural
@@ -279,8 +384,18 @@ impl EvalCommand {
 }
 
 /// The files in the folder of results.
-const OUTPUTS: &[&str] =
-    &["results.json", "table.md", "index.html", "compare.json", "compare.md", "journal.jsonl"];
+const OUTPUTS: &[&str] = &[
+    "results.json",
+    "table.md",
+    "index.html",
+    "compare.json",
+    "compare.md",
+    "journal.jsonl",
+    "memory.json",
+    "memory.md",
+    "kinds.json",
+    "kinds.md",
+];
 
 /// The file itself, or the results in a folder.
 fn results_file(path: &Path) -> PathBuf {

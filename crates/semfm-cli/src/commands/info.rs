@@ -8,6 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use semfm::geom::connectivity::MeshReport;
 use semfm::geom::io::{MeshFormat, printable_name, read_at_most, read_mesh};
+use semfm::memory::Memory;
 use semfm::robot::{Arm, ArmJoint, ArmSettings, MeshPaths, MeshPlace, RobotDescription};
 use semfm::views::mcap::inspect;
 use serde_json::{Value, json};
@@ -16,14 +17,14 @@ use super::Outcome;
 use crate::console;
 use crate::options::{Common, parse_package};
 
-/// Say what is in a mesh, MCAP or URDF file, or why it is refused
+/// Say what is in a mesh, MCAP or URDF file or in a memory, or why it is refused
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  semfm-cli info mug.obj mug.emb.mcap --json\n\n\
     With --json, one object a line: `kind` and counts, or `error` with code, message and place.")]
 pub struct InfoCommand {
     #[arg(
         required = true,
-        help = format!("Mesh files ({}), MCAP files and robots (URDF)", MeshFormat::readable_names())
+        help = format!("Mesh files ({}), MCAP files, robots (URDF) and memories (folders)", MeshFormat::readable_names())
     )]
     files: Vec<PathBuf>,
     /// Folder of a package that a URDF names as package://NAME/…; may be given again
@@ -65,6 +66,9 @@ impl InfoCommand {
 
 /// The report on one file.
 fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Value> {
+    if path.is_dir() {
+        return look_at_memory(path);
+    }
     if is_mcap(path) {
         let report = serde_json::to_value(inspect(path)?);
         return Ok(with_kind("mcap", report.unwrap_or_default()));
@@ -87,6 +91,28 @@ fn look(path: &Path, packages: &BTreeMap<String, PathBuf>) -> semfm::Result<Valu
     value["has_colors"] = json!(!file.appearance.is_plain());
     value["notes"] = json!(file.appearance.notes);
     Ok(value)
+}
+
+/// The report on a memory: its encoder, and what each demonstration is.
+fn look_at_memory(path: &Path) -> semfm::Result<Value> {
+    let memory = Memory::open(path)?;
+    let entries: Vec<Value> = memory
+        .entries()
+        .iter()
+        .map(|entry| {
+            json!({
+                "name": entry.name,
+                "kind": entry.kind,
+                "n_region": entry.n_region,
+                "n_vertices": entry.mesh.n_vertices,
+                "hash": entry.mesh.hash.to_string(),
+                "provenance": entry.provenance,
+            })
+        })
+        .collect();
+    Ok(
+        json!({ "kind": "memory", "encoder": memory.encoder(), "n_entries": entries.len(), "entries": entries }),
+    )
 }
 
 /// The report on a robot: counts, what keeps it from being one tree, and meshes that are missing.
@@ -183,6 +209,7 @@ fn show(path: &Path, report: &Value) {
         match value {
             Value::Array(items) if items.is_empty() => {}
             Value::Null => {}
+            Value::Array(entries) if key == "entries" => entries.iter().for_each(show_entry),
             Value::Array(items) if items.iter().any(Value::is_object) => {
                 console::data(format_args!("  {key}"));
                 items.iter().for_each(|item| console::data(format_args!("    {item}")));
@@ -200,6 +227,19 @@ fn show(path: &Path, report: &Value) {
             other => console::data(format_args!("  {key:24} {other}")),
         }
     }
+}
+
+/// A demonstration of a memory as a line.
+fn show_entry(entry: &Value) {
+    let text = |value: &Value| printable_name(value.as_str().unwrap_or("-")).into_owned();
+    console::data(format_args!(
+        "    {:24} {:16} {} of {} vertices, from {}",
+        text(&entry["name"]),
+        text(&entry["kind"]),
+        entry["n_region"],
+        entry["n_vertices"],
+        text(&entry["provenance"]["mesh_file"])
+    ));
 }
 
 /// The arm as a table: a line a joint.

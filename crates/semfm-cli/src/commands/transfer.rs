@@ -10,6 +10,7 @@ use semfm::files::{
 };
 use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, read_mesh};
+use semfm::memory::MemorySettings;
 use semfm::object_encoder::EncodedPair;
 use semfm::views::{self, mcap::EmbeddingsFile};
 use semfm::{
@@ -20,6 +21,7 @@ use semfm_show::{PLAN_FILES, TRANSFER_FILES, TransferFiles};
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
 use super::grasp::{GraspOptions, gripper_help};
+use super::memory_transfer::MemoryQuestion;
 use super::motion_options::MotionOptions;
 use super::region::grown;
 use super::size::print_size;
@@ -28,7 +30,7 @@ use crate::console;
 use crate::options::Common;
 use crate::output::{check_folder, check_folder_again};
 
-/// Transfer a region from one object to another
+/// Transfer a region from one object, or from a memory of several, to another
 ///
 /// Features say which places of the two surfaces are alike. The built-in encoder makes them, or
 /// another one; or they come as embeddings files of both objects, or per vertex from any network. The
@@ -39,20 +41,27 @@ use crate::output::{check_folder, check_folder_again};
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --encoder google/siglip2-base-patch16-224\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out \\\n    \
     --source-embeddings mug.emb.mcap --target-embeddings kettle.emb.mcap\n  \
+    semfm-cli transfer kettle.ply --memory kitchen -o out\n  \
     semfm-cli transfer mug.obj kettle.ply --region grip.json -o out --gripper franka --metres \\\n    \
     --robot panda.urdf --srdf panda.srdf --base-from-object 0.5,0,0,0,0,0\n\n\
     Exit code 0: an answer to use or to check. 1: verdict `refuse`, no grasp, or none that the arm can carry out (every \
     file is written all the same). 2: bad input.")]
 pub struct TransferCommand {
-    /// The demonstrated object's mesh
+    /// The demonstrated object's mesh; with --memory that of the object to act on
     source: PathBuf,
     /// The mesh of the object to act on
-    target: PathBuf,
+    #[arg(required_unless_present = "memory", conflicts_with = "memory")]
+    target: Option<PathBuf>,
     /// The region on the source (JSON)
-    #[arg(long, value_name = "FILE")]
-    region: PathBuf,
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_unless_present = "memory",
+        conflicts_with = "memory"
+    )]
+    region: Option<PathBuf>,
     /// First complete the region, where one camera saw it, to the part that it belongs to
-    #[arg(long)]
+    #[arg(long, conflicts_with = "memory")]
     grow: bool,
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER")]
@@ -63,6 +72,8 @@ pub struct TransferCommand {
     /// Write no pictures and no scene for Foxglove
     #[arg(long, conflicts_with = "only")]
     no_pictures: bool,
+    #[command(flatten)]
+    memory: MemoryOptions,
     #[command(flatten)]
     features: FeatureOptions,
     #[command(flatten)]
@@ -83,6 +94,23 @@ pub struct TransferCommand {
 }
 
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Memory")]
+struct MemoryOptions {
+    /// Ask the demonstrations in this folder (`semfm-cli remember`) in place of one source; its grasps:
+    /// `semfm-cli grasp TARGET --region out/region.json`
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["gripper", "robot", "source_embeddings",
+        "source_features", "target_features", "features", "method", "rule", "working_vertices", "k",
+        "second_opinion"])]
+    memory: Option<PathBuf>,
+    /// Only demonstrations of this kind
+    #[arg(long, value_name = "TEXT", requires = "memory")]
+    kind: Option<String>,
+    /// Demonstrations that are matched, the most similar ones
+    #[arg(long, value_name = "N", requires = "memory", default_value_t = MemorySettings::default().shortlist)]
+    shortlist: usize,
+}
+
+#[derive(Debug, Args)]
 #[command(next_help_heading = "Features")]
 struct FeatureOptions {
     /// Embeddings of the source's views
@@ -90,7 +118,7 @@ struct FeatureOptions {
         conflicts_with_all = ["encoder", "rolls", "source_features"])]
     source_embeddings: Option<PathBuf>,
     /// Embeddings of the target's views
-    #[arg(long, value_name = "B.emb.mcap", requires = "source_embeddings")]
+    #[arg(long, value_name = "B.emb.mcap", conflicts_with_all = ["encoder", "rolls"])]
     target_embeddings: Option<PathBuf>,
     #[command(flatten)]
     encoder: EncoderOptions,
@@ -167,13 +195,20 @@ struct Pair<T> {
 impl TransferCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         check_folder(&self.output, TRANSFER_FILES, &self.inputs())?;
+        if let Some(memory) = &self.memory.memory {
+            return self.question(memory).answer(&self.output, common);
+        }
+        let given = &self.features;
+        if given.target_embeddings.is_some() && given.source_embeddings.is_none() {
+            bail!("--target-embeddings: expected --source-embeddings beside it, or --memory");
+        }
         if self.robot.is_some() {
             check_folder(&self.output.join(PLAN), PLAN_FILES, &self.inputs())?;
         }
         let task = console::progress(common.quiet);
         let settings = self.matching.settings(self.features.features);
-        let files = Pair { source: read_mesh(&self.source)?, target: read_mesh(&self.target)? };
-        let mut region = read_region(&self.region, &files.source.mesh)
+        let files = Pair { source: read_mesh(&self.source)?, target: read_mesh(self.target())? };
+        let mut region = read_region(self.region(), &files.source.mesh)
             .map_err(|error| self.or_region_of_target(error, &files.target.mesh))?;
         if self.grow {
             region = grown(&files.source.mesh, &region, None, common)?;
@@ -204,15 +239,48 @@ impl TransferCommand {
             region: &region,
             transfer: &transferred,
             provenance: self.provenance(&settings),
-            files: match (&self.only, self.no_pictures) {
-                (Some(_), _) => TransferFiles::Region,
-                (None, true) => TransferFiles::WithoutPictures,
-                (None, false) => TransferFiles::All,
-            },
+            files: self.files(),
             grasps,
             motion,
         };
         output.write(&self.output, &task, common)
+    }
+
+    /// The question to a memory.
+    fn question<'a>(&'a self, memory: &'a Path) -> MemoryQuestion<'a> {
+        MemoryQuestion {
+            memory,
+            target: &self.source,
+            embeddings: self.features.target_embeddings.as_deref(),
+            encoder: &self.features.encoder,
+            settings: MemorySettings {
+                shortlist: self.memory.shortlist,
+                kind: self.memory.kind.clone(),
+                ..MemorySettings::default()
+            },
+            files: self.files(),
+            no_cache: self.matching.no_cache,
+            seed: self.matching.seed,
+        }
+    }
+
+    /// Which files are written.
+    fn files(&self) -> TransferFiles {
+        match (&self.only, self.no_pictures) {
+            (Some(_), _) => TransferFiles::Region,
+            (None, true) => TransferFiles::WithoutPictures,
+            (None, false) => TransferFiles::All,
+        }
+    }
+
+    /// The mesh file of the target, which there always is without --memory.
+    fn target(&self) -> &Path {
+        self.target.as_deref().unwrap_or(&self.source)
+    }
+
+    /// The file of the region, which there always is without --memory.
+    fn region(&self) -> &Path {
+        self.region.as_deref().unwrap_or(Path::new(""))
     }
 
     /// The arm, where one is given.
@@ -220,7 +288,7 @@ impl TransferCommand {
         let Some(robot) = &self.robot else { return Ok(None) };
         let (packages, seed) = (self.grasps.packages(), self.matching.seed);
         let motion = self.motion.prepare(robot, packages, &self.robot_scene, seed)?;
-        let (target, folder) = (self.target.clone(), self.output.join(PLAN));
+        let (target, folder) = (self.target().to_owned(), self.output.join(PLAN));
         Ok(Some(ArmMotion { motion, target, folder }))
     }
 
@@ -234,8 +302,10 @@ impl TransferCommand {
             &features.target_features,
         ];
         let named = [&features.encoder.encoder, &self.gripper];
-        [&self.source, &self.target, &self.region]
-            .into_iter()
+        let memory = &self.memory.memory;
+        let pair = [&self.target, &self.region, memory];
+        std::iter::once(&self.source)
+            .chain(pair.into_iter().flatten())
             .chain(files.into_iter().flatten())
             .map(PathBuf::as_path)
             .chain(named.into_iter().flatten().map(Path::new))
@@ -248,12 +318,12 @@ impl TransferCommand {
     /// The error of a region that does not fit the source, or, where it fits the target, one that
     /// says so.
     fn or_region_of_target(&self, error: semfm::Error, target: &Mesh) -> anyhow::Error {
-        if RegionFile::read(&self.region).is_ok_and(|file| file.names(target)) {
+        if RegionFile::read(self.region()).is_ok_and(|file| file.names(target)) {
             return anyhow!(
                 "{}: this is a region of the target {}, but expected one of the source: are source and \
                  target swapped?",
-                self.region.display(),
-                self.target.display()
+                self.region().display(),
+                self.target().display()
             );
         }
         error.into()
@@ -343,15 +413,15 @@ impl TransferCommand {
         let named = |path: &Path| path.display().to_string();
         Ok(Pair {
             source: source.with_context(|| named(&self.source))?,
-            target: target.with_context(|| named(&self.target))?,
+            target: target.with_context(|| named(self.target()))?,
         })
     }
 
     fn provenance(&self, settings: &PipelineSettings) -> Provenance {
         let files = TransferInputs {
             source: self.source.display().to_string(),
-            target: self.target.display().to_string(),
-            region: self.region.display().to_string(),
+            target: self.target().display().to_string(),
+            region: self.region().display().to_string(),
         };
         Provenance {
             files: Some(files),

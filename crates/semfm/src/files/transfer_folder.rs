@@ -2,6 +2,7 @@
 //! `semfm-show`.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use semfm_fmap::{Anchor, PreparedObject};
 use semfm_geom::io::{
@@ -12,6 +13,7 @@ use semfm_geom::{Mesh, Task};
 use super::point_map::{FORMAT as POINT_MAP_FORMAT, PointMapFile};
 use super::transfer_report::{Provenance, TransferReportFile};
 use super::transferred_region::TransferredRegionFile;
+use crate::encoded_objects::milliseconds_since;
 use crate::upright::upright;
 use crate::weight_colors::{color_bytes, weight_colors};
 use crate::{Prepared, Region, Result, Transfer};
@@ -45,6 +47,17 @@ impl<'a> TransferResult<'a> {
     /// The content of `report.json`.
     pub fn report(&self) -> TransferReportFile {
         TransferReportFile::new(self)
+    }
+
+    /// Writes `report.json` into `folder`, after the other files: its stage `write` is the time since
+    /// `start`, when they were begun.
+    ///
+    /// # Errors
+    /// [`semfm_geom::Error::Io`].
+    pub fn write_report(&self, folder: &Path, start: Instant) -> Result<()> {
+        let mut report = self.report();
+        report.transfer.stages_ms.push("write", milliseconds_since(start));
+        report.write(&folder.join("report.json"))
     }
 
     /// Where the anchors lie on both objects.
@@ -109,7 +122,8 @@ pub struct ObjectAnchors {
 /// so that nothing there has a verdict unless everything is there.
 pub const ANSWERS: &[&str] = &["report.json", "region.json"];
 
-/// Every file that the folder of a transfer can have, with pictures and grasps.
+/// Every file that the folder of a transfer can have, with pictures and grasps; `memory.png` is that of a
+/// memory's answer.
 pub const FILES: &[&str] = &[
     "region.json",
     "report.json",
@@ -120,6 +134,7 @@ pub const FILES: &[&str] = &[
     "transfer.png",
     "features.png",
     "transfer.mcap",
+    "memory.png",
     "grasps.json",
     "grasps.png",
 ];
@@ -141,9 +156,11 @@ pub fn write_transfer(
     result: &TransferResult<'_>,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
+    let start = Instant::now();
     let staged = StagedFolder::new(folder)?;
-    answer_files(staged.path(), result)?;
+    region_file(staged.path(), result)?;
     data_files(staged.path(), result, task)?;
+    result.write_report(staged.path(), start)?;
     put_transfer(staged)
 }
 
@@ -154,8 +171,10 @@ pub fn write_transfer(
 /// # Errors
 /// As [`write_transfer`].
 pub fn write_answer(folder: &Path, result: &TransferResult<'_>) -> Result<Vec<PathBuf>> {
+    let start = Instant::now();
     let staged = StagedFolder::new(folder)?;
-    answer_files(staged.path(), result)?;
+    region_file(staged.path(), result)?;
+    result.write_report(staged.path(), start)?;
     put_transfer(staged)
 }
 
@@ -170,10 +189,9 @@ pub fn put_transfer(staged: StagedFolder) -> Result<Vec<PathBuf>> {
     Ok(staged.put(ANSWERS, &gone)?)
 }
 
-fn answer_files(folder: &Path, result: &TransferResult<'_>) -> Result<()> {
-    let [region, report] = ["region.json", "report.json"].map(|name| folder.join(name));
-    TransferredRegionFile::new(result.transfer, result.target_mesh()).write(&region)?;
-    result.report().write(&report)
+fn region_file(folder: &Path, result: &TransferResult<'_>) -> Result<()> {
+    let file = TransferredRegionFile::new(result.transfer, result.target_mesh());
+    file.write(&folder.join("region.json"))
 }
 
 fn data_files(folder: &Path, result: &TransferResult<'_>, task: &Task) -> Result<()> {
@@ -211,14 +229,14 @@ fn rounded(weight: f64) -> f64 {
 }
 
 /// A mesh as read with a weight per vertex, as property and as colour.
-fn write_weighted(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
+pub(super) fn write_weighted(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
     let colors = bytes_of(weights);
     let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
     Ok(write_mesh_with_attributes(path, mesh, &attributes)?)
 }
 
 /// The same as a GLB in whose scene the object stands upright; its coordinates stay as read.
-fn write_upright(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
+pub(super) fn write_upright(path: &Path, mesh: &Mesh, weights: &[f64]) -> Result<()> {
     let colors = bytes_of(weights);
     let attributes = VertexAttributes { colors: Some(&colors), scalars: &[("weight", weights)] };
     let rotation = upright(mesh)?.y_up_from_mesh().to_array();

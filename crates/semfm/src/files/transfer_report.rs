@@ -153,7 +153,7 @@ impl TransferReportFile {
 }
 
 impl ObjectRecord {
-    fn new(prepared: &Prepared) -> Self {
+    pub(super) fn new(prepared: &Prepared) -> Self {
         let (object, report) = (&prepared.object, &prepared.report);
         let lifted = report.lifted.as_ref();
         Self {
@@ -171,7 +171,8 @@ impl ObjectRecord {
     }
 }
 
-/// Milliseconds of every stage, preparation of both objects included.
+/// Milliseconds of wall time of every stage, preparation of both objects included. Stages of both objects run side by
+/// side, so that their sum is more than what passed.
 pub fn stages_ms(source: &Prepared, target: &Prepared, transfer: &Transfer) -> Stages {
     let mut stages = Stages::default();
     for (side, prepared) in [("source", source), ("target", target)] {

@@ -69,7 +69,7 @@ impl TransferredRegionFile {
 }
 
 impl HypothesisRecord {
-    fn new(hypothesis: &Hypothesis) -> Self {
+    pub(super) fn new(hypothesis: &Hypothesis) -> Self {
         let vertices = hypothesis.region.vertices();
         let weights = weights_at(&hypothesis.region, &vertices);
         Self { vertices, weights, probability: hypothesis.probability }
