@@ -8,7 +8,7 @@ use serde::de::{MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize};
 
-/// Time per stage in milliseconds, in the order in which the stages ran; a JSON object by name.
+/// Wall time per stage in milliseconds, in the order in which the stages ran; a JSON object by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stages(Vec<(Cow<'static, str>, f64)>);
 

@@ -1,6 +1,7 @@
 //! The folder of a transfer: files for programs, for people and for viewers.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use semfm::Task;
 use semfm::files::{self, TransferResult};
@@ -36,6 +37,7 @@ pub fn write_transfer(
     which: TransferFiles,
     task: &Task,
 ) -> Result<Vec<PathBuf>> {
+    let start = Instant::now();
     let staged = StagedFolder::new(folder)?;
     if which == TransferFiles::Region {
         files::write_answer(staged.path(), result)?;
@@ -65,5 +67,6 @@ pub fn write_transfer(
     }
     #[cfg(not(feature = "mcap"))]
     pictures()?;
+    result.write_report(staged.path(), start)?; // anew: the pictures belong to its stage `write`
     Ok(files::put_transfer(staged)?)
 }

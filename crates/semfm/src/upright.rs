@@ -43,13 +43,11 @@ pub fn upright(mesh: &Mesh) -> Result<Upright> {
         return Err(Error::invalid("mesh to be shown", "vertices", "none"));
     };
     let middle = (low + high) / 2.0;
-    let step = mesh.n_faces().div_ceil(N_FACETS).max(1);
-    let facets = (0..mesh.n_faces()).step_by(step).map(|face| Facet::new(mesh, face, middle));
-    let facets: Vec<Facet> = facets.collect();
-    let flat = flat_sides(&facets).into_iter().map(|normal| (-normal, 1.0));
+    let facets = Facets::new(mesh, middle);
+    let flat = facets.flat_sides().into_iter().map(|normal| (-normal, 1.0));
     let candidates = flat.chain([(DVec3::Y, FILE_AXIS), (DVec3::Z, FILE_AXIS)]);
     let (up, score) = candidates
-        .map(|(up, bonus)| (up, bonus * stability(&facets, up)))
+        .map(|(up, bonus)| (up, bonus * facets.stability(up)))
         .fold((DVec3::Z, 0.0), |best, next| if next.1 > best.1 { next } else { best });
     let is_sure = score >= LEAST_STABILITY;
     Ok(Upright { up: if is_sure { up } else { principal_axes(mesh)?.row(2) }, is_sure })
@@ -62,75 +60,99 @@ impl Upright {
     }
 }
 
-/// A triangle: its normal, twice its area long, and its corners.
+/// Triangles about the middle of the object.
+struct Facets {
+    /// The corners of all of them, each once.
+    points: Vec<DVec3>,
+    facets: Vec<Facet>,
+}
+
 struct Facet {
+    /// Twice the area long.
     normal: DVec3,
+    /// Length of the normal.
+    area: f64,
+    /// Sum of the corners.
+    sum: DVec3,
     corners: [DVec3; 3],
 }
 
-impl Facet {
-    fn new(mesh: &Mesh, face: usize, middle: DVec3) -> Self {
-        let corners @ [a, b, c] = mesh.corners(face).map(|p| p - middle);
-        Self { normal: (b - a).cross(c - a), corners }
+impl Facets {
+    fn new(mesh: &Mesh, middle: DVec3) -> Self {
+        let step = mesh.n_faces().div_ceil(N_FACETS).max(1);
+        let chosen = || (0..mesh.n_faces()).step_by(step);
+        let mut is_corner = vec![false; mesh.n_vertices()];
+        chosen().flat_map(|face| mesh.faces()[face]).for_each(|v| is_corner[v as usize] = true);
+        let vertices = mesh.vertices().iter().zip(is_corner);
+        let points = vertices.filter(|(_, is_corner)| *is_corner).map(|(&p, _)| p - middle);
+        let facets = chosen().map(|face| {
+            let corners @ [a, b, c] = mesh.corners(face).map(|p| p - middle);
+            let normal = (b - a).cross(c - a);
+            Facet { normal, area: normal.length(), sum: corners.iter().sum(), corners }
+        });
+        Self { points: points.collect(), facets: facets.collect() }
     }
 
-    /// Height of the middle.
-    fn height(&self, up: DVec3) -> f64 {
-        self.corners.iter().sum::<DVec3>().dot(up) / 3.0
+    /// Normals of the largest flat parts of the surface.
+    fn flat_sides(&self) -> Vec<DVec3> {
+        let bins: Vec<DVec3> = fibonacci_directions(N_BINS).collect();
+        let mut sums = vec![DVec3::ZERO; bins.len()];
+        for facet in &self.facets {
+            sums[nearest_direction(&bins, facet.normal)] += facet.normal;
+        }
+        sums.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
+        sums.into_iter().take(N_FLAT_SIDES).filter_map(DVec3::try_normalize).collect()
     }
-}
 
-/// Normals of the largest flat parts of the surface.
-fn flat_sides(facets: &[Facet]) -> Vec<DVec3> {
-    let bins: Vec<DVec3> = fibonacci_directions(N_BINS).collect();
-    let mut sums = vec![DVec3::ZERO; bins.len()];
-    for facet in facets {
-        sums[nearest_direction(&bins, facet.normal)] += facet.normal;
+    /// How well the object stands with this side up: the share of the surface that lies flat on the ground,
+    /// times how far the ground reaches as a share of the object's width where that is least. The first
+    /// alone would stand a bottle on its side, the second alone a mug on its rim.
+    fn stability(&self, up: DVec3) -> f64 {
+        // Heights of the middles.
+        let heights: Vec<f64> = self.facets.iter().map(|facet| facet.sum.dot(up) / 3.0).collect();
+        let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (mut flat, mut total) = (0.0, 0.0);
+        let mut ground = Vec::new();
+        for (facet, height) in self.facets.iter().zip(heights) {
+            total += facet.area;
+            if height - low < GROUND * (high - low) {
+                ground.extend(facet.corners);
+                if facet.normal.dot(up) < -FLAT * facet.area {
+                    flat += facet.area;
+                }
+            }
+        }
+        let x = up.any_orthonormal_vector();
+        let y = up.cross(x);
+        let reach = (0..N_WIDTHS)
+            .map(|i| {
+                let (sin, cos) = (std::f64::consts::PI * i as f64 / N_WIDTHS as f64).sin_cos();
+                let along = cos * x + sin * y;
+                width(&ground, along) / width(&self.points, along)
+            })
+            .fold(1.0, f64::min);
+        if total > 0.0 { flat / total * reach } else { 0.0 }
     }
-    sums.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
-    sums.into_iter().take(N_FLAT_SIDES).filter_map(DVec3::try_normalize).collect()
 }
 
 /// The direction with the largest product; the first of equals.
 fn nearest_direction(directions: &[DVec3], normal: DVec3) -> usize {
-    (1..directions.len()).fold(0, |best, i| {
-        if directions[i].dot(normal) > directions[best].dot(normal) { i } else { best }
-    })
-}
-
-/// How well an object stands with this side up: the share of the surface that lies flat on the ground,
-/// times how far the ground reaches as a share of the object's width where that is least. The first
-/// alone would stand a bottle on its side, the second alone a mug on its rim.
-fn stability(facets: &[Facet], up: DVec3) -> f64 {
-    let heights = facets.iter().map(|facet| facet.height(up));
-    let low = heights.clone().fold(f64::INFINITY, f64::min);
-    let high = heights.fold(f64::NEG_INFINITY, f64::max);
-    let is_low = |facet: &&Facet| facet.height(up) - low < GROUND * (high - low);
-    let (mut flat, mut total) = (0.0, 0.0);
-    for facet in facets {
-        let area = facet.normal.length();
-        total += area;
-        if is_low(&facet) && facet.normal.dot(up) < -FLAT * area {
-            flat += area;
+    let mut best = (0, f64::NEG_INFINITY);
+    for (i, direction) in directions.iter().enumerate() {
+        let product = direction.dot(normal);
+        if product > best.1 {
+            best = (i, product);
         }
     }
-    let x = up.any_orthonormal_vector();
-    let y = up.cross(x);
-    let reach = (0..N_WIDTHS)
-        .map(|i| {
-            let (sin, cos) = (std::f64::consts::PI * i as f64 / N_WIDTHS as f64).sin_cos();
-            let along = cos * x + sin * y;
-            width(facets.iter().filter(is_low), along) / width(facets.iter(), along)
-        })
-        .fold(1.0, f64::min);
-    if total > 0.0 { flat / total * reach } else { 0.0 }
+    best.0
 }
 
-/// Extent of the facets along a direction.
-fn width<'a>(facets: impl Iterator<Item = &'a Facet>, along: DVec3) -> f64 {
-    let (low, high) = facets
-        .flat_map(|facet| facet.corners)
-        .map(|corner| corner.dot(along))
+/// Extent of points along a direction.
+fn width(points: &[DVec3], along: DVec3) -> f64 {
+    let (low, high) = points
+        .iter()
+        .map(|point| point.dot(along))
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     (high - low).max(0.0)
 }
