@@ -4,6 +4,8 @@
 //!   ([`ObservationFiles`]) from folders of the BOP benchmark ([`BopScene`], [`write_bop`])
 //!   and, with the feature `mcap`, from bags of ROS 2 (`read_bag`, `write_bag`).
 //!   [`check_registration`] tells which camera a depth image belongs to.
+//! * **Hands**: what pose estimators reconstruct ([`read_hand`]), brought to its measured depth
+//!   ([`Hand::at_measured_depth`]), and where it touches ([`find_contact`]).
 //! * **Files of other programs**: depth images, masks, calibrations and NumPy's arrays, each with one reader.
 
 #[cfg(feature = "mcap")]
@@ -13,6 +15,7 @@ mod coco_rle;
 mod depth_image;
 mod distortion;
 mod error;
+mod hand;
 mod intrinsics;
 mod mask;
 mod npz;
@@ -28,6 +31,10 @@ pub use bop::{BopModel, BopScene, read_bop_models, write_bop};
 pub use depth_image::read_depth_image;
 pub use distortion::Distortion;
 pub use error::{Error, Result};
+pub use hand::{
+    Contact, ContactSettings, Hand, HandPart, HandShift, PartContact, find_contact, merge_contacts,
+    read_hand, read_vertex_ids,
+};
 pub use intrinsics::{Calibration, read_calibration, read_intrinsics};
 pub use mask::{MaskedPicture, read_labelled_mask, read_mask};
 pub use npz::NumpyArchive;
