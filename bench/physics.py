@@ -8,7 +8,7 @@ in kilograms, else ``--density`` gives it. Where MuJoCo is missing the program m
 own (``.venv-physics`` beside ``bench``) and starts again there.
 
 **Object.** Only pads touch it, so it is cut into convex columns along the closing axis, a fifth of the pad
-wide, over the pads and 12 mm around them: each column is the hull of what a grid of rays (half a column
+wide, over the pads and 8 mm around them: each column is the hull of what a grid of rays (half a column
 apart) and the mesh's vertices meet between the pads. What a gap narrower than a finger separates is one, as
 for the grasp itself. The error of the columns is measured at rays in between (``column_error``) and printed.
 Mass, centre of mass and inertia are those of the whole: of the volume where the mesh is watertight, of the
@@ -59,14 +59,14 @@ VERSION = 1
 #: Stiffness of the pads, N/m³: rubber of 1.5 MPa, 3 mm thick. 30 N press a full pad of 18 mm in by .2 mm.
 FOUNDATION = 5e8
 #: Columns across a pad, and how far beside it they still stand, metres.
-COLUMNS, BESIDE = 5, 0.012
+COLUMNS, BESIDE = 5, 0.008
 #: What stands out of the interval between the contacts by less than this belongs to what is held, metres.
 WINDOW = 0.006
 #: Least thickness of a column, metres: a sheet without inside has none of its own.
 THINNEST = 1e-3
 #: Kilograms and inertia factor of a finger.
 FINGER_MASS = 0.2
-STEP, STEPS_A_CONTROL = 0.002, 5
+STEP, STEPS_A_CONTROL = 0.0025, 4
 STAND_OFF, SPEED = 0.003, 0.03
 G = 9.81
 #: Standard deviations of the hand's place: metres, radians.
@@ -90,7 +90,8 @@ class Body:
 
     @classmethod
     def read(cls, path: Path, scale: float, n_triangles: int | None = None) -> Body:
-        mesh = trimesh.load(path, process=False, force="mesh", skip_materials=True)
+        mesh = trimesh.Trimesh(*read_obj(path), process=False) if path.suffix == ".obj" else None
+        mesh = mesh or trimesh.load(path, process=False, force="mesh", skip_materials=True)
         if n_triangles is not None and len(mesh.faces) != n_triangles:
             raise SystemExit(f"{path}: expected {n_triangles} triangles, found {len(mesh.faces)}")
         mesh.apply_scale(scale)
@@ -107,6 +108,20 @@ class Body:
         second += np.einsum("f,fi,fj->ij", areas / 12, total, total)
         inertia = (np.trace(second) * np.eye(3) - second) / areas.sum()
         return cls(mesh.vertices, mesh.faces, centre, inertia, None)
+
+
+def read_obj(path: Path) -> tuple[list, list]:
+    """Vertices and triangles alone, as they stand in the file: no textures, which would need other packages."""
+    vertices, faces = [], []
+    for line in path.read_text(errors="replace").splitlines():
+        word, *rest = line.split() or [""]
+        if word == "v":
+            vertices.append([float(x) for x in rest[:3]])
+        elif word == "f":
+            ids = [int(corner.split("/")[0]) for corner in rest]
+            ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]
+            faces += [(ids[0], b, c) for b, c in zip(ids[1:], ids[2:])]
+    return vertices, faces
 
 
 @dataclass

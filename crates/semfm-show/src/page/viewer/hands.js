@@ -7,13 +7,17 @@
 const TERMS = {
   approach: "the hand comes as it was demonstrated",
   bite: "the pads are filled along their length",
+  centred: "the forces act in the middle of the pads",
   clearance: "the open hand keeps 1 cm from everything",
+  closing: "the object does not turn while the pads close",
   contact: "each pad touches with 60 % of its face or more",
   epsilon: "the grip resists pushes and twists as well as two full pads",
+  evenness: "the whole of both pads is pressed evenly",
   friction: "the contacts oppose each other exactly",
-  gravity: "the weight does not turn the object between the pads",
+  gravity: "the weight asks for little of the torque that friction can hold",
   lever: "the grip is around the centre of mass",
   region: "all contact lies in the region",
+  weight: "the object weighs little against what friction can hold",
 };
 
 // a · b for motions of 3 × 4.
