@@ -1,5 +1,6 @@
 //! What becomes of a region that is transferred.
 
+use crate::confidence::verdict;
 use crate::hypotheses::Hypothesis;
 use crate::report::TransferReport;
 use crate::{PointMap, Region, Verdict};
@@ -27,6 +28,23 @@ pub struct Transfer {
 }
 
 impl Transfer {
+    /// The same answer where the objects are of one kind with this probability only, which was not known before: the
+    /// confidence is multiplied by it.
+    #[must_use]
+    pub fn if_of_one_kind(mut self, probability: f64) -> Self {
+        self.confidence *= probability;
+        self.verdict = verdict(self.confidence);
+        self.report.one_kind = Some(probability);
+        self
+    }
+
+    /// Why the answer is not accepted, in words, where more is known than that it is doubtful.
+    pub fn why(&self) -> Option<&'static str> {
+        let doubtful = self.verdict != Verdict::Accept;
+        (doubtful && self.report.is_not_alike())
+            .then_some("not alike: the two objects are hardly of one kind")
+    }
+
     /// Weight per target vertex, in [0, 1].
     pub fn weights(&self) -> &[f64] {
         self.region.weights()

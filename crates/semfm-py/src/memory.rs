@@ -58,7 +58,7 @@ impl Memory {
     }
 
     /// The encoder of this name, or the memory's own where none is given.
-    fn encoder(&self, py: Python<'_>, name: Option<&str>) -> PyResult<ObjectEncoder> {
+    fn open_encoder(&self, py: Python<'_>, name: Option<&str>) -> PyResult<ObjectEncoder> {
         let (own, settings) =
             self.read(|memory| (memory.encoder().cloned(), memory.settings().clone()));
         let rolls = own.as_ref().map(|own| own.rolls);
@@ -100,7 +100,7 @@ impl Memory {
 
     /// dict, optional: the encoder behind all features; None while the memory is empty.
     #[getter]
-    fn encoder_record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn encoder<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let encoder = self.read(|memory| memory.encoder().cloned());
         json::to_python(py, &encoder)
     }
@@ -153,7 +153,7 @@ impl Memory {
             (Some(embeddings), None) => {
                 Features::Given(embeddings_of(embeddings, "embeddings", &object.mesh)?)
             }
-            (None, encoder) => Features::Encoder(self.encoder(py, encoder)?),
+            (None, encoder) => Features::Encoder(self.open_encoder(py, encoder)?),
         };
         let memory = Arc::clone(&self.inner);
         run(py, progress, move |task| {
@@ -232,7 +232,7 @@ impl Memory {
                     Some(given) => {
                         Features::Given(embeddings_of(given, "embeddings", &object.mesh)?)
                     }
-                    None => Features::Encoder(self.encoder(py, encoder)?),
+                    None => Features::Encoder(self.open_encoder(py, encoder)?),
                 };
                 Target::Raw(object, given)
             }

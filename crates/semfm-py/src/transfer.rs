@@ -55,6 +55,12 @@ impl Transfer {
         self.inner.verdict.to_string()
     }
 
+    /// str, optional: why the answer is not accepted, where more is known than that it is doubtful.
+    #[getter]
+    fn why(&self) -> Option<&'static str> {
+        self.inner.why()
+    }
+
     /// list of Hypothesis: where the region may belong, by falling probability.
     #[getter]
     fn hypotheses(&self) -> Vec<Hypothesis> {

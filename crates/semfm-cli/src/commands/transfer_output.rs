@@ -165,7 +165,9 @@ impl TransferOutput<'_> {
         let (n, of) = (region.vertices().len(), region.n_vertices());
         console::data(format_args!("verdict     {verdict} (confidence {confidence:.2})"));
         console::data(format_args!("region      {n} of {of} vertices of the target"));
-        if region.is_empty() {
+        if let Some(why) = self.transfer.why() {
+            console::data(format_args!("why         {why}"));
+        } else if region.is_empty() {
             console::data(format_args!("why         {}", self.why_empty()));
         }
         if hypotheses.len() > 1 {

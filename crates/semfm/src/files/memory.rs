@@ -8,7 +8,6 @@ use semfm_geom::io::{FormatError, read_json};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::write_json;
 use crate::{EncoderRecord, Result};
 
 /// The format that is written.

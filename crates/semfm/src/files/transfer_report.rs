@@ -25,6 +25,9 @@ pub struct TransferReportFile {
     pub confidence: f64,
     /// What to do with the region.
     pub verdict: Verdict,
+    /// Why it is not accepted, in words, where more is known than that it is doubtful.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
     /// The demonstrated object.
     pub source: ObjectRecord,
     /// The object to act on.
@@ -123,6 +126,7 @@ impl TransferReportFile {
             format: FORMAT.into(),
             confidence: transfer.confidence,
             verdict: transfer.verdict,
+            why: transfer.why().map(str::to_owned),
             source: ObjectRecord::new(source),
             target: ObjectRecord::new(target),
             transfer: TransferReport { stages_ms, ..transfer.report.clone() },

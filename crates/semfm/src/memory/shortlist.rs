@@ -1,8 +1,10 @@
 //! Which demonstrations resemble an object.
 
 use semfm_fmap::likeness::PlainFeatures;
+use semfm_geom::LikenessScale;
 
 use super::Memory;
+use crate::files::EntryRecord;
 
 /// A demonstration and how much the target resembles it at first sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +28,7 @@ pub fn shortlist<'a>(
     let mut found: Vec<(Candidate, &str)> = demonstrations
         .enumerate()
         .map(|(place, (name, descriptor))| {
-            let pairs = descriptor.iter().zip(target.descriptor());
-            let similarity = f64::from(pairs.map(|(a, b)| a * b).sum::<f32>());
+            let similarity = cosine(descriptor, target.descriptor());
             (Candidate { place, similarity }, name)
         })
         .collect();
@@ -35,6 +36,32 @@ pub fn shortlist<'a>(
         b.similarity.total_cmp(&a.similarity).then_with(|| name_a.cmp(name_b))
     });
     found.into_iter().map(|(candidate, _)| candidate).take(count).collect()
+}
+
+/// Entries that the scale of similarity is read off, at most: each is compared with each.
+const MOST_COMPARED: usize = 200;
+
+/// How similar the mean features of entries of different kinds are, and of one kind, in the owner's words: what the
+/// features of an encoder that nobody measured are read by. None where no two entries have one kind, or all have.
+pub(super) fn similarity_of_kinds(entries: &[EntryRecord]) -> Option<LikenessScale> {
+    let named = entries.iter().filter(|entry| entry.kind.is_some()).take(MOST_COMPARED);
+    let named: Vec<&EntryRecord> = named.collect();
+    let (mut unlike, mut alike) = (Vec::new(), Vec::new());
+    for (place, entry) in named.iter().enumerate() {
+        for other in &named[..place] {
+            let similarity = cosine(&entry.descriptor, &other.descriptor);
+            if entry.kind == other.kind { &mut alike } else { &mut unlike }.push(similarity);
+        }
+    }
+    if unlike.is_empty() || alike.is_empty() {
+        return None;
+    }
+    LikenessScale::of(&unlike, &alike)
+}
+
+/// Of two vectors of unit length.
+fn cosine(a: &[f32], b: &[f32]) -> f64 {
+    f64::from(a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>())
 }
 
 impl Memory {

@@ -246,3 +246,25 @@ fn files_of_an_entry_that_are_not_its_own_are_named() {
     let error = again.transfer(&b.prepared(), &settings, &Task::default()).unwrap_err().to_string();
     assert!(error.contains(MESH) && error.contains("entry \"a\""), "{error}");
 }
+
+#[test]
+fn the_kinds_of_a_memory_say_how_similar_its_kinds_are() {
+    let entry = |name: &str, kind: Option<&str>, descriptor: [f32; 2]| EntryRecord {
+        name: name.into(),
+        kind: kind.map(str::to_owned),
+        folder: "0".repeat(16),
+        mesh: semfm_geom::MeshIdentity::of(&icosphere(1)),
+        n_region: 1,
+        region_hash: String::new(),
+        descriptor: descriptor.to_vec(),
+        provenance: crate::files::EntryProvenance::default(),
+    };
+    let (mug, pan) = (Some("mug"), Some("pan"));
+    let mugs = [entry("a", mug, [1.0, 0.0]), entry("b", mug, [0.8, 0.6])];
+    assert_eq!(shortlist::similarity_of_kinds(&mugs), None);
+    let [a, b] = mugs;
+    let unnamed = entry("c", None, [-1.0, 0.0]);
+    let scale = shortlist::similarity_of_kinds(&[a, b, unnamed, entry("d", pan, [0.0, 1.0])]);
+    let scale = scale.unwrap();
+    assert!((scale.alike - 0.8).abs() < 1e-6 && (scale.unlike - 0.3).abs() < 1e-6, "{scale:?}");
+}

@@ -11,6 +11,7 @@ use semfm_geom::{Mesh, Task, Verdict};
 use super::Candidate;
 use super::Memory;
 use super::entry_objects::EntryObject;
+use super::shortlist::similarity_of_kinds;
 use crate::encoded_objects::milliseconds_since;
 use crate::files::{EntryRecord, MemoryEncoder};
 use crate::{Error, Prepared, Region, Result, Transfer};
@@ -113,7 +114,16 @@ impl Memory {
             Ok(Matching::new(source, target, &self.settings().transfer, task)?
                 .transfer(&object.region)?)
         });
-        let transfers = transfers.collect::<Result<Vec<_>>>()?;
+        let mut transfers = transfers.collect::<Result<Vec<_>>>()?;
+        if target.object.confidence_weights().likeness.is_none()
+            && let Some(scale) = similarity_of_kinds(self.entries())
+        {
+            let said = transfers.into_iter().zip(&chosen);
+            let probability = |similarity| scale.probability_of_one_kind(similarity);
+            transfers = said
+                .map(|(transfer, of)| transfer.if_of_one_kind(probability(of.similarity)))
+                .collect();
+        }
         book("match");
         let answers: Vec<Answer<'_>> = objects
             .iter()
