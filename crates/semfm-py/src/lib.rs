@@ -29,6 +29,7 @@ mod interruptible;
 mod json;
 mod laplacian;
 mod matching;
+mod memory;
 mod mesh;
 mod pictures;
 mod pinhole;
@@ -86,6 +87,8 @@ mod _semfm {
     };
     #[pymodule_export]
     use crate::matching::{_restore_matching, Matching};
+    #[pymodule_export]
+    use crate::memory::{Memory, MemoryTransfer};
     #[pymodule_export]
     use crate::mesh::{Mesh, MeshFile, mesh_formats, read_mesh};
     #[pymodule_export]

@@ -257,7 +257,7 @@ impl Hypothesis {
         Self { region: Shared::new(region), probability }
     }
 
-    fn of(hypothesis: &fmap::Hypothesis) -> Self {
+    pub fn of(hypothesis: &fmap::Hypothesis) -> Self {
         let fmap::Hypothesis { region, probability, .. } = hypothesis;
         Self { region: Shared::new(region.clone()), probability: *probability }
     }
