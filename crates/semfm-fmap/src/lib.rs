@@ -90,7 +90,7 @@ pub use confidence::Evidence;
 pub use error::{Error, Result};
 pub use functional_map::FunctionalMap;
 pub use hypotheses::Hypothesis;
-pub use matching::{Matching, transfer};
+pub use matching::{Matching, transfer, transfer_with_anchors};
 pub use method::Method;
 pub use methods::semfm::{LabelledBasis, anchor_fit};
 pub use methods::{ConfidenceRule, Lifting, MethodInfo, ViewFeatures};

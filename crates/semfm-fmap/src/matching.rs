@@ -1,5 +1,7 @@
 //! A matched pair, and the short call that transfers one region.
 
+use std::sync::OnceLock;
+
 use semfm_geom::{Shape, Task};
 
 use crate::confidence::{
@@ -10,7 +12,8 @@ use crate::method::Method;
 use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
 use crate::metrics::overlap;
 use crate::report::{
-    MapQuality, OtherRule, TransferReport, TransportReport, anchor_reports, area_share,
+    AnchorReport, MapQuality, OtherRule, TransferReport, TransportReport, anchor_reports,
+    area_share,
 };
 use crate::settings::TransferSettings;
 use crate::stages::Stages;
@@ -18,7 +21,7 @@ use crate::transfer::Transfer;
 use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Result};
 
 /// Transfers `region`, which lies on the source's original vertices, to the target: a [`Matching`]
-/// for one region, whose report lists the anchors whatever the method, where there are features.
+/// for one region. Its report lists the anchors where the method reads them.
 ///
 /// # Errors
 /// [`Error::EmptyRegion`], [`Error::Length`] where the region is not one of the source's mesh or
@@ -27,6 +30,22 @@ use crate::{Anchors, Error, FunctionalMap, PointMap, PreparedObject, Region, Res
 /// [`Error::LinearAlgebra`], [`Error::NotOriented`] for `wks` with an orientation, [`Error::Geom`] on
 /// cancellation. A region that lands nowhere is no error but a refusal.
 pub fn transfer(
+    source: &PreparedObject,
+    target: &PreparedObject,
+    region: &Region,
+    settings: &TransferSettings,
+    task: &Task,
+) -> Result<Transfer> {
+    check_region(region, source.shape().original().n_vertices())?;
+    Matching::new(source, target, settings, task)?.transfer(region)
+}
+
+/// [`transfer`] with a report that lists the anchors whatever the method, where there are features: for answers that
+/// people look at.
+///
+/// # Errors
+/// As [`transfer`].
+pub fn transfer_with_anchors(
     source: &PreparedObject,
     target: &PreparedObject,
     region: &Region,
@@ -49,6 +68,10 @@ pub struct Matching {
     /// The second opinion beside a method without a map: the map of `fused`.
     second_map: Option<SecondMap>,
     stages: Stages,
+    /// What reports and answers say of the match, whatever the region: made for the first one.
+    point_map: OnceLock<PointMap>,
+    quality: OnceLock<MapQuality>,
+    anchor_reports: OnceLock<Vec<AnchorReport>>,
 }
 
 /// A map of `fused` beside another method, and the settings that it was made with.
@@ -98,7 +121,16 @@ impl Matching {
             let matched = (Method::Fused.info().matched)(&pair, &settings, &mut stages, task)?;
             second_map = Some(SecondMap { settings, matched });
         }
-        Ok(Self { pair, settings, matched, second_map, stages })
+        Ok(Self {
+            pair,
+            settings,
+            matched,
+            second_map,
+            stages,
+            point_map: OnceLock::new(),
+            quality: OnceLock::new(),
+            anchor_reports: OnceLock::new(),
+        })
     }
 
     /// The demonstrated object.
@@ -169,7 +201,7 @@ impl Matching {
             confidence,
             verdict: verdict(confidence),
             hypotheses: self.hypotheses(&voted, second.as_deref())?,
-            point_map: self.matched.point_map.onto_originals(source, target),
+            point_map: self.point_map().clone(),
             other_rule: other.map(|votes| onto_original(target, &votes)).transpose()?,
             report: TransferReport {
                 settings: self.settings.clone(),
@@ -193,9 +225,16 @@ impl Matching {
     fn complete(&self, report: &mut TransferReport) {
         let (pair, matched) = (&self.pair, &self.matched);
         if let Some(clustered) = pair.clustered() {
-            report.anchors = anchor_reports(pair, clustered, &matched.point_map);
+            let reports = || anchor_reports(pair, clustered, &matched.point_map);
+            report.anchors = self.anchor_reports.get_or_init(reports).clone();
         }
-        report.map = MapQuality::of(pair, matched);
+        report.map = self.quality.get_or_init(|| MapQuality::of(pair, matched)).clone();
+    }
+
+    /// The point map between the meshes as read.
+    fn point_map(&self) -> &PointMap {
+        let (source, target) = (self.source().shape(), self.target().shape());
+        self.point_map.get_or_init(|| self.matched.point_map.onto_originals(source, target))
     }
 
     fn vote(&self, region: &Region) -> Result<Voted> {
@@ -281,7 +320,8 @@ impl Matching {
     /// The probability that the objects are of one kind, where the scale of likeness is known of either object's
     /// features: where they differ, the more cautious one.
     fn one_kind(&self, likeness: f64) -> Option<f64> {
-        let scales = [self.source(), self.target()].map(|object| object.confidence_weights().likeness);
+        let scales =
+            [self.source(), self.target()].map(|object| object.confidence_weights().likeness);
         let known = scales.into_iter().flatten();
         known.map(|scale| scale.probability_of_one_kind(likeness)).reduce(f64::min)
     }

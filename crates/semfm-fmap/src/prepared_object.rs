@@ -7,7 +7,7 @@ use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use semfm_geom::descriptors::{WksSettings, wks};
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{ConfidenceWeights, PointIndex, SemanticCloud, Shape, Task};
+use semfm_geom::{ConfidenceWeights, HeatStep, PointIndex, SemanticCloud, Shape, Task};
 
 use crate::clusters::{ClusterSettings, Clusters, spectral_clusters};
 use crate::features::CentredFeatures;
@@ -33,8 +33,8 @@ const LEAST_MASS: f64 = 1e-3;
 /// the frame and units of its mesh as read), and what follows from the two, each made once.
 ///
 /// n is the number of working vertices, M that of the cloud's points. A clone shares everything with
-/// its original and costs nothing. The semantic clusters, the samples and the neighbour graph are
-/// made when something first reads them.
+/// its original and costs nothing. The semantic clusters, the samples, the neighbour graph and the factor that
+/// smooths votes are made when something first reads them.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -75,7 +75,14 @@ struct Derived {
     plain: OnceLock<PlainFeatures>,
     samples: OnceLock<Vec<u32>>,
     graph: OnceLock<NeighbourGraph>,
+    heat_step: OnceLock<KeptHeatStep>,
     point_of_original_vertex: OnceLock<Vec<u32>>,
+}
+
+/// A step of heat diffusion and its time.
+struct KeptHeatStep {
+    time: f64,
+    step: HeatStep,
 }
 
 /// Clusters and the settings that they were cut by.
@@ -145,6 +152,7 @@ impl PreparedObject {
             plain: OnceLock::new(),
             samples: OnceLock::new(),
             graph: OnceLock::new(),
+            heat_step: OnceLock::new(),
             point_of_original_vertex: OnceLock::new(),
         };
         Ok(Self {
@@ -264,6 +272,21 @@ impl PreparedObject {
             features.squared_distance(i, j)
         })?;
         Ok(self.derived.graph.get_or_init(|| graph))
+    }
+
+    /// [`Shape::smooth`] for values on the working vertices (n); the factor of the first time asked for is kept.
+    pub(crate) fn smooth(&self, values: &[f64], time: f64) -> Result<Vec<f64>> {
+        let kept = match self.derived.heat_step.get() {
+            Some(kept) => kept,
+            None => {
+                let step = self.shape().heat_step(time)?;
+                self.derived.heat_step.get_or_init(|| KeptHeatStep { time, step })
+            }
+        };
+        if kept.time == time {
+            return Ok(kept.step.smooth(values)?);
+        }
+        Ok(self.shape().smooth(values, time)?)
     }
 
     /// Values on the cloud's points (M), mixed onto the working vertices (n).

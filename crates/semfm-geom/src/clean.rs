@@ -1,6 +1,5 @@
 //! Cleaning: a mesh from anywhere made fit for a Laplacian, with every step counted.
 
-use std::collections::HashSet;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -135,15 +134,14 @@ pub fn clean(mesh: &Mesh, settings: &CleanSettings) -> Result<Cleaned> {
 
 /// The triangles with three different corners, once each, on welded ids.
 fn sound_faces(mesh: &Mesh, first: &[u32], report: &mut CleanReport) -> Vec<[u32; 3]> {
-    let mut seen = HashSet::with_capacity(mesh.n_faces());
+    let welded: Vec<[u32; 3]> =
+        mesh.faces().iter().map(|ids| ids.map(|id| first[id as usize])).collect();
+    let is_repeated = repeated(&welded, mesh.n_vertices());
     let mut sound = Vec::with_capacity(mesh.n_faces());
-    for (face, ids) in mesh.faces().iter().enumerate() {
-        let [a, b, c] = ids.map(|id| first[id as usize]);
-        let mut sorted = [a, b, c];
-        sorted.sort_unstable();
+    for (face, &[a, b, c]) in welded.iter().enumerate() {
         if a == b || b == c || c == a {
             report.collapsed_faces += 1;
-        } else if !seen.insert(sorted) {
+        } else if is_repeated[face] {
             report.duplicate_faces += 1;
         } else {
             report.flat_faces += usize::from(mesh.face_area(face) <= 0.0);
@@ -151,6 +149,57 @@ fn sound_faces(mesh: &Mesh, first: &[u32], report: &mut CleanReport) -> Vec<[u32
         }
     }
     sound
+}
+
+/// For each triangle, whether an earlier one has its corners, in whatever order.
+fn repeated(faces: &[[u32; 3]], n_vertices: usize) -> Vec<bool> {
+    // By their lowest corner; of each the other two, and the triangle.
+    let sorted = faces.iter().map(|&ids| {
+        let mut ids = ids;
+        ids.sort_unstable();
+        ids
+    });
+    let triangles = (0u32..).zip(sorted).map(|(face, [a, b, c])| (a, ([b, c], face)));
+    let mut lists = ListsByVertex::new(n_vertices, triangles);
+    let mut is_repeated = vec![false; faces.len()];
+    lists.for_each(|list| {
+        list.sort_unstable();
+        for pair in list.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            is_repeated[pair[1].1 as usize] = true;
+        }
+    });
+    is_repeated
+}
+
+/// Things that belong to vertices, those of a vertex together.
+pub(crate) struct ListsByVertex<T> {
+    /// Where the things of each vertex begin (n + 1).
+    starts: Vec<usize>,
+    things: Vec<T>,
+}
+
+impl<T: Copy + Default> ListsByVertex<T> {
+    pub fn new(n_vertices: usize, things: impl Iterator<Item = (u32, T)> + Clone) -> Self {
+        let mut starts = vec![0; n_vertices + 1];
+        things.clone().for_each(|(vertex, _)| starts[vertex as usize + 1] += 1);
+        for vertex in 0..n_vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let mut all = vec![T::default(); starts[n_vertices]];
+        let mut next = starts.clone();
+        for (vertex, thing) in things {
+            all[next[vertex as usize]] = thing;
+            next[vertex as usize] += 1;
+        }
+        Self { starts, things: all }
+    }
+
+    /// Calls `work` with the list of each vertex in turn.
+    pub fn for_each(&mut self, mut work: impl FnMut(&mut [T])) {
+        for range in self.starts.windows(2) {
+            work(&mut self.things[range[0]..range[1]]);
+        }
+    }
 }
 
 /// The triangles whose component is more than dust.

@@ -44,7 +44,7 @@ pub mod zoo;
 
 pub use cache::{CachedShape, ShapeCache};
 pub use camera::{Intrinsics, Pinhole, PixelDepth};
-pub use cholesky::SparseCholesky;
+pub use cholesky::{CholeskyAnalysis, SparseCholesky};
 pub use clean::{CleanReport, CleanSettings, Cleaned, clean};
 pub use confidence_weights::ConfidenceWeights;
 pub use eigenbasis::Eigenbasis;
@@ -59,7 +59,7 @@ pub use point_index::PointIndex;
 pub use principal_axes::principal_axes;
 pub use semantic_cloud::SemanticCloud;
 pub use sequential_faer::keep_faer_sequential;
-pub use shape::{Shape, ShapeReport, ShapeSettings, ShapeTimes};
+pub use shape::{HeatStep, Shape, ShapeReport, ShapeSettings, ShapeTimes};
 pub use simplify::{Simplified, SimplifyReport, SimplifySettings, Topology, simplify};
 pub use surface::{RayHit, SurfaceIndex, SurfacePoint};
 pub use task::{Progress, Task};

@@ -1,12 +1,10 @@
 //! Simplification: fewer, more even triangles on a subset of the vertices, same topology.
 
-use std::collections::HashSet;
-
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::clean::roots;
-use crate::collapse::{Collapsed, collapse};
+use crate::clean::{ListsByVertex, roots};
+use crate::collapse::{Collapsed, Collapses};
 use crate::math::DVec3;
 use crate::surface::{SurfaceIndex, SurfacePoint};
 use crate::{Error, Mesh, Result, Task};
@@ -63,17 +61,19 @@ impl Topology {
     /// Counts components, vertices in use, edges and triangles of `mesh`.
     pub fn of(mesh: &Mesh) -> Self {
         let root = roots(mesh.n_vertices(), mesh.faces());
-        let used: HashSet<u32> = mesh.faces().iter().flatten().copied().collect();
-        let n_components = used.iter().filter(|&&id| root[id as usize] == id).count();
-        let mut edges: Vec<(u32, u32)> = mesh
-            .faces()
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(a, b)| (a.min(b), a.max(b)))
-            .collect();
-        edges.par_sort_unstable();
-        edges.dedup();
-        let euler = used.len() as i64 - edges.len() as i64 + mesh.n_faces() as i64;
+        let mut is_used = vec![false; mesh.n_vertices()];
+        mesh.faces().iter().flatten().for_each(|&id| is_used[id as usize] = true);
+        let used = || (0u32..).zip(&is_used).filter(|(_, is_used)| **is_used).map(|(id, _)| id);
+        let n_components = used().filter(|&id| root[id as usize] == id).count();
+        let sides = mesh.faces().iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut higher_ends =
+            ListsByVertex::new(mesh.n_vertices(), sides.map(|(a, b)| (a.min(b), a.max(b))));
+        let mut n_edges = 0;
+        higher_ends.for_each(|ends| {
+            ends.sort_unstable();
+            n_edges += ends.chunk_by(|a, b| a == b).count() as i64;
+        });
+        let euler = used().count() as i64 - n_edges + mesh.n_faces() as i64;
         Self { n_components, euler }
     }
 }
@@ -111,19 +111,21 @@ pub fn simplify(
     if target == 0 || n <= target {
         return Ok(None);
     }
+    let collapses = Collapses::new(mesh, target, task)?;
     let before = SurfaceIndex::new(mesh)?;
     let mut attempts = 0;
     while target < n {
         attempts += 1;
         task.check()?;
-        let (working, to_before) = on_fewer(mesh, target, task)?;
-        let of_before =
-            closest_points(&SurfaceIndex::new(&working)?, mesh.vertices().par_iter().copied())?;
+        let Fewer { mesh: working, to_before, came_to } = Fewer::new(mesh, &collapses, target)?;
         let centres = (0..working.n_faces()).into_par_iter().map(|face| {
             let [a, b, c] = working.corners(face);
-            (a + b + c) / 3.0
+            ((a + b + c) / 3.0, f64::MAX)
         });
         let back = closest_points(&before, centres)?;
+        let vertices = (mesh.vertices().par_iter().zip(&came_to))
+            .map(|(&p, &kept)| (p, reach(p.distance(mesh.vertices()[kept as usize]))));
+        let of_before = closest_points(&SurfaceIndex::new(&working)?, vertices)?;
         let farthest = of_before.iter().chain(&back).map(|p| p.distance).fold(0.0, f64::max);
         let distance = farthest / mesh.diagonal();
         if distance <= settings.most_distance {
@@ -143,30 +145,48 @@ pub fn simplify(
     Ok(None)
 }
 
+/// How far to look for the nearest point of a surface that has a point at this distance.
+fn reach(distance: f64) -> f64 {
+    distance * (1.0 + 1e-9) + f64::MIN_POSITIVE
+}
+
+/// The point of the surface nearest to each of some points, of which each knows how far to look first.
 fn closest_points(
     surface: &SurfaceIndex,
-    points: impl IndexedParallelIterator<Item = DVec3>,
+    points: impl IndexedParallelIterator<Item = (DVec3, f64)>,
 ) -> Result<Vec<SurfacePoint>> {
+    let closest =
+        |(p, reach)| surface.closest_among(p, reach, |_| true).or_else(|| surface.closest(p));
     // Only coordinates whose squares overflow have no closest point.
-    points.map(|p| surface.closest(p)).collect::<Option<_>>().ok_or_else(|| Error::OutOfRange {
+    points.map(closest).collect::<Option<_>>().ok_or_else(|| Error::OutOfRange {
         what: "coordinates",
         expected: "a mesh whose squared diagonal is finite".into(),
         found: "one beyond 1e150".into(),
     })
 }
 
-/// One run of the collapse: the simpler mesh and, for each of its vertices, the vertex before.
-fn on_fewer(mesh: &Mesh, target: usize, task: &Task) -> Result<(Mesh, Vec<u32>)> {
-    let Collapsed { faces, kept } = collapse(mesh, target, task)?;
-    let to_before: Vec<u32> =
-        (0..mesh.n_vertices() as u32).filter(|&id| kept[id as usize]).collect();
-    let mut new_id = vec![u32::MAX; mesh.n_vertices()];
-    for (new, &before) in (0u32..).zip(&to_before) {
-        new_id[before as usize] = new;
+/// A simpler mesh and how its vertices belong to those before.
+struct Fewer {
+    mesh: Mesh,
+    /// For each of its vertices the vertex before; ascending.
+    to_before: Vec<u32>,
+    /// For each vertex before the one that it was moved onto, by its number before.
+    came_to: Vec<u32>,
+}
+
+impl Fewer {
+    fn new(mesh: &Mesh, collapses: &Collapses<'_>, target: usize) -> Result<Self> {
+        let Collapsed { faces, kept, came_to } = collapses.down_to(target);
+        let to_before: Vec<u32> =
+            (0..mesh.n_vertices() as u32).filter(|&id| kept[id as usize]).collect();
+        let mut new_id = vec![u32::MAX; mesh.n_vertices()];
+        for (new, &before) in (0u32..).zip(&to_before) {
+            new_id[before as usize] = new;
+        }
+        let vertices = to_before.iter().map(|&id| mesh.vertices()[id as usize]).collect();
+        let faces = faces.iter().map(|ids| ids.map(|id| new_id[id as usize])).collect();
+        Ok(Self { mesh: Mesh::new(vertices, faces)?, to_before, came_to })
     }
-    let vertices = to_before.iter().map(|&id| mesh.vertices()[id as usize]).collect();
-    let faces = faces.iter().map(|ids| ids.map(|id| new_id[id as usize])).collect();
-    Ok((Mesh::new(vertices, faces)?, to_before))
 }
 
 #[cfg(test)]

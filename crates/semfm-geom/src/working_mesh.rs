@@ -39,7 +39,7 @@ pub struct PreparedWorkingMesh {
 pub struct BarycentricPoint {
     /// Working vertices.
     pub corners: [u32; 3],
-    /// Their weights, each in [0, 1], adding up to 1.
+    /// Their weights, each in [0, 1], adding up to 1; the last two have single precision.
     pub weights: [f64; 3],
 }
 
@@ -50,7 +50,14 @@ impl BarycentricPoint {
     }
 
     fn on(mesh: &Mesh, place: &SurfacePoint) -> Self {
-        Self { corners: mesh.faces()[place.face as usize], weights: place.barycentric }
+        let [_, second, third] = place.barycentric;
+        Self::new(mesh.faces()[place.face as usize], [second as f32, third as f32])
+    }
+
+    /// The point with these weights of the second and third corner.
+    pub(crate) fn new(corners: [u32; 3], of_others: [f32; 2]) -> Self {
+        let [second, third] = of_others.map(f64::from);
+        Self { corners, weights: [(1.0 - second - third).max(0.0), second, third] }
     }
 
     /// The corner nearest to `position`; among equals the first.
@@ -193,7 +200,7 @@ mod tests {
         let working = working(&mesh, 100);
         let x: Vec<f64> = working.mesh.vertices().iter().map(|p| p.x).collect();
         for (x, p) in working.onto_original(&x).iter().zip(mesh.vertices()) {
-            assert!((x - p.x).abs() < 1e-12, "found {x} at {p}");
+            assert!((x - p.x).abs() < 1e-5, "found {x} at {p}"); // weights in single precision
         }
     }
 

@@ -8,6 +8,7 @@ use semfm::files::{
     Provenance, RegionFile, Seeds, TransferInputs, read_embeddings, read_region,
     read_vertex_features,
 };
+use semfm::fmap::transfer_with_anchors;
 use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, read_mesh};
 use semfm::memory::MemorySettings;
@@ -232,7 +233,9 @@ impl TransferCommand {
             }
         }
         let (a, b) = (&source.object, &target.object);
-        let transferred = transfer(a, b, &region, &settings.transfer, &task)?;
+        // The answer alone is asked for by programs: nobody looks at the anchors.
+        let carry = if self.only.is_some() { transfer } else { transfer_with_anchors };
+        let transferred = carry(a, b, &region, &settings.transfer, &task)?;
         let output = TransferOutput {
             source: &source,
             target: &target,

@@ -80,7 +80,8 @@ fn every_method_with_features_transfers_the_tip_to_the_tip() {
         (Method::Wks, 0.0),
     ] {
         let settings = TransferSettings::of(method);
-        let answer = transfer(&source, &target, &region, &settings, &Task::default()).unwrap();
+        let answer =
+            transfer_with_anchors(&source, &target, &region, &settings, &Task::default()).unwrap();
         let iou = metrics::iou(&answer.region, &truth).unwrap();
         assert!(iou >= least, "{method} reaches IoU {iou:.2} only");
         assert_eq!(answer.point_map.n_target(), target.shape().original().n_vertices());

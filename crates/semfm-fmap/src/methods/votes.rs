@@ -21,7 +21,7 @@ pub(crate) fn by_map(
         (Rule::Image, Some(target_of)) => image(target, target_of, inside),
         _ => preimage(matched, inside),
     };
-    if settings.diffusion == 0.0 { Ok(hit) } else { Ok(target.smooth(&hit, settings.diffusion)?) }
+    if settings.diffusion == 0.0 { Ok(hit) } else { pair.target.smooth(&hit, settings.diffusion) }
 }
 
 /// [`by_map`], and then [`spread`] along the target's features.

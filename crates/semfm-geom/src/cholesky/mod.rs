@@ -2,11 +2,13 @@
 
 mod panels;
 
+use std::fmt;
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot;
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -37,8 +39,15 @@ use crate::{Error, Result};
 /// ```
 #[derive(Debug)]
 pub struct SparseCholesky {
-    symbolic: SymbolicCholesky<usize>,
+    analysis: CholeskyAnalysis,
     panels: Panels,
+}
+
+/// What the sparsity pattern of a matrix alone says of its factor: the order of the unknowns and what is filled.
+/// Made once, it serves every matrix of this pattern; a clone costs nothing.
+#[derive(Clone)]
+pub struct CholeskyAnalysis {
+    symbolic: Arc<SymbolicCholesky<usize>>,
 }
 
 /// Below zero, because faer's own `FORCE_SUPERNODAL` (zero) still stores a diagonal matrix by columns.
@@ -58,20 +67,22 @@ impl SparseCholesky {
     /// [`Error::Length`] for a matrix that is not square; [`Error::LinearAlgebra`] where the
     /// factor does not fit into memory.
     pub fn new(matrix: SparseColMatRef<'_, usize, f64>) -> Result<Self> {
-        if matrix.nrows() != matrix.ncols() {
-            let (expected, found) = (matrix.nrows(), matrix.ncols());
-            return Err(Error::Length { what: "columns of a square matrix", expected, found });
-        }
-        let symbolic = factorize_symbolic_cholesky(
-            matrix.symbolic(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: ALWAYS_SUPERNODAL,
-                ..Default::default()
-            },
-        )
-        .map_err(|_| FAILED)?;
+        Self::with_analysis(&CholeskyAnalysis::new(matrix)?, matrix)
+    }
+
+    /// The same for a matrix whose sparsity pattern was analysed before.
+    ///
+    /// # Errors
+    /// As [`SparseCholesky::new`].
+    ///
+    /// # Panics
+    /// Where the matrix has another pattern than the one that was analysed.
+    pub fn with_analysis(
+        analysis: &CholeskyAnalysis,
+        matrix: SparseColMatRef<'_, usize, f64>,
+    ) -> Result<Self> {
+        let symbolic = analysis.symbolic();
+        assert_eq!(symbolic.nrows(), matrix.nrows(), "one pattern");
         let SymbolicCholeskyRaw::Supernodal(nodes) = symbolic.raw() else {
             return Err(FAILED);
         };
@@ -90,18 +101,18 @@ impl SparseCholesky {
             let row = symbolic.perm().map_or(index, |perm| perm.arrays().0[index]);
             return Err(Error::NotPositiveDefinite { what: "the sparse matrix", row });
         }
-        let panels = Panels::new(SupernodalLltRef::new(nodes, &values));
-        Ok(Self { symbolic, panels })
+        let panels = Panels::new(nodes, values);
+        Ok(Self { analysis: analysis.clone(), panels })
     }
 
     /// Number of rows n.
     pub fn n_rows(&self) -> usize {
-        self.symbolic.nrows()
+        self.analysis.symbolic.nrows()
     }
 
     /// The analysis of the sparsity pattern, for further factorisations of like matrices.
-    pub(crate) fn symbolic(&self) -> &SymbolicCholesky<usize> {
-        &self.symbolic
+    pub fn analysis(&self) -> &CholeskyAnalysis {
+        &self.analysis
     }
 
     /// Numbers stored in the factor R, fill-in and supernodal padding included.
@@ -134,7 +145,7 @@ impl SparseCholesky {
     fn solve_lanes<const N: usize>(&self, columns: MatMut<'_, f64>) {
         let n = self.n_rows();
         let identity: Vec<usize>;
-        let order = match self.symbolic.perm() {
+        let order = match self.analysis.symbolic.perm() {
             Some(perm) => perm.arrays().0,
             None => {
                 identity = (0..n).collect();
@@ -153,6 +164,38 @@ impl SparseCholesky {
                 column[row] = x[j];
             }
         }
+    }
+}
+
+impl CholeskyAnalysis {
+    /// Analyses the lower triangle of `matrix` (n × n).
+    ///
+    /// # Errors
+    /// [`Error::Length`] for a matrix that is not square; [`Error::LinearAlgebra`] where there is no memory.
+    pub fn new(matrix: SparseColMatRef<'_, usize, f64>) -> Result<Self> {
+        if matrix.nrows() != matrix.ncols() {
+            let (expected, found) = (matrix.nrows(), matrix.ncols());
+            return Err(Error::Length { what: "columns of a square matrix", expected, found });
+        }
+        let parameters = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: ALWAYS_SUPERNODAL,
+            ..Default::default()
+        };
+        let (pattern, order) = (matrix.symbolic(), SymmetricOrdering::Amd);
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, order, parameters);
+        Ok(Self { symbolic: Arc::new(symbolic.map_err(|_| FAILED)?) })
+    }
+
+    pub(crate) fn symbolic(&self) -> &SymbolicCholesky<usize> {
+        &self.symbolic
+    }
+}
+
+impl fmt::Debug for CholeskyAnalysis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("CholeskyAnalysis")
+            .field("n", &self.symbolic.nrows())
+            .finish_non_exhaustive()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Triangular solves on a supernodal factor, eight right-hand sides at a time.
 
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use pulp::Arch;
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+use pulp::{Arch, Simd, WithSimd};
 
 /// A supernode: neighbouring columns of R with the same rows below them.
 #[derive(Debug)]
@@ -31,11 +31,11 @@ pub(super) struct Panels {
 /// N right-hand sides' worth of one unknown.
 type Lanes<const N: usize> = [f64; N];
 
-/// sum −= l · x on every lane.
+/// sum −= l · x on every lane, in one rounding where `FUSED`.
 #[inline(always)]
-fn subtract<const N: usize>(sum: &mut Lanes<N>, l: f64, x: &Lanes<N>) {
+fn subtract<const N: usize, const FUSED: bool>(sum: &mut Lanes<N>, l: f64, x: &Lanes<N>) {
     for (s, x) in sum.iter_mut().zip(x) {
-        *s -= l * x;
+        *s = if FUSED { (-l).mul_add(*x, *s) } else { *s - l * x };
     }
 }
 
@@ -45,32 +45,32 @@ fn scale<const N: usize>(x: &mut Lanes<N>, by: f64) {
 }
 
 impl Panels {
-    /// Copies faer's factor, whose panels lie column after column.
-    pub fn new(factor: SupernodalLltRef<'_, usize, f64>) -> Self {
-        let n_panels = factor.symbolic().n_supernodes();
-        let mut all = Self {
-            panels: Vec::with_capacity(n_panels),
-            rows: Vec::new(),
-            values: Vec::with_capacity(factor.values().len()),
-        };
+    /// Turns faer's factor, whose panels lie column after column, round in its place.
+    pub fn new(nodes: &SymbolicSupernodalCholesky<usize>, mut values: Vec<f64>) -> Self {
+        let n_panels = nodes.n_supernodes();
+        let (mut panels, mut rows) = (Vec::with_capacity(n_panels), Vec::new());
+        let mut columns = Vec::new();
         for s in 0..n_panels {
-            let node = factor.supernode(s);
-            let (numbers, below) = (node.val(), node.pattern());
-            all.panels.push(Panel {
-                first: node.start(),
-                width: numbers.ncols(),
-                rows: (all.rows.len(), below.len()),
-                values: all.values.len(),
-            });
-            all.rows.extend(below.iter().map(|&row| row as u32));
-            for i in 0..numbers.nrows() {
-                all.values.extend((0..numbers.ncols()).map(|j| match i == j {
-                    true => 1.0 / numbers[(i, j)],
-                    false => numbers[(i, j)],
-                }));
+            let below = nodes.supernode(s).pattern();
+            let first = nodes.supernode_begin()[s];
+            let width = nodes.supernode_end()[s] - first;
+            let start = nodes.col_ptr_for_val()[s];
+            let numbers = &mut values[start..nodes.col_ptr_for_val()[s + 1]];
+            columns.clear();
+            columns.extend_from_slice(numbers);
+            let height = columns.len() / width;
+            for (i, row) in numbers.chunks_exact_mut(width).enumerate() {
+                for (j, number) in row.iter_mut().enumerate() {
+                    *number = columns[j * height + i];
+                }
+                if let Some(diagonal) = row.get_mut(i) {
+                    *diagonal = 1.0 / *diagonal;
+                }
             }
+            panels.push(Panel { first, width, rows: (rows.len(), below.len()), values: start });
+            rows.extend(below.iter().map(|&row| row as u32));
         }
-        all
+        Self { panels, rows, values }
     }
 
     /// Numbers stored.
@@ -78,21 +78,20 @@ impl Panels {
         self.values.len()
     }
 
-    /// Replaces `x` (n rows of N lanes, in the order of the factor) by (R Rᵀ)⁻¹ x.
+    /// Replaces `x` (n rows of N lanes, in the order of the factor) by (R Rᵀ)⁻¹ x, by the best
+    /// instructions of the machine at hand.
     pub fn solve<const N: usize>(&self, x: &mut [Lanes<N>]) {
-        // The best instructions of the machine at hand; products and sums stay apart, so that the
-        // answer does not depend on which they are.
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for panel in &self.panels {
-                    self.forward(panel, x);
-                }
-                for panel in self.panels.iter().rev() {
-                    self.backward(panel, x);
-                }
-            },
-        );
+        Arch::new().dispatch(Solve { panels: self, x });
+    }
+
+    #[inline(always)]
+    fn solve_with<const N: usize, const FUSED: bool>(&self, x: &mut [Lanes<N>]) {
+        for panel in &self.panels {
+            self.forward::<N, FUSED>(panel, x);
+        }
+        for panel in self.panels.iter().rev() {
+            self.backward::<N, FUSED>(panel, x);
+        }
     }
 
     /// The panel's rows of R: its triangle (w · w numbers), then those below.
@@ -106,19 +105,19 @@ impl Panels {
 
     /// R y = x on the panel's unknowns, and their part of the equations below.
     #[inline(always)]
-    fn forward<const N: usize>(&self, panel: &Panel, x: &mut [Lanes<N>]) {
+    fn forward<const N: usize, const FUSED: bool>(&self, panel: &Panel, x: &mut [Lanes<N>]) {
         let w = panel.width;
         let (triangle, below, rows) = self.parts(panel);
         let (head, tail) = x.split_at_mut(panel.first + w);
         let mine = &mut head[panel.first..];
-        for (i, row) in triangle.chunks_exact(w).enumerate() {
-            let (solved, open) = mine.split_at_mut(i);
-            let mut sum = open[0];
-            for (y, &l) in solved.iter().zip(row) {
-                subtract(&mut sum, l, y);
+        // Column by column: the rows of a column do not wait for each other.
+        for j in 0..w {
+            let (solved, open) = mine.split_at_mut(j + 1);
+            scale(&mut solved[j], triangle[j * w + j]);
+            let y = solved[j];
+            for (sum, row) in open.iter_mut().zip(triangle.chunks_exact(w).skip(j + 1)) {
+                subtract::<N, FUSED>(sum, row[j], &y);
             }
-            scale(&mut sum, row[i]);
-            open[0] = sum;
         }
         let offset = panel.first + w;
         let mut quads = below.chunks_exact(4 * w).zip(rows.chunks_exact(4));
@@ -127,10 +126,10 @@ impl Panels {
             let mut sums = at.map(|row| tail[row]);
             let ((l0, l1), (l2, l3)) = (l[..2 * w].split_at(w), l[2 * w..].split_at(w));
             for ((((y, &l0), &l1), &l2), &l3) in mine.iter().zip(l0).zip(l1).zip(l2).zip(l3) {
-                subtract(&mut sums[0], l0, y);
-                subtract(&mut sums[1], l1, y);
-                subtract(&mut sums[2], l2, y);
-                subtract(&mut sums[3], l3, y);
+                subtract::<N, FUSED>(&mut sums[0], l0, y);
+                subtract::<N, FUSED>(&mut sums[1], l1, y);
+                subtract::<N, FUSED>(&mut sums[2], l2, y);
+                subtract::<N, FUSED>(&mut sums[3], l3, y);
             }
             for (row, sum) in at.into_iter().zip(sums) {
                 tail[row] = sum;
@@ -140,14 +139,14 @@ impl Panels {
         for (l, &id) in below[left * w..].chunks_exact(w).zip(&rows[left..]) {
             let sum = &mut tail[id as usize - offset];
             for (y, &l) in mine.iter().zip(l) {
-                subtract(sum, l, y);
+                subtract::<N, FUSED>(sum, l, y);
             }
         }
     }
 
     /// Rᵀ z = x on the panel's unknowns, given those below.
     #[inline(always)]
-    fn backward<const N: usize>(&self, panel: &Panel, x: &mut [Lanes<N>]) {
+    fn backward<const N: usize, const FUSED: bool>(&self, panel: &Panel, x: &mut [Lanes<N>]) {
         let w = panel.width;
         let (triangle, below, rows) = self.parts(panel);
         let (head, tail) = x.split_at_mut(panel.first + w);
@@ -157,17 +156,17 @@ impl Panels {
             let z = [0, 1, 2, 3].map(|q| tail[ids[q] as usize - offset]);
             let ((l0, l1), (l2, l3)) = (l[..2 * w].split_at(w), l[2 * w..].split_at(w));
             for ((((sum, &l0), &l1), &l2), &l3) in mine.iter_mut().zip(l0).zip(l1).zip(l2).zip(l3) {
-                subtract(sum, l0, &z[0]);
-                subtract(sum, l1, &z[1]);
-                subtract(sum, l2, &z[2]);
-                subtract(sum, l3, &z[3]);
+                subtract::<N, FUSED>(sum, l0, &z[0]);
+                subtract::<N, FUSED>(sum, l1, &z[1]);
+                subtract::<N, FUSED>(sum, l2, &z[2]);
+                subtract::<N, FUSED>(sum, l3, &z[3]);
             }
         }
         let left = rows.len() / 4 * 4;
         for (l, &id) in below[left * w..].chunks_exact(w).zip(&rows[left..]) {
             let z = tail[id as usize - offset];
             for (sum, &l) in mine.iter_mut().zip(l) {
-                subtract(sum, l, &z);
+                subtract::<N, FUSED>(sum, l, &z);
             }
         }
         for (i, row) in triangle.chunks_exact(w).enumerate().rev() {
@@ -175,8 +174,29 @@ impl Panels {
             scale(&mut solved[0], row[i]);
             let z = solved[0];
             for (sum, &l) in open.iter_mut().zip(row) {
-                subtract(sum, l, &z);
+                subtract::<N, FUSED>(sum, l, &z);
             }
+        }
+    }
+}
+
+/// A solve of N right-hand sides at once.
+struct Solve<'a, const N: usize> {
+    panels: &'a Panels,
+    x: &'a mut [Lanes<N>],
+}
+
+impl<const N: usize> WithSimd for Solve<'_, N> {
+    type Output = ();
+
+    /// Every processor with vectors of four numbers multiplies and subtracts in one instruction; where there
+    /// are none, one rounding would be a call for each number.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        if S::IS_SCALAR {
+            self.panels.solve_with::<N, false>(self.x);
+        } else {
+            self.panels.solve_with::<N, true>(self.x);
         }
     }
 }

@@ -12,7 +12,7 @@ mod orthogonalise;
 mod row_panels;
 mod shift_invert;
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 use serde::Serialize;
 
 use self::check::{last_gap, missed_below};
@@ -146,20 +146,24 @@ fn iterate(
     task: &Task,
 ) -> Result<(Vec<f64>, Mat<f64>)> {
     let scale = 1.0 / laplacian.mass.iter().sum::<f64>();
-    let operator = ShiftInvert::new(laplacian)?;
-    task.check()?;
+    let mut analysis = None;
     let mut values = vec![0.0; kernel.ncols()];
     let mut vectors = kernel;
     let mut wanted = k - values.len();
     for search in 0..MOST_SEARCHES {
+        let operator = ShiftInvert::new(laplacian, analysis.as_ref())?;
+        task.check()?;
         let plan = plan(laplacian.n_vertices(), vectors.ncols(), wanted, settings, search);
         let Ritz { mus, vectors: found } =
             lanczos::largest_pairs(&operator, vectors.as_ref(), &plan, task)?;
         values.extend(mus.iter().map(|&mu| operator.eigenvalue(mu).max(0.0)));
-        (values, vectors) = merge(values, vectors.as_ref(), found.as_ref(), k);
+        // The count needs as much memory as the factor, which is made again in the rare case that one is missing.
+        let analysis = analysis.insert(operator.factor.analysis().clone());
+        drop(operator);
+        (values, vectors) = merge(values, vectors, found, k);
         let missed = match last_gap(&values, scale) {
             None => 0,
-            Some(gap) => missed_below(gap, laplacian, operator.factor.symbolic())?,
+            Some(gap) => missed_below(gap, laplacian, analysis.symbolic())?,
         };
         if missed == 0 {
             return Ok((values, vectors));
@@ -191,12 +195,7 @@ fn plan(
 /// The k pairs of smallest value among the known and the found ones, ascending.
 ///
 /// `values` names the known pairs first, then the found ones.
-fn merge(
-    values: Vec<f64>,
-    known: MatRef<'_, f64>,
-    found: MatRef<'_, f64>,
-    k: usize,
-) -> (Vec<f64>, Mat<f64>) {
+fn merge(values: Vec<f64>, known: Mat<f64>, found: Mat<f64>, k: usize) -> (Vec<f64>, Mat<f64>) {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b])); // stable
     order.truncate(k);

@@ -78,18 +78,27 @@ impl RowPanels {
         }
     }
 
-    /// The combinations V S (n × fewer) of the `columns` V as an ordinary matrix. Each panel is
-    /// freed once it is used, so that basis and result are never both in memory as a whole.
+    /// The combinations V S (n × fewer) of the `columns` V as an ordinary matrix. Each panel becomes its
+    /// combinations first, so that basis and result are never both in memory as a whole.
     pub fn into_combinations(
         self,
         columns: Range<usize>,
         combinations: MatRef<'_, f64>,
     ) -> Mat<f64> {
-        let mut result = Mat::zeros(self.n_rows, combinations.ncols());
-        for (p, panel) in self.panels.into_iter().enumerate() {
-            let rows = result.as_mut().subrows_mut(p * PANEL_ROWS, panel.nrows());
+        let combine = |panel: Mat<f64>| {
+            let mut rows = Mat::zeros(panel.nrows(), combinations.ncols());
             let v = panel.as_ref().subcols(columns.start, columns.len());
-            matmul(rows, Accum::Replace, v, combinations, 1.0, Par::Seq);
+            matmul(rows.as_mut(), Accum::Replace, v, combinations, 1.0, Par::Seq);
+            rows
+        };
+        // In place in the list: a panel is freed before the next is combined.
+        let mut panels = self.panels;
+        for panel in &mut panels {
+            *panel = combine(std::mem::replace(panel, Mat::zeros(0, 0)));
+        }
+        let mut result = Mat::zeros(self.n_rows, combinations.ncols());
+        for (p, panel) in panels.into_iter().enumerate() {
+            result.as_mut().subrows_mut(p * PANEL_ROWS, panel.nrows()).copy_from(panel);
         }
         result
     }

@@ -4,7 +4,7 @@ use faer::Mat;
 use faer::reborrow::ReborrowMut;
 use faer::sparse::{SparseColMat, Triplet};
 
-use crate::cholesky::SparseCholesky;
+use crate::cholesky::{CholeskyAnalysis, SparseCholesky};
 use crate::{Error, Laplacian, Result};
 
 /// The shift s, times the surface's area.
@@ -26,10 +26,15 @@ pub(super) struct ShiftInvert {
 }
 
 impl ShiftInvert {
-    /// Factorises L + sM with a shift that follows the scale of the surface.
-    pub fn new(laplacian: &Laplacian) -> Result<Self> {
+    /// Factorises L + sM with a shift that follows the scale of the surface; `analysis` is that of any
+    /// earlier shift.
+    pub fn new(laplacian: &Laplacian, analysis: Option<&CholeskyAnalysis>) -> Result<Self> {
         let shift = SHIFT_TIMES_AREA / laplacian.mass.iter().sum::<f64>();
-        let factor = SparseCholesky::new(shifted(laplacian, shift)?.as_ref())?;
+        let matrix = shifted(laplacian, shift)?;
+        let factor = match analysis {
+            Some(analysis) => SparseCholesky::with_analysis(analysis, matrix.as_ref()),
+            None => SparseCholesky::new(matrix.as_ref()),
+        }?;
         let root_mass = laplacian.mass.iter().map(|m| m.sqrt()).collect();
         Ok(Self { factor, root_mass, shift })
     }

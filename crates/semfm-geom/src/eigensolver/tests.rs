@@ -59,7 +59,7 @@ fn lanczos_agrees_with_the_dense_solution() {
 #[test]
 fn a_restarted_search_finds_the_same_as_one_in_many_dimensions() {
     let laplacian = torus_laplacian(60, 25, 0.2);
-    let operator = ShiftInvert::new(&laplacian).unwrap();
+    let operator = ShiftInvert::new(&laplacian, None).unwrap();
     let none = Mat::zeros(1500, 0);
     let [tight, ample] = [56, 300].map(|max_dimension| {
         let plan = Plan { wanted: 40, block: 4, max_dimension, tolerance: 1e-9, seed: 5 };
@@ -160,11 +160,11 @@ fn the_same_seed_gives_the_same_bytes_and_signs_follow_the_rule() {
 #[test]
 fn a_count_notices_a_pair_that_was_left_out() {
     let laplacian = torus_laplacian(40, 20, 0.2);
-    let operator = ShiftInvert::new(&laplacian).unwrap();
+    let operator = ShiftInvert::new(&laplacian, None).unwrap();
     let mut values = dense_values(&laplacian, 21);
     let missed = |values: &[f64]| {
         let gap = last_gap(values, values[1]).unwrap();
-        missed_below(gap, &laplacian, operator.factor.symbolic()).unwrap()
+        missed_below(gap, &laplacian, operator.factor.analysis().symbolic()).unwrap()
     };
     assert_eq!(missed(&values), 0);
     values.remove(10);
@@ -176,11 +176,11 @@ fn a_count_notices_a_pair_that_was_left_out() {
 #[test]
 fn a_count_below_what_was_found_is_an_error() {
     let laplacian = torus_laplacian(40, 20, 0.2);
-    let operator = ShiftInvert::new(&laplacian).unwrap();
+    let operator = ShiftInvert::new(&laplacian, None).unwrap();
     let values = dense_values(&laplacian, 9);
     let too_many = check::SpectralGap { below: values[7], above: values[8], expected: 9 };
     assert!(matches!(
-        missed_below(too_many, &laplacian, operator.factor.symbolic()),
+        missed_below(too_many, &laplacian, operator.factor.analysis().symbolic()),
         Err(Error::LinearAlgebra(_))
     ));
 }

@@ -30,8 +30,8 @@ pub(super) fn transfer_groups(folder: &Path, task: &Task) -> Result<Vec<Group>> 
     let files = TransferFolder::read(folder)?;
     let TransferFolder { source, target, map, .. } = &files;
     let viewpoints = paired_viewpoints(
-        WeightedMesh { mesh: source, weights: &map.source_weight },
-        WeightedMesh { mesh: target, weights: &map.target_weight },
+        WeightedMesh { mesh: source, weights: &map.source_weight }.into(),
+        WeightedMesh { mesh: target, weights: &map.target_weight }.into(),
         &map.source_of,
         VIEWPOINT_SIDE,
         task,

@@ -31,4 +31,4 @@ pub(crate) use motion_picture::{lowered, write_motion_picture_of};
 pub(crate) use pair_rotation::WeightedMesh;
 pub(crate) use semfm::upright::upright;
 pub(crate) use transfer_figure::ObjectFigure;
-pub(crate) use viewpoints::{PairedViewpoints, paired_viewpoints, viewpoints_around};
+pub(crate) use viewpoints::{PairedViewpoints, Seen, paired_viewpoints, viewpoints_around};

@@ -5,7 +5,7 @@ use semfm::{Mesh, PreparedObject, Task, Transfer};
 
 use super::feature_colors::FeatureColors;
 use super::sheet::PICTURE_SIDE;
-use super::{PairedViewpoints, Viewpoints, WeightedMesh, paired_viewpoints};
+use super::{PairedViewpoints, Seen, Viewpoints, WeightedMesh, paired_viewpoints};
 use crate::Result;
 use crate::colors::position_colors;
 
@@ -41,9 +41,20 @@ impl<'a> TransferFigure<'a> {
         let TransferResult { source, target, region, transfer, .. } = *result;
         let source_of = &transfer.point_map.source_of;
         let (source_mesh, target_mesh) = (result.source_mesh(), result.target_mesh());
+        let (source_shape, target_shape) = (source.object.shape(), target.object.shape());
+        let on_working = [
+            source_shape.onto_working(region.weights()),
+            target_shape.onto_working(transfer.weights()),
+        ];
         let viewpoints: PairedViewpoints = paired_viewpoints(
-            WeightedMesh { mesh: source_mesh, weights: region.weights() },
-            WeightedMesh { mesh: target_mesh, weights: transfer.weights() },
+            Seen {
+                object: WeightedMesh { mesh: source_mesh, weights: region.weights() },
+                counted: WeightedMesh { mesh: source_shape.mesh(), weights: &on_working[0] },
+            },
+            Seen {
+                object: WeightedMesh { mesh: target_mesh, weights: transfer.weights() },
+                counted: WeightedMesh { mesh: target_shape.mesh(), weights: &on_working[1] },
+            },
             source_of,
             PICTURE_SIDE,
             task,

@@ -21,7 +21,9 @@ impl TransferFigure<'_> {
     /// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails, and where the task was
     /// cancelled.
     pub fn write_transfer_picture(&self, path: &Path, task: &Task) -> Result<()> {
-        let (source, target) = (pictures(&self.source, task)?, pictures(&self.target, task)?);
+        let (source, target) =
+            rayon::join(|| pictures(&self.source, task), || pictures(&self.target, task));
+        let (source, target) = (source?, target?);
         let rows = [
             Row { title: "source: the demonstrated region".into(), pictures: &source },
             Row { title: format!("target: {}", self.verdict_line()), pictures: &target },

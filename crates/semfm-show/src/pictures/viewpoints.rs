@@ -59,6 +59,20 @@ pub(crate) struct PairedViewpoints {
     pub target: Viewpoints,
 }
 
+/// An object that is looked at.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    pub object: WeightedMesh<'a>,
+    /// What is counted in its place, where only shares of pixels matter: itself or a simpler mesh of it.
+    pub counted: WeightedMesh<'a>,
+}
+
+impl<'a> From<WeightedMesh<'a>> for Seen<'a> {
+    fn from(object: WeightedMesh<'a>) -> Self {
+        Self { object, counted: object }
+    }
+}
+
 /// Viewpoints of a pair whose target vertex `j` is matched to the source vertex `source_of[j]`: both
 /// objects from the same two sides as far as the map tells how the target is turned, each from its own
 /// two best sides where it does not.
@@ -66,12 +80,13 @@ pub(crate) struct PairedViewpoints {
 /// # Errors
 /// As [`viewpoints`].
 pub(crate) fn paired_viewpoints(
-    source: WeightedMesh<'_>,
-    target: WeightedMesh<'_>,
+    source_seen: Seen<'_>,
+    target_seen: Seen<'_>,
     source_of: &[u32],
     side: u32,
     task: &Task,
 ) -> Result<PairedViewpoints> {
+    let (source, target) = (source_seen.object, target_seen.object);
     let standing_source = Standing { object: source, upright: upright(source.mesh)? };
     let standing_target = Standing { object: target, upright: upright(target.mesh)? };
     let source_up = standing_source.upright.up;
@@ -84,8 +99,11 @@ pub(crate) fn paired_viewpoints(
     let on_source = directions_around(source_up);
     let on_target: Vec<Direction> =
         on_source.iter().map(|direction| direction.turned(turn)).collect();
-    let from_source = visible(source, &on_source, task)?;
-    let from_target = visible(target, &on_target, task)?;
+    let (from_source, from_target) = rayon::join(
+        || visible(source_seen.counted, &on_source, task),
+        || visible(target_seen.counted, &on_target, task),
+    );
+    let (from_source, from_target) = (from_source?, from_target?);
     let scores: Vec<f64> = from_source
         .iter()
         .zip(&from_target)
@@ -227,7 +245,8 @@ mod tests {
             WeightedMesh { mesh: &copy, weights: &weights },
         );
         let PairedViewpoints { source, target } =
-            paired_viewpoints(original, copy, &identity, 64, &Task::default()).unwrap();
+            paired_viewpoints(original.into(), copy.into(), &identity, 64, &Task::default())
+                .unwrap();
         for (a, b) in [
             (source.best.camera_from_world().matrix3, target.best.camera_from_world().matrix3),
             (source.other.camera_from_world().matrix3, target.other.camera_from_world().matrix3),
