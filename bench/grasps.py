@@ -5,6 +5,13 @@ Reads nothing but ``grasps.json`` files and the meshes they are of::
     pip install numpy trimesh python-fcl
     python bench/grasps.py mug.grasps.json=mug.obj … [--region mug.grasps.json=region.json] [--friction 0.5]
 
+With ``--steady``, it runs the search itself: noise, seeds and large meshes, on meshes in metres::
+
+    python bench/grasps.py --steady semfm-cli hammer.obj mug.obj … [--noise .001 .002 .005] [--seeds 5] [--dense 2]
+
+Noise is independent and normal on each coordinate, as a share of the diagonal of the object's box. ``--dense N`` cuts
+each triangle into four, N times. Times are CPU seconds of the process (user and system) on one thread.
+
 For each grasp: whether the hand, open where it arrives, anywhere on its way in, or closed, meets the
 object's exact triangles; whether it is in force closure by rays of our own; whether both contacts
 lie in the region.
@@ -15,6 +22,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import resource
+import subprocess
+import tempfile
 from pathlib import Path
 
 import fcl
@@ -128,12 +138,85 @@ def _region(path: Path, n_vertices: int) -> np.ndarray:
     return inside
 
 
+def search(cli: str, mesh: Path, folder: Path, seed: int = 0, hand: str = "franka") -> tuple[dict, float]:
+    """The answer of one search over the whole object, and its CPU seconds."""
+    n_vertices = len(trimesh.load(mesh, process=False, force="mesh").vertices)
+    # Ids of vertices that trimesh counts otherwise than we do are of no use here: the region is all of them.
+    region, out = folder / "all.json", folder / "grasps.json"
+    info = json.loads(subprocess.run([cli, "info", "--json", str(mesh)], capture_output=True, check=True).stdout)
+    info = info[0] if isinstance(info, list) else info
+    n_vertices = info.get("n_vertices", n_vertices)
+    region.write_text(json.dumps({"vertices": list(range(n_vertices))}))
+    command = [cli, "grasp", str(mesh), "--region", str(region), "--gripper", hand, "--metres", "--threads", "1"]
+    command += ["--seed", str(seed), "--quiet", "-o", str(out)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return json.loads(out.read_text()), seconds
+
+
+def steady(cli: str, meshes: list[str], noises: list[float], n_seeds: int, dense: int, hand: str) -> None:
+    """Survivors under noise, the way of the best grasp over seeds, time and collisions by number of triangles."""
+    print("| object | triangles | noise | survivors | of those without | best moves (mm) | colliding | CPU s |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name in meshes:
+        clean = trimesh.load(name, process=False, force="mesh")
+        diagonal = float(np.linalg.norm(clean.extents))
+        with tempfile.TemporaryDirectory() as folder:
+            plain = {"vertices": clean.vertices, "faces": clean.faces}
+            mesh = trimesh.Trimesh(**plain, process=True)  # vertices that lie in one place are one
+            base = None
+            for noise in [0.0, *noises]:
+                rng = np.random.default_rng(1)
+                moved = mesh.copy()
+                moved.vertices = mesh.vertices + noise * diagonal * rng.standard_normal(mesh.vertices.shape)
+                base = steady_row(cli, Path(name), moved, noise, base, n_seeds, Path(folder), hand)
+            for _ in range(dense):
+                mesh = mesh.subdivide()
+                steady_row(cli, Path(name), mesh, 0.0, base, 1, Path(folder), hand)
+
+
+def steady_row(
+    cli: str, name: Path, mesh: trimesh.Trimesh, noise: float, base: int | None, n_seeds: int, folder: Path, hand: str
+) -> int:
+    path = folder / "object.ply"
+    path.write_bytes(trimesh.exchange.ply.export_ply(mesh, encoding="binary"))
+    answers = [search(cli, path, folder, seed, hand) for seed in range(n_seeds)]
+    # Contacts tell where a grasp is: a hand that comes from elsewhere to the same place holds the same.
+    middles = [np.mean(a["grasps"][0]["contacts"], axis=0) for a, _ in answers if a["grasps"]]
+    way = max((np.linalg.norm(p - q) for p in middles for q in middles), default=float("nan"))
+    answer, seconds = answers[0]
+    stored = trimesh.load(path, process=False)
+    scene, hand_parts = fcl.CollisionObject(_bvh(stored)), Hand(answer["gripper"])
+    poses = [(np.array(g["object_from_tcp"]), g) for g in answer["grasps"]]
+    colliding = sum(_collides(hand_parts, scene, pose, grasp) for pose, grasp in poses)
+    survivors = answer["n_survivors"]
+    share = f"{100 * survivors / base:.0f} %" if base else "–"
+    label = name.parent.name if name.stem == "textured" else name.stem
+    moves = f"{1e3 * way:.1f}" if n_seeds > 1 else "–"
+    print(
+        f"| {label} | {len(mesh.faces)} | {100 * noise:g} % | {survivors} | {share} | {moves} "
+        f"| {colliding} of {len(poses)} | {seconds:.1f} |",
+        flush=True,
+    )
+    return base or survivors
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pairs", nargs="+", metavar="GRASPS.json=MESH")
+    parser.add_argument("--steady", metavar="SEMFM_CLI")
+    parser.add_argument("--noise", type=float, nargs="*", default=[0.001, 0.002, 0.005])
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--dense", type=int, default=0)
+    parser.add_argument("--gripper", default="franka")
     parser.add_argument("--region", action="append", default=[], metavar="GRASPS.json=REGION.json")
     parser.add_argument("--friction", type=float, default=0.5)
     arguments = parser.parse_args()
+    if arguments.steady:
+        a = arguments
+        return steady(a.steady, a.pairs, a.noise, a.seeds, a.dense, a.gripper)
     regions = dict(text.split("=", 1) for text in arguments.region)
     total: dict[str, int] = {}
     print("| file | grasps | colliding | in force closure | contacts in region |")

@@ -63,7 +63,8 @@ pub(crate) fn antipodal(
         // Known inside: into it. Otherwise the face may be wound either way.
         let direction = if object.is_signed() || rng.random::<bool>() { tilted } else { -tilted };
         // Beyond the opening too: that the object is there, but too thick, is an answer.
-        let hits = object.touched().tree.crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
+        let hits =
+            object.touched().tree.crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
         let opposite = hits
             .iter()
             .filter(|(_, face)| *face != seed.item)

@@ -58,7 +58,9 @@ impl BoxTree {
         let mut items: Vec<(Bounds, u32)> = items.collect();
         let mut nodes = Vec::with_capacity(items.len());
         let n = items.len();
-        split(&mut items, 0, n, &mut nodes);
+        if n > 0 {
+            split(&mut items, 0, n, &mut nodes);
+        }
         Self { nodes, items }
     }
 

@@ -26,6 +26,9 @@ const CLOSING_STEP: f64 = 4e-3;
 /// its pad: the pad still touches then, more softly.
 const WIDER: [f64; 3] = [0.0, 0.25, 0.5];
 
+/// The same on a noisy surface, in standard deviations of the noise: the mesh has spikes beside the pad, too.
+const NOISE_WIDER: [f64; 3] = [1.0, 2.0, 3.0];
+
 /// Distances beyond this are as good as any, metres.
 pub(crate) const FAR: f64 = 0.01;
 
@@ -103,7 +106,7 @@ impl<'a> Collision<'a> {
             return Err(Reason::Inside.into());
         }
         let clearance = self.clearance(open, tcp);
-        Refusal::where_positive(Reason::Clearance, self.settings.limits.clearance - clearance)?;
+        Refusal::where_positive(Reason::Clearance, self.least_clearance() - clearance)?;
         Ok(Fit { width, opening, clearance })
     }
 
@@ -127,8 +130,11 @@ impl<'a> Collision<'a> {
 
     /// The fingers from `opening` to contact; returns the width where they stop.
     fn close_fingers(&self, closing: &Closing, opening: f64) -> Result<f64, Reason> {
-        for wider in WIDER {
-            let extra = wider * self.settings.compliance;
+        let noise = self.object.surface_report().noise;
+        let of_noise = NOISE_WIDER.map(|wider| wider * noise);
+        let of_pads = WIDER.map(|wider| wider * self.settings.compliance);
+        let extras = of_pads.into_iter().chain(of_noise.into_iter().filter(|_| noise > 0.0));
+        for extra in extras {
             let width = closing.width + 2.0 * (TOUCH_GAP + extra);
             if width <= opening && self.closes_freely(&closing.tcp, opening, width) {
                 return Ok(width);
@@ -176,7 +182,7 @@ impl<'a> Collision<'a> {
     /// Distance of the open gripper at the grasp to object, scene and table, at most [`FAR`] or the
     /// asked clearance.
     fn clearance(&self, open: &PosedGripper<'_>, tcp: &Pose) -> f64 {
-        let mut least = FAR.max(self.settings.limits.clearance);
+        let mut least = FAR.max(self.least_clearance());
         for (_, shape, pose) in open.pieces() {
             let solid = shape.at(&(*tcp * *pose));
             least = self.object.obstacle().distance(&solid, least);
@@ -191,6 +197,11 @@ impl<'a> Collision<'a> {
             }
         }
         least.max(0.0)
+    }
+
+    /// What is asked, and what an uncertain pose asks.
+    fn least_clearance(&self) -> f64 {
+        self.settings.limits.clearance.max(self.settings.pose_margin)
     }
 
     /// How far back along the approach the open gripper is free, metres: how much a colliding grasp is
@@ -217,7 +228,7 @@ impl<'a> Collision<'a> {
     /// Distances between the pads on the way in: fully open, and as little as is safe.
     fn openings(&self, width: f64) -> impl Iterator<Item = f64> {
         let widest = *self.gripper.opening().end();
-        let fitted = width + 2.0 * (TOUCH_GAP + SLACK);
+        let fitted = width + 2.0 * (TOUCH_GAP + SLACK.max(1.2 * self.settings.pose_margin));
         [Some(widest), (fitted < widest - SLACK).then_some(fitted)].into_iter().flatten()
     }
 
@@ -234,7 +245,7 @@ impl<'a> Collision<'a> {
             .fold(f64::INFINITY, f64::min);
         let back = -self.settings.retreat * (tcp.rotation * DVec3::Z).dot(table.normal);
         let height = lowest + back.min(0.0) - table.point.dot(table.normal);
-        self.settings.limits.table_clearance.max(MARGIN) - height
+        self.settings.limits.table_clearance.max(self.settings.pose_margin).max(MARGIN) - height
     }
 
     fn meets_scene(&self, solid: &Solid) -> bool {

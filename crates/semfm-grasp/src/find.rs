@@ -16,6 +16,7 @@ use crate::scene::Scene;
 use crate::search::{Found, Search};
 use crate::select::{diverse, drawn};
 use crate::settings::{GraspSettings, Selection};
+use crate::working_surface::SurfaceReport;
 use semfm_robot::Gripper;
 
 /// Grasps of one region by one gripper in one scene, and what became of the other candidates.
@@ -28,6 +29,8 @@ pub struct Grasps {
     /// Of the candidates refused for the main reason (the stage that let the smallest share of those that reached it
     /// through) the one that missed by least.
     pub nearest_miss: Option<Miss>,
+    /// The surface on which contacts were sought.
+    pub surface: SurfaceReport,
     /// Gripper poses examined.
     pub n_candidates: usize,
     /// Gripper poses that passed every check, before near ones were merged and the best chosen.
@@ -108,6 +111,7 @@ pub fn find_grasps_with(
         grasps,
         nearest_miss: sampled.nearest().map(|near| search.miss(near)),
         rejected: sampled.rejected,
+        surface: object.surface_report(),
         n_candidates: sampled.n_candidates,
         n_survivors,
         stages_ms: vec![

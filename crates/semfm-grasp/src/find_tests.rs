@@ -13,7 +13,8 @@ use crate::object::GraspObject;
 use crate::rejection::Reason;
 use crate::scene::Scene;
 use crate::settings::{ApproachCone, GraspSettings};
-use crate::test_meshes::{cuboid, cylinder, joined, moved};
+use crate::test_meshes::{cuboid, cylinder, joined, moved, noisy};
+use crate::working_surface::SurfaceSettings;
 
 fn gripper() -> GripperGeometry {
     GripperGeometry::from_boxes(&BoxGripper::default()).unwrap()
@@ -63,7 +64,8 @@ fn grasps_of_a_ball_and_a_can_go_through_their_middles() {
         let line = (grasp.contacts[1] - grasp.contacts[0]).normalize();
         let off = (-grasp.contacts[0]).reject_from_normalized(line).length();
         assert!(off < 0.025 * 0.5f64.atan().sin(), "{off} beside the middle");
-        assert!((0.044..0.0503).contains(&grasp.width));
+        // Where a finger meets the ball beside its pad, the hand stays wider by up to half of what pads give way.
+        assert!((0.044..0.0503 + 1.5e-3).contains(&grasp.width), "{}", grasp.width);
     }
     let can = search(&cylinder(0.033, 0.1, 96), &Scene::new(), &few(200));
     assert!(!can.grasps.is_empty());
@@ -196,6 +198,159 @@ fn a_thin_open_sheet_is_held_by_its_border() {
     let found = search(&sheet, &Scene::new(), &few(200));
     assert!(!found.grasps.is_empty(), "{:?}", found.rejected.iter().collect::<Vec<_>>());
     assert!(found.grasps.iter().all(|g| g.closing().z.abs() > 0.88));
+}
+
+/// A handle with a head, of edges of some 2 mm: a hammer of 22 cm.
+fn hammer() -> Mesh {
+    let ball = zoo::icosphere(5);
+    let handle = moved(&ball, |p| {
+        let z = 0.1 * p.z.asin() * std::f64::consts::FRAC_2_PI;
+        let r = 0.014 * (1.0 - (z / 0.1).powi(8)).max(0.0).powf(0.25);
+        let across = DVec3::new(p.x, p.y, 0.0).normalize_or_zero();
+        DVec3::new(0.0, 0.0, z) + r * across
+    });
+    let head = moved(&zoo::icosphere(4), |p| DVec3::new(0.045 * p.x, 0.02 * p.y, 0.1 + 0.02 * p.z));
+    joined(&handle, &head)
+}
+
+#[test]
+fn noise_of_half_a_percent_leaves_half_of_the_grasps() {
+    let clean = hammer();
+    let rough = noisy(&clean, 0.005 * clean.diagonal(), 3);
+    let settings = few(60);
+    let [good, left] = [&clean, &rough].map(|mesh| search(mesh, &Scene::new(), &settings));
+    assert!(good.n_survivors > 100, "{}", good.n_survivors);
+    assert!(
+        2 * left.n_survivors >= good.n_survivors,
+        "{} of {}",
+        left.n_survivors,
+        good.n_survivors
+    );
+    assert!(left.surface.noise > 0.5e-3 && good.surface.noise == 0.0);
+    // The rough mesh itself keeps off every hand, and the pads are told to go below it.
+    for grasp in &left.grasps {
+        assert!(
+            grasp.contact_width() < grasp.width && grasp.command_width() < grasp.contact_width()
+        );
+        assert!(!meets(&rough, grasp.width, &grasp.object_from_tcp), "{grasp:?}");
+    }
+    let object = GraspObject::with_surface(&rough, 1.0, SurfaceSettings::exact()).unwrap();
+    let region = vec![1.0; object.n_weights()];
+    let task = Task::default();
+    let bare =
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
+    assert!(4 * bare.n_survivors < good.n_survivors, "without smoothing {}", bare.n_survivors);
+}
+
+/// Whether a point of the mesh, or of the middle of one of its edges, is inside of a box of the closed default gripper:
+/// told without any of the code that the search uses.
+fn meets(mesh: &Mesh, width: f64, tcp: &Pose) -> bool {
+    let BoxGripper { finger, tip, palm, .. } = BoxGripper::default();
+    let inside = |p: DVec3| {
+        let side = p.y.abs() - width / 2.0;
+        let at_finger = p.x.abs() < finger[0] / 2.0
+            && (0.0..finger[1]).contains(&side)
+            && (tip - finger[2]..tip).contains(&p.z);
+        let palm_z = tip - finger[2] - p.z;
+        let at_palm = p.x.abs() < palm[0] / 2.0
+            && p.y.abs() < palm[1] / 2.0
+            && (0.0..palm[2]).contains(&palm_z);
+        at_finger || at_palm
+    };
+    let tcp_from_object = tcp.inverse();
+    (0..mesh.n_faces()).any(|face| {
+        let [a, b, c] = mesh.corners(face).map(|p| tcp_from_object * p);
+        [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)].into_iter().any(inside)
+    })
+}
+
+#[test]
+fn grasps_of_a_dense_mesh_are_those_of_the_mesh_itself() {
+    let dense = moved(&zoo::icosphere(5), |p| DVec3::new(0.06 * p.x, 0.02 * p.y, 0.03 * p.z));
+    let settings = SurfaceSettings { working_vertices: 1500, smooth: true };
+    let object = GraspObject::with_surface(&dense, 1.0, settings).unwrap();
+    assert!(object.surface_report().is_simplified);
+    let (region, task) = (vec![1.0; object.n_weights()], Task::default());
+    let settings = GraspSettings { n_samples: 60, neighbour_rounds: 1, ..GraspSettings::default() };
+    let found =
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
+    assert_eq!(found.grasps.len(), settings.top);
+    assert_eq!(found.rejected.total() + found.n_survivors, found.n_candidates);
+    let exact = GraspObject::with_surface(&dense, 1.0, SurfaceSettings::exact()).unwrap();
+    for grasp in &found.grasps {
+        assert!(!meets(&dense, grasp.width, &grasp.object_from_tcp));
+        let pose = PoseToExamine { object_from_tcp: grasp.object_from_tcp, width: grasp.width };
+        let again =
+            examine_poses(&exact, &region, &gripper(), &Scene::new(), &settings, &[pose]).unwrap();
+        let again = again[0].as_ref().unwrap();
+        assert!((again.width - grasp.width).abs() < 1e-9);
+        for (here, there) in grasp.contacts.iter().zip(&again.contacts) {
+            assert!(here.distance(*there) < 1e-6, "{here} and {there}");
+        }
+    }
+}
+
+#[test]
+fn the_best_grasp_stays_where_it_is_when_the_seed_changes() {
+    let mesh = hammer();
+    let object = GraspObject::from_mesh(&mesh, 1.0).unwrap();
+    let region = vec![1.0; object.n_weights()];
+    // Gravity and one side to come from: else a round handle has many equal grasps.
+    let mut settings = GraspSettings { n_samples: 200, gravity: Some(DVec3::NEG_Z), ..few(200) };
+    settings.neighbour_rounds = 1;
+    let places: Vec<DVec3> = (0..3)
+        .map(|seed| {
+            let settings = GraspSettings { seed, ..settings.clone() };
+            let task = Task::default();
+            let found =
+                find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task);
+            let best = &found.unwrap().grasps[0];
+            best.contacts[0].midpoint(best.contacts[1])
+        })
+        .collect();
+    for place in &places {
+        assert!(place.distance(places[0]) <= 0.01, "{places:?}");
+    }
+}
+
+#[test]
+fn an_uncertain_pose_keeps_the_gripper_away() {
+    let margin = 0.004;
+    let settings = GraspSettings { pose_margin: margin, ..few(200) };
+    let table = Scene::new().with_table(DVec3::Z * -0.04, DVec3::Z).unwrap();
+    let found = search(&bar(), &table, &settings);
+    assert!(!found.grasps.is_empty());
+    for grasp in &found.grasps {
+        assert!(grasp.opening >= grasp.width + 1.9 * margin, "{grasp:?}");
+        let lowest = grasp.object_from_tcp.translation.z - 0.009 * grasp.approach().z.abs();
+        assert!(lowest > -0.04, "{lowest}");
+    }
+    let [sure, unsure] = [0.0, 0.012].map(|pose_margin| {
+        search(&bar(), &table, &GraspSettings { pose_margin, ..few(200) }).n_survivors
+    });
+    assert!(unsure < sure, "{unsure} of {sure}");
+}
+
+#[test]
+fn long_pads_hold_a_short_handle_with_their_tips() {
+    // A bail of 12 mm before a wall 45 mm behind it: pads of 65 mm do not fit between.
+    let bail = moved(&cylinder(0.006, 0.06, 48), |p| DVec3::new(p.x, p.z, p.y));
+    let wall = moved(&cuboid(DVec3::new(0.2, 0.2, 0.01)), |p| p - 0.05 * DVec3::Z);
+    let both = joined(&bail, &wall);
+    let object = GraspObject::from_mesh(&both, 1.0).unwrap();
+    let region: Vec<f64> =
+        both.vertices().iter().map(|p| f64::from(u8::from(p.z > -0.02))).collect();
+    let long = BoxGripper {
+        opening: 0.0..=0.14,
+        pad: [0.027, 0.065],
+        finger: [0.03, 0.014, 0.1],
+        tip: 0.0325,
+        palm: [0.08, 0.2, 0.1],
+    };
+    let hand = GripperGeometry::from_boxes(&long).unwrap();
+    let (settings, task) = (few(200), Task::default());
+    let found = find_grasps_with(&object, &region, &hand, &Scene::new(), &settings, &task).unwrap();
+    assert!(found.grasps.len() >= 10, "{} {:?}", found.grasps.len(), found.rejected);
 }
 
 /// A rotation from three angles.

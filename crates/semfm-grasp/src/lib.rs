@@ -30,6 +30,7 @@ mod refine;
 mod rejection;
 mod scene;
 mod score;
+mod score_weights;
 mod search;
 mod select;
 mod settings;
@@ -50,7 +51,8 @@ pub use scene::{Scene, Table};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use semfm_robot::Pose;
 pub use working_surface::{SurfaceReport, SurfaceSettings};
-pub use settings::{ApproachCone, GraspSettings, Limits, ScoreWeights, Selection, Separation, TERMS};
+pub use score_weights::{ScoreWeights, TERMS};
+pub use settings::{ApproachCone, GraspSettings, Limits, Selection, Separation};
 
 #[cfg(test)]
 mod tests {

@@ -72,6 +72,7 @@ mod tests {
             epsilon: 0.0,
             closing_turn: 0.0,
             score: 1.0,
+            hold: None,
             terms: Vec::new(),
         }
     }

@@ -11,7 +11,7 @@ use semfm_geom::{Mesh, PointIndex, without_repeated_faces};
 
 use crate::obstacle::Obstacle;
 use crate::settings::direction;
-use crate::working_surface::{SurfaceReport, SurfaceSettings, WorkingSurface, report_of_exact};
+use crate::working_surface::{SurfaceReport, SurfaceSettings, WorkingSurface};
 use crate::{Error, Result};
 
 /// Distance between the samples that stand for a mesh where candidates are grown, metres: a tenth
@@ -111,7 +111,7 @@ impl GraspObject {
         let radius = radius(mesh.vertices(), centre_of_mass);
         let working = WorkingSurface::of(&mesh, settings)?;
         let report =
-            working.as_ref().map_or_else(|| report_of_exact(&mesh), |working| working.report);
+            working.as_ref().map_or_else(|| SurfaceReport::of(&mesh), |working| working.report);
         let working = working.map(|WorkingSurface { mesh, to_given, report }| {
             let signs = outward_signs(&mesh);
             Working { body: Body::of_mesh(mesh, signs, report.smoothing_steps > 0), to_given }
@@ -177,13 +177,7 @@ impl GraspObject {
                 is_rough: false,
             },
             working: None,
-            report: SurfaceReport {
-                n_triangles: 0,
-                is_simplified: false,
-                noise: 0.0,
-                smoothing_steps: 0,
-                deviation: 0.0,
-            },
+            report: SurfaceReport::default(),
             centre_of_mass,
         })
     }

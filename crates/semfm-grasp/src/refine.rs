@@ -132,11 +132,8 @@ mod tests {
     fn the_main_reason_is_what_keeps_most_back() {
         let counts = |rows: &[(Reason, usize)]| rows.iter().copied().collect::<Rejected>();
         // Too thick, but ten that a gripper could span run into the object.
-        let thick = counts(&[
-            (Reason::ForceClosure, 6000),
-            (Reason::Width, 3990),
-            (Reason::Collision, 10),
-        ]);
+        let thick =
+            counts(&[(Reason::ForceClosure, 6000), (Reason::Width, 3990), (Reason::Collision, 10)]);
         assert_eq!(main_reason(&thick, 10_000), Some(Reason::Width));
         // Good grasps all of them, but for what is asked last.
         let near = counts(&[(Reason::ForceClosure, 9000), (Reason::Clearance, 1000)]);

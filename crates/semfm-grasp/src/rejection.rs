@@ -100,6 +100,53 @@ impl Reason {
     }
 }
 
+impl Reason {
+    /// Names of the options (of the settings, of Python's `find_grasps`, with `-` for `_` of the shell) that would
+    /// change it, the likeliest first.
+    pub fn options(self) -> &'static [&'static str] {
+        match self {
+            Self::NoContact => &["scale", "n_samples"],
+            Self::Approach => &["approach_cone", "approach"],
+            Self::Width => &["scale", "width_range", "gripper"],
+            Self::Table => &["table", "approach"],
+            Self::Region => &["pad_in_region"],
+            Self::Contact => &["gripper", "scale"],
+            Self::ForceClosure => &["friction"],
+            Self::Collision | Self::Closing => &["gripper", "n_samples"],
+            Self::ApproachPath => &["scene", "gripper", "n_samples"],
+            Self::Scene => &["scene_margin", "scene"],
+            Self::Inside => &["scene"],
+            Self::Clearance => &["clearance"],
+        }
+    }
+
+    /// What to do about it, in a few words.
+    pub fn advice(self) -> &'static str {
+        match self {
+            Self::NoContact => "check the scale, or grow the region over both sides of its part",
+            Self::Approach => "widen the cone, or turn it",
+            Self::Width => {
+                "check the scale, allow other widths, or take a gripper that opens wider"
+            }
+            Self::Table => "check where the table is, or let the gripper come from above",
+            Self::Region => "let less of each pad lie in the region, or enlarge the region",
+            Self::Contact => "check the scale, or take a gripper with smaller pads",
+            Self::ForceClosure => {
+                "raise the friction if the pads hold better, or enlarge the region"
+            }
+            Self::Collision | Self::Closing => {
+                "take a slimmer gripper, try more samples, or move the region to where there is room"
+            }
+            Self::ApproachPath => "clear the way, take a slimmer gripper, or try more samples",
+            Self::Scene => {
+                "keep less from the scene's points, or leave the object itself out of the scene"
+            }
+            Self::Inside => "leave out of the scene what encloses the gripper",
+            Self::Clearance => "ask for less clearance",
+        }
+    }
+}
+
 /// What a candidate failed, and by how much in the unit of the reason.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refusal {
@@ -183,6 +230,7 @@ mod tests {
         for (i, reason) in Reason::ALL.into_iter().enumerate() {
             assert_eq!(reason as usize, i);
             assert!(names.insert(reason.name()));
+            assert!(!reason.options().is_empty() && !reason.advice().is_empty());
         }
         let mut counts = Rejected::default();
         counts.add(Reason::Width, 1);

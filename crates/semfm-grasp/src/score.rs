@@ -25,15 +25,20 @@ const LOAD: f64 = 1.5 * 9.81;
 /// An object that turns by this much while the pads close is not held where it was planned, radians.
 const FULL_TURN: f64 = 0.26; // 15°
 
-/// Turns measurements of a grasp into terms in [0, 1] and their weighted mean.
+/// Turns measurements of a grasp into terms in [0, 1], and those into the probability that it holds
+/// ([`ScoreWeights`]).
 ///
 /// | term | 1 | 0 |
 /// | --- | --- | --- |
 /// | `contact` | the smaller patch covers 60 % of its pad or more | nothing touches |
 /// | `friction` | the contacts oppose each other exactly | at the edge of a friction cone |
 /// | `epsilon` | ε of two full pads around the centre of mass | no force closure |
-/// | `gravity` | the weight does not turn the object about the closing axis | its arm is long against the pads (1 / (1 + arm / pad)) |
+/// | `gravity` | the weight does not turn the object about the closing axis | its torque is beyond what friction can hold (held / (held + torque)) |
+/// | `weight` | the object weighs nothing against what friction can hold | it weighs far more (held / (held + load)) |
 /// | `lever` | contacts around the centre of mass | as far from it as the object reaches |
+/// | `evenness` | the whole of both pads is pressed evenly | a point of one is |
+/// | `centred` | the forces act in the middle of the pads | at the rim of one |
+/// | `closing` | the object does not turn while the pads close | it turns by 15° or more |
 /// | `clearance` | the open gripper is 1 cm from everything | it touches |
 /// | `bite` | the pads are filled along their length | only a tip holds |
 /// | `approach` | as demonstrated | at a right angle to it, or against |
@@ -52,6 +57,8 @@ pub(crate) struct Scorer<'a> {
 /// The score with its reasons.
 pub(crate) struct Score {
     pub(crate) score: f64,
+    /// Where the mass is known.
+    pub(crate) hold: Option<f64>,
     pub(crate) epsilon: f64,
     /// Radians.
     pub(crate) closing_turn: f64,
@@ -88,53 +95,34 @@ impl<'a> Scorer<'a> {
         });
         let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
         let arm = com - left.contact.midpoint(right.contact);
-        let weights = &self.settings.weights;
         let settled = self.settled(closing);
-        let [one, other] = settled.pressures;
-        let force = self.settings.grip_force;
-        let weight = self.settings.mass.unwrap_or(UNKNOWN_MASS) * LOAD;
-        let torsion = friction * force * (one.radius + other.radius);
-        let apart = one.centre - other.centre;
-        let off_axis = apart.x.hypot(apart.z) / (friction * apart.y.abs()).max(1e-9);
-        let even = one.area.min(other.area) / (self.pad[0] * self.pad[1]);
-        let off = |p: &Pressure| {
-            (2.0 * p.centre.x.abs() / self.pad[0]).max(2.0 * p.centre.z.abs() / self.pad[1])
-        };
-        let turning = self.turning_arm(closing, arm);
-        let mut weighted = vec![
-            ("contact", weights.contact, self.pad_share(closing) / FULL_CONTACT),
-            ("friction", weights.friction, 1.0 - angle / friction.atan()),
-            ("epsilon", weights.epsilon, epsilon / self.best_epsilon.max(1e-12)),
-            ("gravity", weights.gravity, torsion / (torsion + weight * turning)),
-            ("arm", 0.0, 1.0 / (1.0 + turning / self.pad[1])),
-            ("weight", 0.0, 2.0 * friction * force / (2.0 * friction * force + weight)),
-            ("closing", 0.0, 1.0 - settled.turn / FULL_TURN),
-            ("cone", 0.0, 1.0 - off_axis),
-            ("even", 0.0, even),
-            ("centred", 0.0, 1.0 - off(&one).max(off(&other))),
-            (
-                "hang",
-                0.0,
-                0.5 + 0.5 * arm.dot(closing.tcp.rotation * DVec3::Z) / self.object.radius(),
-            ),
-            ("lever", weights.lever, 1.0 - arm.length() / self.object.radius()),
-            ("clearance", weights.clearance, fit.clearance / FAR),
-            ("bite", weights.bite, self.bite(left).min(self.bite(right))),
-            ("region", weights.region, left.region.midpoint(right.region)),
+        let mut terms = vec![
+            ("contact", self.pad_share(closing) / FULL_CONTACT),
+            ("friction", 1.0 - angle / friction.atan()),
+            ("epsilon", epsilon / self.best_epsilon.max(1e-12)),
+            ("gravity", self.share_of_torque(&settled, self.turning_arm(closing, arm))),
+            ("weight", self.share_of_force()),
+            ("lever", 1.0 - arm.length() / self.object.radius()),
+            ("bite", self.bite(left).min(self.bite(right))),
+            ("evenness", self.evenness(&settled)),
+            ("centred", self.centred(&settled)),
+            ("closing", 1.0 - settled.turn / FULL_TURN),
+            ("clearance", fit.clearance / FAR),
+            ("region", left.region.midpoint(right.region)),
         ];
         if let Some(demonstrated) = self.settings.demonstrated_approach {
             let cosine = (closing.tcp.rotation * DVec3::Z).dot(demonstrated.normalize());
-            weighted.push(("approach", weights.approach, cosine));
+            terms.push(("approach", cosine));
         }
-        weighted.iter_mut().for_each(|term| term.2 = term.2.clamp(0.0, 1.0));
-        let total: f64 = weighted.iter().map(|term| term.1).sum();
-        let sum: f64 = weighted.iter().map(|term| term.1 * term.2).sum();
-        let score = if total > 0.0 { sum / total } else { 0.0 };
+        terms.iter_mut().for_each(|term| term.1 = term.1.clamp(0.0, 1.0));
+        let weights = &self.settings.weights;
+        let hold = weights.probability(&terms);
         Score {
-            score,
+            score: hold * weights.preference(&terms),
+            hold: self.settings.mass.map(|_| hold),
             epsilon,
             closing_turn: settled.turn,
-            terms: weighted.into_iter().map(|(n, _, value)| (n, value)).collect(),
+            terms,
         }
     }
 
@@ -147,6 +135,40 @@ impl<'a> Scorer<'a> {
             let pressures = points.map(|point| Pressure::of_point(point, view.cell_area));
             Settled { turn: 0.0, pressures }
         })
+    }
+
+    /// The torque that both pads can hold about the closing axis, against that and the torque of the load on an
+    /// arm of `arm` metres.
+    fn share_of_torque(&self, settled: &Settled, arm: f64) -> f64 {
+        let [one, other] = settled.pressures;
+        let GraspSettings { friction, grip_force, .. } = self.settings;
+        let held = friction * grip_force * (one.radius + other.radius);
+        held / (held + self.load() * arm)
+    }
+
+    /// The force that both pads can hold along themselves, against that and the load.
+    fn share_of_force(&self) -> f64 {
+        let held = 2.0 * self.settings.friction * self.settings.grip_force;
+        held / (held + self.load())
+    }
+
+    /// What the object weighs while it is lifted and shaken, newtons.
+    fn load(&self) -> f64 {
+        self.settings.mass.unwrap_or(UNKNOWN_MASS) * LOAD
+    }
+
+    /// How evenly the less even pad is pressed: the area of an even pressure against the pad's.
+    fn evenness(&self, settled: &Settled) -> f64 {
+        let least = settled.pressures.iter().map(|p| p.area).fold(f64::INFINITY, f64::min);
+        least / (self.pad[0] * self.pad[1])
+    }
+
+    /// How far from the pads' rims the forces act: a hand that comes a little beside still meets the object.
+    fn centred(&self, settled: &Settled) -> f64 {
+        let off = |p: &Pressure| {
+            (2.0 * p.centre.x.abs() / self.pad[0]).max(2.0 * p.centre.z.abs() / self.pad[1])
+        };
+        1.0 - settled.pressures.iter().map(off).fold(0.0, f64::max)
     }
 
     /// Share of the pad's length that a patch fills.
@@ -200,11 +222,15 @@ mod tests {
         };
         let middle = at(0.0, 0.0);
         for (name, value) in &middle.terms {
-            assert!(*value > 0.8 || *name == "epsilon" && *value > 0.5, "{name} is {value}");
+            // A full pad is pressed evenly but for the cells on its rim.
+            assert!(*value > 0.75 || *name == "epsilon" && *value > 0.5, "{name} is {value}");
         }
         let end = at(0.08, 0.0);
         assert!(end.score < middle.score && end.epsilon < middle.epsilon);
-        assert!((value(&end, "gravity") - 1.0 / (1.0 + 0.08 / 0.018)).abs() < 1e-9);
+        // Full pads of 18 mm: torsion 2 μ F r with r = .3826 · 18 mm, against 1.5 · .3 kg · g on 8 cm.
+        let held: f64 = 2.0 * 0.5 * 30.0 * 0.3826 * 0.018;
+        let gravity = held / (held + UNKNOWN_MASS * LOAD * 0.08);
+        assert!((value(&end, "gravity") - gravity).abs() < 0.01, "{:?}", end.terms);
         assert!((value(&end, "lever") - (1.0 - 0.08 / object.radius())).abs() < 1e-9);
         let shallow = at(0.0, 0.02);
         assert!((value(&shallow, "bite") - 0.004 / 0.018).abs() < 1e-9);
@@ -224,6 +250,9 @@ mod tests {
             let settings = GraspSettings { demonstrated_approach, ..GraspSettings::default() };
             Scorer::new(&object, &gripper, &settings, None).score(&closing, &fit, 0.0).score
         });
-        assert!(scores[0] > scores[1] + 0.1);
+        assert!(
+            (scores[1] - 0.5 * scores[0]).abs() < 1e-9,
+            "a right angle takes away the whole share"
+        );
     }
 }

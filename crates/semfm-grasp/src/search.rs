@@ -21,8 +21,8 @@ use crate::gpg::Gpg;
 use crate::grasp::Grasp;
 use crate::gripper_geometry::GripperGeometry;
 use crate::neighbours::neighbours;
-use crate::refine::main_reason;
 use crate::object::{Body, GraspObject, Region, Surface};
+use crate::refine::main_reason;
 use crate::rejection::{Miss, Reason, Refusal, Rejected};
 use crate::scene::Scene;
 use crate::score::Scorer;
@@ -185,8 +185,15 @@ impl<'a> Search<'a> {
     }
 
     /// The stages on the surface that answers are of.
-    pub(crate) fn examine_pose(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
-        if self.object.is_simplified() { self.examine_as_is(candidate) } else { self.examine(candidate) }
+    pub(crate) fn examine_pose(
+        &self,
+        candidate: &Candidate,
+    ) -> std::result::Result<Grasp, Box<Near>> {
+        if self.object.is_simplified() {
+            self.examine_as_is(candidate)
+        } else {
+            self.examine(candidate)
+        }
     }
 
     /// The stages on the object as it is, for a grasp that was found on a simpler surface.
@@ -266,6 +273,7 @@ impl<'a> Search<'a> {
             epsilon: score.epsilon,
             closing_turn: score.closing_turn,
             score: score.score,
+            hold: score.hold,
             terms: score.terms,
         }
     }
@@ -303,6 +311,7 @@ impl<'a> Search<'a> {
             epsilon: 0.0,
             closing_turn: 0.0,
             score: 0.0,
+            hold: None,
             terms: Vec::new(),
         };
         Miss { reason, by, grasp }

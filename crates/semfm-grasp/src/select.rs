@@ -79,6 +79,7 @@ mod tests {
             epsilon: 0.0,
             closing_turn: 0.0,
             score,
+            hold: None,
             terms: Vec::new(),
         }
     }

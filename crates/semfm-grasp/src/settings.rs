@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use semfm_geom::math::DVec3;
 
+use crate::score_weights::ScoreWeights;
 use crate::{Error, Result};
 
 /// Settings of [`find_grasps`](crate::find_grasps); the default fits grippers and objects of the size
@@ -36,6 +37,9 @@ pub struct GraspSettings {
     pub diversity: f64,
     /// Which of the grasps that passed every check are returned.
     pub selection: Selection,
+    /// How far the object may stand from where it is said to stand, metres: before the pads close, the gripper keeps
+    /// at least so far from it, from the table and from the scene.
+    pub pose_margin: f64,
     /// Two grasps are one where they are nearer than this in both place and direction.
     pub separation: Separation,
     /// What a grasp must satisfy.
@@ -94,49 +98,6 @@ pub struct Separation {
     pub rotation: f64,
 }
 
-/// Names of the terms of a score, in the order in which they are listed.
-pub const TERMS: [&str; 16] = [
-    "arm",
-    "weight",
-    "closing",
-    "cone",
-    "even",
-    "centred",
-    "hang",
-    "contact",
-    "friction",
-    "epsilon",
-    "gravity",
-    "lever",
-    "clearance",
-    "bite",
-    "approach",
-    "region",
-];
-
-/// Weight of each named term; the score is their weighted mean.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScoreWeights {
-    /// `contact`: the part of the pads that touches.
-    pub contact: f64,
-    /// `friction`: how far inside the friction cones the forces lie.
-    pub friction: f64,
-    /// `epsilon`: Ferrari & Canny's ε against that of two full pads around the centre of mass.
-    pub epsilon: f64,
-    /// `gravity`: how little the object's weight turns it in the gripper.
-    pub gravity: f64,
-    /// `lever`: how near the contacts are to the centre of mass.
-    pub lever: f64,
-    /// `clearance`: how far the open gripper stays from everything.
-    pub clearance: f64,
-    /// `bite`: how much of the pads' length is filled.
-    pub bite: f64,
-    /// `approach`: agreement with the demonstrated approach; left out where none was given.
-    pub approach: f64,
-    /// `region`: weight of the region under the pads.
-    pub region: f64,
-}
-
 impl Default for GraspSettings {
     fn default() -> Self {
         Self {
@@ -151,6 +112,7 @@ impl Default for GraspSettings {
             top: 20,
             diversity: 0.1,
             selection: Selection::Best,
+            pose_margin: 0.0,
             separation: Separation { translation: 0.01, rotation: 15f64.to_radians() },
             limits: Limits::default(),
             demonstrated_approach: None,
@@ -173,24 +135,6 @@ impl Default for Limits {
     }
 }
 
-/// As labels go, the antipodal share of the pads alone tells a good grasp from a bad one poorly
-/// (AUC .63 on a mug against simulated ground truth); patch, bite and torque carry the score.
-impl Default for ScoreWeights {
-    fn default() -> Self {
-        Self {
-            contact: 2.0,
-            friction: 1.0,
-            epsilon: 1.5,
-            gravity: 1.0,
-            lever: 0.5,
-            clearance: 0.5,
-            bite: 1.0,
-            approach: 2.0,
-            region: 1.5,
-        }
-    }
-}
-
 impl GraspSettings {
     /// Says which number is out of its range.
     ///
@@ -203,6 +147,7 @@ impl GraspSettings {
         length("limits.clearance", self.limits.clearance)?;
         length("limits.table_clearance", self.limits.table_clearance)?;
         length("retreat", self.retreat)?;
+        length("pose_margin", self.pose_margin)?;
         length("separation.translation", self.separation.translation)?;
         within("separation.rotation", self.separation.rotation, 0.0, 3.2, "0 to π")?;
         within("compliance", self.compliance, 1e-5, 0.1, "0.01 mm to 0.1 m")?;
@@ -230,33 +175,7 @@ impl GraspSettings {
         {
             vector.map_or(Ok(()), |vector| direction(what, vector))?;
         }
-        let weights = self.weights.listed();
-        if !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || weights.iter().sum::<f64>() <= 0.0
-        {
-            let expected = "finite numbers of at least 0, one of them above".into();
-            return Err(Error::OutOfRange {
-                what: "weights",
-                expected,
-                found: format!("{weights:?}"),
-            });
-        }
-        Ok(())
-    }
-}
-
-impl ScoreWeights {
-    fn listed(&self) -> [f64; 9] {
-        [
-            self.contact,
-            self.friction,
-            self.epsilon,
-            self.gravity,
-            self.lever,
-            self.clearance,
-            self.bite,
-            self.approach,
-            self.region,
-        ]
+        self.weights.check()
     }
 }
 

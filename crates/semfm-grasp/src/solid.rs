@@ -130,9 +130,7 @@ impl Convex {
         let local = pose.rotation.inverse() * direction;
         let least = match &self.hull {
             None => -self.half.dot(local.abs()),
-            Some(hull) => {
-                hull.points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min)
-            }
+            Some(hull) => hull.points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min),
         };
         let least = least + self.centre.dot(local);
         least + pose.translation.dot(direction)
@@ -284,9 +282,7 @@ impl Solid {
             None => {
                 intersection_test_cuboid_triangle(&Pose::IDENTITY, &Cuboid::new(half), &triangle)
             }
-            Some(hull) => {
-                !hull.is_beside([a, b, c], margin) && !separated(hull, &triangle, margin)
-            }
+            Some(hull) => !hull.is_beside([a, b, c], margin) && !separated(hull, &triangle, margin),
         }
     }
 
@@ -330,8 +326,7 @@ impl GrownBox {
     /// Whether the two overlap (six of the fifteen separating axes: it may say yes for a near miss,
     /// never no for a hit).
     pub(crate) fn overlaps(&self, bounds: &Bounds) -> bool {
-        let (centre, extent) =
-            ((bounds.low + bounds.high) * 0.5, (bounds.high - bounds.low) * 0.5);
+        let (centre, extent) = ((bounds.low + bounds.high) * 0.5, (bounds.high - bounds.low) * 0.5);
         let offset = self.centre - centre;
         offset.abs().cmple(extent + self.reach).all()
             && (self.turn * offset).abs().cmple(self.half + self.spread * extent).all()

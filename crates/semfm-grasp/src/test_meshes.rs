@@ -56,7 +56,8 @@ pub(crate) fn moved(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
 pub(crate) fn noisy(mesh: &Mesh, sigma: f64, seed: u64) -> Mesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
-    let points = mesh.vertices().iter().map(|&p| p + sigma * DVec3::from_array([(); 3].map(|()| normal())));
+    let points =
+        mesh.vertices().iter().map(|&p| p + sigma * DVec3::from_array([(); 3].map(|()| normal())));
     let points: Vec<DVec3> = points.collect();
     Mesh::new(points, mesh.faces().to_vec()).unwrap()
 }

@@ -36,9 +36,9 @@ impl SurfaceSettings {
 }
 
 /// The surface on which contacts were sought.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceReport {
-    /// Its triangles.
+    /// Its triangles; 0 for points.
     pub n_triangles: usize,
     /// Whether it has fewer triangles than the mesh.
     pub is_simplified: bool,
@@ -85,13 +85,7 @@ const STEPS: (f64, f64) = (75.0, 60.0);
 impl WorkingSurface {
     /// `None` where the mesh (in metres) will do as it is.
     pub(crate) fn of(mesh: &Mesh, settings: SurfaceSettings) -> Result<Option<Self>> {
-        let mut report = SurfaceReport {
-            n_triangles: mesh.n_faces(),
-            is_simplified: false,
-            noise: 0.0,
-            smoothing_steps: 0,
-            deviation: 0.0,
-        };
+        let mut report = SurfaceReport::of(mesh);
         let mut working = mesh.clone();
         if settings.smooth {
             report.noise = smooth(&mut working, &mut report.smoothing_steps)?;
@@ -124,14 +118,10 @@ impl WorkingSurface {
     }
 }
 
-/// The surface of a mesh that stands for itself.
-pub(crate) fn report_of_exact(mesh: &Mesh) -> SurfaceReport {
-    SurfaceReport {
-        n_triangles: mesh.n_faces(),
-        is_simplified: false,
-        noise: 0.0,
-        smoothing_steps: 0,
-        deviation: 0.0,
+impl SurfaceReport {
+    /// Of a mesh that stands for itself.
+    pub fn of(mesh: &Mesh) -> Self {
+        Self { n_triangles: mesh.n_faces(), ..Self::default() }
     }
 }
 
@@ -177,9 +167,7 @@ fn noise(mesh: &Mesh, rings: &Rings) -> f64 {
     let around = rings.laplacian(&normals);
     let mut parts: Vec<f64> = (0..mesh.n_vertices())
         .filter(|&v| !rings.of[v].is_empty())
-        .filter_map(|v| {
-            Some(bent[v].dot((2.0 * normals[v] + around[v]).try_normalize()?).abs())
-        })
+        .filter_map(|v| Some(bent[v].dot((2.0 * normals[v] + around[v]).try_normalize()?).abs()))
         .collect();
     if parts.is_empty() {
         return 0.0;

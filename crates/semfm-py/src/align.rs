@@ -1,13 +1,13 @@
 //! `align`: the pose and scale of an object in what a camera sees.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use semfm::align::Alignment as Found;
 use semfm::align::{self, AlignSettings, ObservedCloud, Sim3};
-use semfm::files::AlignedFile;
+use semfm::files::{AlignedFile, AlignedPose};
 use semfm::geom::math::DVec3;
 
 use crate::arrays_in::{self, Axis};
@@ -60,6 +60,13 @@ type Pickled<'py> = (
     usize,
     u64,
 );
+
+impl Alignment {
+    /// The pose as readers of `aligned.json` have it.
+    pub fn pose(&self) -> semfm::Result<AlignedPose> {
+        AlignedPose::of_file((*self.file).clone(), Path::new("alignment"))
+    }
+}
 
 #[pymethods]
 impl Alignment {

@@ -2,7 +2,7 @@
 
 use semfm::geom::math::{DQuat, DVec3};
 use semfm::grasp::TERMS;
-use semfm::grasp::{Grasp, Grasps, Miss, Pose, Reason};
+use semfm::grasp::{Grasp, Grasps, Miss, Pose, Reason, SurfaceReport};
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
@@ -12,6 +12,9 @@ pub struct PickledGrasps {
     nearest_miss: Option<(String, f64, PickledGrasp)>,
     n_candidates: usize,
     n_survivors: usize,
+    /// Triangles, simplified, noise, steps, deviation of the surface that contacts were sought on.
+    #[serde(default)]
+    surface: (usize, bool, f64, usize, f64),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -26,6 +29,8 @@ pub struct PickledGrasp {
     #[serde(default)]
     closing_turn: f64,
     score: f64,
+    #[serde(default)]
+    hold: Option<f64>,
     terms: Vec<(String, f64)>,
 }
 
@@ -43,12 +48,25 @@ impl PickledGrasps {
             }),
             n_candidates: found.n_candidates,
             n_survivors: found.n_survivors,
+            surface: {
+                let SurfaceReport { n_triangles, is_simplified, noise, smoothing_steps, deviation } =
+                    found.surface;
+                (n_triangles, is_simplified, noise, smoothing_steps, deviation)
+            },
         }
     }
 
     /// The grasps again, without the times that they took. Names that this version does not know are left out.
     pub fn restore(self) -> Grasps {
+        let (n_triangles, is_simplified, noise, smoothing_steps, deviation) = self.surface;
         Grasps {
+            surface: SurfaceReport {
+                n_triangles,
+                is_simplified,
+                noise,
+                smoothing_steps,
+                deviation,
+            },
             grasps: self.grasps.into_iter().map(PickledGrasp::restore).collect(),
             rejected: self
                 .rejected
@@ -77,6 +95,7 @@ impl PickledGrasp {
             epsilon: grasp.epsilon,
             closing_turn: grasp.closing_turn,
             score: grasp.score,
+            hold: grasp.hold,
             terms: grasp.terms.iter().map(|&(name, x)| (name.to_owned(), x)).collect(),
         }
     }
@@ -92,6 +111,7 @@ impl PickledGrasp {
             epsilon: self.epsilon,
             closing_turn: self.closing_turn,
             score: self.score,
+            hold: self.hold,
             terms: self
                 .terms
                 .iter()

@@ -6,12 +6,14 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
-use semfm::files::{GraspsFile, write_isaac_grasps, write_ros2_grasps};
+use semfm::align::Verdict;
+use semfm::files::{AlignedPose, GraspsFile, read_aligned, write_isaac_grasps, write_ros2_grasps};
 use semfm::geom::math::{DMat4, DVec3};
-use semfm::grasp::{self, ApproachCone, GraspSettings, Pose};
+use semfm::grasp::{self, ApproachCone, GraspSettings, Pose, SurfaceSettings};
 use semfm::{GraspRequest, GraspResult, Obstacle, Table};
 use semfm_show::write_grasp_picture;
 
+use crate::align::Alignment;
 use crate::arrays_in::{self, rigid};
 use crate::grasp_pickle::{PickledGrasp, PickledGrasps};
 use crate::gripper::{Gripper, matrix};
@@ -59,10 +61,22 @@ impl Grasp {
         arrays_out::owned(py, approach.to_array().to_vec())
     }
 
-    /// float: distance between the closed pads, metres.
+    /// float: distance between the closed pads where they touch nothing yet, metres.
     #[getter]
     fn width(&self) -> f64 {
         self.grasp.width
+    }
+
+    /// float: distance between the two contacts along the closing direction, metres: where the pads touch.
+    #[getter]
+    fn contact_width(&self) -> f64 {
+        self.grasp.contact_width()
+    }
+
+    /// float: what to tell a hand that stops at a force, metres: below contact, so that the pads press.
+    #[getter]
+    fn command_width(&self) -> f64 {
+        self.grasp.command_width()
     }
 
     /// float: distance between the pads on the way in, metres.
@@ -71,13 +85,13 @@ impl Grasp {
         self.grasp.opening
     }
 
-    /// (2, 3) float64 array: one contact for each pad, metres.
+    /// (2, 3) float64 array: one contact for each pad, in the object's frame, metres.
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         rows(py, self.grasp.contacts)
     }
 
-    /// (2, 3) float64 array: the object's unit normal at each contact.
+    /// (2, 3) float64 array: the object's unit normal at each contact, in the object's frame.
     #[getter]
     fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         rows(py, self.grasp.normals)
@@ -95,7 +109,15 @@ impl Grasp {
         self.grasp.closing_turn
     }
 
-    /// float: weighted mean of the terms, 0 to 1.
+    /// float, optional: the probability that the grasp holds while the object is lifted, shaken and tilted;
+    /// None where no `mass` was given.
+    #[getter]
+    fn hold(&self) -> Option<f64> {
+        self.grasp.hold
+    }
+
+    /// float: the probability that the grasp holds, times what is asked beyond that; without a `mass`, as for
+    /// an object of .3 kg.
     #[getter]
     fn score(&self) -> f64 {
         self.grasp.score
@@ -274,6 +296,15 @@ impl Grasps {
         Some((miss.reason.name(), miss.by, miss.reason.unit()))
     }
 
+    /// str, optional: what kept most candidates from being grasps, what to do about it, and the options of
+    /// `find_grasps` that would change it.
+    #[getter]
+    fn advice(&self) -> Option<String> {
+        let reason = self.found.nearest_miss.as_ref()?.reason;
+        let options = reason.options().join(", ");
+        Some(format!("{}: {} ({options})", reason.explanation(), reason.advice()))
+    }
+
     /// The content of `grasps.json`.
     ///
     /// Returns
@@ -420,8 +451,13 @@ fn of_columns(columns: [f64; 16]) -> Pose {
 ///     Where the pads shall close; of the mesh.
 /// gripper : Gripper or path
 ///     A gripper, or what `Gripper` takes.
-/// scale : float
-///     Metres per unit of the mesh; 1 for a mesh in metres.
+/// scale : float, optional
+///     Metres per unit of the mesh; 1 for a mesh in metres. Not with `alignment`, needed without.
+/// alignment : Alignment or path, optional
+///     Pose and scale before a camera, from `align` or `aligned.json`: in place of `scale` and `camera_from_object`.
+///     What is uncertain of the pose keeps the gripper away until the pads close.
+/// use_refused : bool, optional
+///     Take an alignment whose verdict is `refuse`, which is an error otherwise.
 /// camera_from_object : (4, 4) array_like, optional
 ///     Rigid pose of the object, scaled to metres, before a camera. Scene, table and directions
 ///     are then given in the camera's frame, else in the object's in metres.
@@ -436,8 +472,17 @@ fn of_columns(columns: [f64; 16]) -> Pose {
 ///     Grasps to return.
 /// n_samples : int, optional
 ///     Points of the region from which candidates are grown.
+/// working_vertices : int, optional
+///     Vertices of the surface on which contacts are sought on larger meshes; 0: on the mesh as it is, neither
+///     simplified nor, where it is noisy, smoothed. Collisions are always with the mesh as it is.
 /// friction : float, optional
 ///     Coulomb coefficient between pad and object.
+/// diversity : float, optional
+///     Share of the score that grasps may give up to differ from each other; 0 returns the best, however near.
+/// mass : float, optional
+///     Kilograms: `hold` is then the probability that the grasp holds.
+/// grip_force : float, optional
+///     Force with which each pad presses, newtons.
 /// width_range : tuple of float, float, optional
 ///     Least and largest distance between the closed pads, metres.
 /// approach : (3,) array_like, optional
@@ -467,9 +512,10 @@ fn of_columns(columns: [f64; 16]) -> Pose {
 /// >>> bool(abs(grasps[0].width - 0.06) < 0.002)
 /// True
 #[pyfunction]
-#[pyo3(signature = (mesh, region, gripper, *, scale, camera_from_object=None, table=None,
-    scene_meshes=None, scene_points=None, scene_margin=0.005, top=20, n_samples=1000, friction=0.5,
-    width_range=None, approach=None, approach_cone=None,
+#[pyo3(signature = (mesh, region, gripper, *, scale=None, camera_from_object=None, alignment=None,
+    use_refused=false, table=None, scene_meshes=None, scene_points=None, scene_margin=0.005, top=20,
+    n_samples=1000, working_vertices=None, friction=0.5,
+    diversity=0.1, mass=None, grip_force=30.0, width_range=None, approach=None, approach_cone=None,
     demonstrated_approach=None, clearance=0.0, pad_in_region=0.5, seed=0, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn find_grasps(
@@ -477,15 +523,21 @@ pub fn find_grasps(
     mesh: &Bound<'_, PyAny>,
     region: &Bound<'_, PyAny>,
     gripper: &Bound<'_, PyAny>,
-    scale: f64,
+    scale: Option<f64>,
     camera_from_object: Option<&Bound<'_, PyAny>>,
+    alignment: Option<&Bound<'_, PyAny>>,
+    use_refused: bool,
     table: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     scene_meshes: Option<&Bound<'_, PyList>>,
     scene_points: Option<&Bound<'_, PyAny>>,
     scene_margin: f64,
     top: usize,
     n_samples: usize,
+    working_vertices: Option<usize>,
     friction: f64,
+    diversity: f64,
+    mass: Option<f64>,
+    grip_force: f64,
     width_range: Option<(f64, f64)>,
     approach: Option<&Bound<'_, PyAny>>,
     approach_cone: Option<f64>,
@@ -500,11 +552,41 @@ pub fn find_grasps(
         Ok(gripper) => gripper.clone().unbind(),
         Err(_) => py.get_type::<Gripper>().call1((gripper,))?.cast_into::<Gripper>()?.unbind(),
     };
-    let mut request = GraspRequest::new(scale);
-    let name = "camera_from_object";
-    request.camera_from_object = camera_from_object.map(|pose| rigid(pose, name)).transpose()?;
+    let mut request = match (scale, alignment) {
+        (Some(scale), None) => GraspRequest::new(scale),
+        (None, Some(alignment)) => {
+            let pose = accepted_pose(py, alignment, &mesh, use_refused)?;
+            GraspRequest::at_pose(&pose, &mesh)
+        }
+        (given, _) => {
+            let found = if given.is_some() { "both" } else { "neither" };
+            return Err(errors::invalid(py, "scale", "one of scale and alignment", found));
+        }
+    };
+    let scale = request.object_scale;
+    if let Some(pose) = camera_from_object {
+        const NAME: &str = "camera_from_object";
+        if alignment.is_some() {
+            return Err(errors::invalid(py, NAME, "none beside an alignment", "one"));
+        }
+        request.camera_from_object = Some(rigid(pose, NAME)?);
+    }
+    if let Some(working_vertices) = working_vertices {
+        request.surface = SurfaceSettings { working_vertices, smooth: working_vertices > 0 };
+    }
+    let pose_margin = request.settings.pose_margin;
     let settings = &mut request.settings;
-    *settings = GraspSettings { top, n_samples, friction, seed, ..Default::default() };
+    *settings = GraspSettings {
+        top,
+        n_samples,
+        friction,
+        diversity,
+        mass,
+        grip_force,
+        seed,
+        pose_margin,
+        ..Default::default()
+    };
     settings.demonstrated_approach = vector(demonstrated_approach, "demonstrated_approach")?;
     settings.limits.approach = vector(approach, "approach")?
         .map(|axis| ApproachCone { axis, half_angle: approach_cone.unwrap_or(FRAC_PI_4) });
@@ -534,6 +616,26 @@ pub fn find_grasps(
     })?;
     let found = Arc::new(found);
     Ok(Grasps { found, mesh, region, gripper, scale, camera_from_object, table })
+}
+
+/// The pose of an `Alignment` or a file; one that is refused is an error unless told otherwise.
+fn accepted_pose(
+    py: Python<'_>,
+    alignment: &Bound<'_, PyAny>,
+    mesh: &semfm::Mesh,
+    use_refused: bool,
+) -> PyResult<AlignedPose> {
+    let pose = match alignment.cast::<Alignment>() {
+        Ok(alignment) => alignment.get().pose(),
+        Err(_) => read_aligned(&alignment.extract::<PathBuf>()?, Some(mesh)),
+    };
+    let pose = pose.map_err(|error| errors::raise(py, &error))?;
+    if pose.verdict == Some(Verdict::Refuse) && !use_refused {
+        let found = format!("refuse ({})", pose.reasons.join("; "));
+        let expected = "a pose with the verdict accept or check, or use_refused=True";
+        return Err(errors::invalid(py, "alignment", expected, &found));
+    }
+    Ok(pose)
 }
 
 /// A vector (3), where there is one.

@@ -54,7 +54,10 @@ pub enum Error {
         found: String,
     },
     /// A name that is neither a built-in gripper nor a URDF file.
-    #[error("gripper `{name}`: expected {known} or a .urdf file{meant}")]
+    #[error(
+        "gripper `{name}`: expected {known} or a .urdf file of a hand with two parallel pads (suction cups and hands \
+         of three or more fingers are not covered){meant}"
+    )]
     UnknownGripper {
         /// The name.
         name: String,

@@ -9,15 +9,20 @@ use parry3d_f64::math::Pose;
 use semfm_align::Sim3;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
-use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, find_grasps};
+use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, SurfaceSettings, find_grasps};
 use semfm_robot::Gripper;
 
+use crate::files::AlignedPose;
 use crate::pose_dependence::shares_of_poses;
 use crate::{GraspResult, ObjectSize, Result};
 
 /// Metres that a gripper keeps from the points of a cloud, unless said otherwise: the noise of a
 /// depth camera at arm's length.
 pub const POINT_MARGIN: f64 = 0.005;
+
+/// Metres that an uncertain pose keeps the gripper away at most: beyond, hardly a hand gets around a handle, and
+/// [`GraspProblem::shares_of_poses`] tells more.
+pub const MOST_POSE_MARGIN: f64 = 0.01;
 
 /// What grasps are wanted, and what stands around the object.
 #[derive(Clone, Debug)]
@@ -35,6 +40,8 @@ pub struct GraspRequest {
     pub obstacles: Vec<Obstacle>,
     /// Distance that the gripper keeps from the points of obstacles, metres.
     pub point_margin: f64,
+    /// On which surface contacts are sought.
+    pub surface: SurfaceSettings,
     /// The settings of the search; their directions are in the answer's frame.
     pub settings: GraspSettings,
 }
@@ -67,8 +74,21 @@ impl GraspRequest {
             table: None,
             obstacles: Vec::new(),
             point_margin: POINT_MARGIN,
+            surface: SurfaceSettings::default(),
             settings: GraspSettings::default(),
         }
+    }
+
+    /// The default search at a pose from [`align`](semfm_align::align). Where the pose is uncertain the gripper keeps
+    /// its distance: by one standard deviation ([`AlignedPose::uncertainty`]), at most [`MOST_POSE_MARGIN`].
+    ///
+    /// The verdict is the caller's to ask: a pose that is refused makes a request all the same.
+    pub fn at_pose(pose: &AlignedPose, mesh: &Mesh) -> Self {
+        let mut request = Self::new(pose.camera_from_object.scale);
+        request.camera_from_object = Some(pose.camera_from_object.rigid());
+        request.alternatives.clone_from(&pose.alternatives);
+        request.settings.pose_margin = pose.uncertainty(mesh).min(MOST_POSE_MARGIN);
+        request
     }
 
     /// Everything turned into the frame of `mesh` and made ready for the search.
@@ -83,7 +103,7 @@ impl GraspRequest {
         }
         let object_from_answer = self.camera_from_object.map_or(Pose::IDENTITY, |p| p.inverse());
         Ok(GraspProblem {
-            object: GraspObject::from_mesh(&mesh, self.object_scale)?,
+            object: GraspObject::with_surface(&mesh, self.object_scale, self.surface)?,
             scene: self.scene(object_from_answer)?,
             settings: turned(self.settings, object_from_answer),
             mesh,

@@ -11,6 +11,8 @@ use semfm_grasp::Grasps;
 use semfm_robot::Gripper;
 use serde::{Deserialize, Serialize};
 
+use crate::ObjectSize;
+
 /// Grasps: of which object, by which gripper, seen from where.
 #[derive(Clone, Copy, Debug)]
 pub struct GraspResult<'a> {
@@ -47,6 +49,18 @@ impl AnswerFrame {
 }
 
 impl GraspResult<'_> {
+    /// How large the object is.
+    pub fn size(&self) -> ObjectSize {
+        ObjectSize::of(self.mesh, self.object_scale)
+    }
+
+    /// The shortest side of the object's box as a share of the gripper's widest opening: above 1 it fits between the
+    /// pads by parts only.
+    pub fn size_to_opening(&self) -> f64 {
+        let shortest = self.size().sides.into_iter().fold(f64::INFINITY, f64::min);
+        shortest / self.gripper.opening.end()
+    }
+
     /// The frame that poses are given in.
     pub fn frame(&self) -> AnswerFrame {
         match self.camera_from_object {

@@ -13,7 +13,9 @@ use semfm::files::{
 };
 use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
-use semfm::grasp::{ApproachCone, GraspSettings, Grasps, Selection};
+use semfm::grasp::{
+    ApproachCone, GraspSettings, Grasps, Reason, Selection, SurfaceReport, SurfaceSettings,
+};
 use semfm::robot::{BuiltinGripper, Gripper, GripperSettings};
 use semfm::{GraspProblem, GraspRequest, Mesh, POINT_MARGIN, Table, Task};
 use semfm_show::write_grasp_picture;
@@ -102,6 +104,10 @@ pub struct GraspOptions {
     /// Points of the region from which candidates are grown
     #[arg(long, default_value_t = GraspSettings::default().n_samples, value_name = "N", help_heading = "Grasps")]
     samples: usize,
+    /// Vertices of the surface on which contacts are sought on larger meshes; 0: on the mesh as it is, not simplified
+    /// and, where it is noisy, not smoothed. Collisions are always with the mesh as it is
+    #[arg(long, value_name = "N", help_heading = "Grasps")]
+    working_vertices: Option<usize>,
     /// Friction coefficient between pad and object
     #[arg(long, default_value_t = GraspSettings::default().friction, value_name = "MU", help_heading = "Grasps")]
     friction: f64,
@@ -148,7 +154,7 @@ struct MetricOptions {
 
 /// Help of an argument that takes a gripper: the built-in ones by name.
 pub fn gripper_help(what: &str) -> String {
-    format!("{what}: {}, or a URDF", BuiltinGripper::names())
+    format!("{what}: {}, or a URDF of a hand with two parallel pads", BuiltinGripper::names())
 }
 
 impl GraspCommand {
@@ -168,6 +174,7 @@ impl GraspCommand {
         self.picture.iter().try_for_each(refuse_input)?;
         if !common.quiet {
             print_size(&problem.size());
+            print_pose_margin(problem.settings().pose_margin);
         }
         let found = problem.find(region.weights(), &task)?;
         let result = problem.result(&found);
@@ -188,8 +195,18 @@ impl GraspCommand {
         } else {
             print_grasps(&found, common);
         }
+        if !common.quiet {
+            print_surface(&found.surface);
+        }
         warn_of_dependent_grasps(&problem, region.weights(), &found)?;
         if found.grasps.is_empty() && !common.quiet {
+            let opening = problem.gripper().opening.end();
+            console::message(format_args!(
+                "the object is {}; its shortest side is {:.2} of the gripper's opening of {:.0} mm",
+                problem.size(),
+                result.size_to_opening(),
+                1e3 * opening
+            ));
             let reason = small_region(&problem, region.weights())?;
             reason.iter().for_each(console::message);
             if is_one_sided(problem.mesh(), &region)? {
@@ -225,6 +242,7 @@ impl GraspOptions {
             diversity,
             random: false,
             samples: n_samples,
+            working_vertices: None,
             friction,
             mass: None,
             grip_force,
@@ -253,7 +271,12 @@ impl GraspOptions {
         let packages = self.package.iter().cloned().collect();
         let gripper = Gripper::open(gripper, &GripperSettings { packages, ..Default::default() })
             .context("--gripper")?;
-        request.settings = self.settings(seed);
+        let pose_margin = request.settings.pose_margin;
+        request.settings = GraspSettings { pose_margin, ..self.settings(seed) };
+        if let Some(working_vertices) = self.working_vertices {
+            let smooth = working_vertices > 0;
+            request.surface = SurfaceSettings { working_vertices, smooth };
+        }
         request.table = self.table;
         request.point_margin = self.scene_margin;
         for path in &self.scene {
@@ -292,10 +315,7 @@ impl MetricOptions {
         if let Some(path) = &self.aligned {
             let aligned = read_aligned(path, Some(mesh))?;
             warn_of_pose(path, &aligned, use_refused)?;
-            let AlignedPose { camera_from_object: pose, alternatives, .. } = aligned;
-            let camera_from_object = Some(pose.rigid());
-            let request = GraspRequest::new(pose.scale);
-            return Ok(GraspRequest { camera_from_object, alternatives, ..request });
+            return Ok(GraspRequest::at_pose(&aligned, mesh));
         }
         match (self.scale, self.metres) {
             (Some(scale), _) => Ok(GraspRequest::new(scale)),
@@ -389,6 +409,8 @@ pub fn grasps_file(problem: &GraspProblem, found: &Grasps) -> GraspsFile {
     let settings = GraspSettingsRecord {
         seed: settings.seed,
         friction: settings.friction,
+        grip_force: settings.grip_force,
+        mass: settings.mass,
         n_samples: settings.n_samples,
         version: env!("CARGO_PKG_VERSION").into(),
     };
@@ -439,14 +461,56 @@ pub fn print_grasps(found: &Grasps, common: &Common) {
         return;
     }
     for (reason, count) in found.rejected.iter() {
-        console::message(format_args!("{count:8}  {:14} {}", reason.name(), reason.explanation()));
+        console::message(format_args!(
+            "{count:8}  {:14} {} ({})",
+            reason.name(),
+            reason.explanation(),
+            option_names(reason)
+        ));
     }
     if let Some(miss) = &found.nearest_miss {
         let unit = miss.reason.unit();
         console::message(format_args!(
-            "the nearest miss failed by {:.4} {unit}: {}",
+            "the nearest miss failed by {:.4} {unit}: {}; {} ({})",
             miss.by,
-            miss.reason.explanation()
+            miss.reason.explanation(),
+            miss.reason.advice(),
+            option_names(miss.reason)
+        ));
+    }
+}
+
+/// The options that would change a reason, as the shell knows them.
+fn option_names(reason: Reason) -> String {
+    let names = reason.options().iter().map(|&name| {
+        // One option has another name here.
+        let name = if name == "n_samples" { "samples" } else { name };
+        format!("--{}", name.replace('_', "-"))
+    });
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// Says how far an uncertain pose keeps the gripper away.
+fn print_pose_margin(margin: f64) {
+    if margin > 0.0 {
+        console::message(format_args!(
+            "the pose is uncertain by {:.1} mm: before the pads close, the gripper keeps as far from everything",
+            1e3 * margin
+        ));
+    }
+}
+
+/// Says that contacts were sought on another surface.
+fn print_surface(surface: &SurfaceReport) {
+    if surface.noise > 0.0 {
+        console::message(format_args!(
+            "the mesh has noise of {:.2} mm: contacts are those of a smoothed surface, collisions those of the mesh",
+            1e3 * surface.noise
+        ));
+    } else if surface.is_simplified {
+        console::message(format_args!(
+            "contacts were sought on {} triangles, and every grasp was examined on the mesh itself",
+            surface.n_triangles
         ));
     }
 }

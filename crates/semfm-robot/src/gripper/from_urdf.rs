@@ -1,6 +1,7 @@
 //! A gripper out of a robot description.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use parry3d_f64::math::Pose;
@@ -22,6 +23,15 @@ const N_HALVINGS: usize = 60;
 
 /// Pads that are closer than this touch, metres.
 const TOUCH: f64 = 1e-9;
+
+/// A known hand's opening that differs by more is another, metres.
+const OTHER_OPENING: f64 = 2e-3;
+
+/// Pads that differ by less are the same.
+const SAME_PAD: f64 = 0.02;
+
+/// Shapes for collisions of a known hand's pads are larger than the pads by at most this share.
+const LARGER_PAD: f64 = 0.25;
 
 /// Cosine of 5°, by which a given TCP's y axis may leave the closing direction.
 const COS_TCP: f64 = 0.996;
@@ -176,7 +186,8 @@ impl Loader<'_> {
             return Err(self.no_gripper(expected, format!("{links} links and {joints} joints")));
         };
         let Some(best) = found.first() else {
-            let expected = "two fingers with flat pads that stay parallel and close on each other";
+            let expected = "two fingers with flat pads that stay parallel and close on each other (suction cups \
+                            and hands of three or more fingers are not covered)";
             let found = format!("no such pair{}", self.joints_without_range());
             return Err(self.no_gripper(expected, found));
         };
@@ -238,16 +249,17 @@ impl Loader<'_> {
         self.check_span(fingers)?;
         let samples = self.drive_samples(fingers)?;
         let flange = self.flange(fingers)?;
+        let flange_link = self.name_of(flange).to_owned();
         let palm_poses = fingers.drive.poses(self.robot, fingers.palm, 0.0);
         let flange_from_palm = palm_poses[flange].inverse();
-        let Parts { mut parts, notes, replaced } = self.parts(fingers, shapes, &samples)?;
+        let Parts { mut parts, mut notes, replaced } = self.parts(fingers, shapes, &samples)?;
         parts.extend(self.builtin_parts(&replaced)?);
         let opening = match (samples.first(), samples.last()) {
             (Some(closed), Some(open)) => closed.width..=open.width,
             _ => 0.0..=0.0,
         };
         let flange = by_width(&samples, |sample| flange_from_palm * sample.palm_from_tcp);
-        let pad = self.settings.pad.unwrap_or(fingers.pad);
+        let pad = self.pad(fingers, &opening, &mut notes)?;
         let gripper = Gripper::new(&self.robot.name, opening, pad, flange, parts).map_err(
             |error| match error {
                 Error::OutOfRange { what, expected, found } => {
@@ -265,7 +277,46 @@ impl Loader<'_> {
                 DriveJoint::new(name, samples.iter().map(|s| (s.width, driven.at(s.share))))
             })
             .collect();
-        Ok(Gripper { notes, joints, ..gripper })
+        Ok(Gripper { notes, joints, flange_link, ..gripper })
+    }
+
+    /// The pads' sides: as told, else as found. Where the names tell a known hand and what was found holds its pads
+    /// (boxes for collisions are often larger), they are the known ones; where its opening differs, that is noted.
+    fn pad(
+        &self,
+        fingers: &FingerPair,
+        opening: &RangeInclusive<f64>,
+        notes: &mut Vec<String>,
+    ) -> Result<[f64; 2]> {
+        let found = fingers.pad;
+        if let Some(pad) = self.settings.pad {
+            return Ok(pad);
+        }
+        let Some(row) = self.known_gripper() else { return Ok(found) };
+        let known = row.gripper()?;
+        let millimetres = |[x, z]: [f64; 2]| format!("{:.1} × {:.1} mm", 1e3 * x, 1e3 * z);
+        let (here, there) = (opening.end(), known.opening.end());
+        if (here - there).abs() > OTHER_OPENING {
+            notes.push(format!(
+                "opens to {:.1} mm as described; `{}` opens to {:.1} mm ({})",
+                1e3 * here,
+                row.name,
+                1e3 * there,
+                row.source
+            ));
+        }
+        let excess = [0, 1].map(|i| found[i] / known.pad[i] - 1.0);
+        let holds = excess.iter().all(|share| (-SAME_PAD..=LARGER_PAD).contains(share));
+        if !holds || excess.iter().all(|share| share.abs() <= SAME_PAD) {
+            return Ok(found);
+        }
+        notes.push(format!(
+            "pads of {} as in `{}`, not the {} of its shapes for collisions",
+            millimetres(known.pad),
+            row.name,
+            millimetres(found)
+        ));
+        Ok(known.pad)
     }
 
     /// The convex pieces of the gripper's links, and what stands in for those that cannot be read.

@@ -48,6 +48,8 @@ pub struct Gripper {
     pub parts: Vec<GripperPart>,
     /// The joints that open and close it, where they are known by name; mimicking ones follow.
     pub joints: Vec<DriveJoint>,
+    /// The link whose frame the flange is, as robot descriptions name it; empty where that is not known.
+    pub flange_link: String,
     /// What was replaced or left out when it was loaded, in words.
     pub notes: Vec<String>,
     /// The TCP in the flange's frame, by width.
@@ -93,9 +95,17 @@ impl Gripper {
             }
         }
         let flange_from_tcp = flange.at(closed);
-        let (name, joints, notes) = (name.into(), Vec::new(), Vec::new());
-        let flange_motion = flange;
-        Ok(Self { name, opening, pad, flange_from_tcp, parts, joints, notes, flange_motion })
+        Ok(Self {
+            name: name.into(),
+            opening,
+            pad,
+            flange_from_tcp,
+            parts,
+            joints: Vec::new(),
+            flange_link: String::new(),
+            notes: Vec::new(),
+            flange_motion: flange,
+        })
     }
 
     /// Each part with its pose in the TCP frame when the pads are `width` metres apart; a width

@@ -218,7 +218,7 @@ mod tests {
     use parry3d_f64::math::Pose;
     use parry3d_f64::shape::Cuboid;
     use semfm::GraspResult;
-    use semfm::grasp::{Grasp, Grasps, Rejected};
+    use semfm::grasp::{Grasp, Grasps, Rejected, SurfaceReport};
     use semfm::robot::Gripper;
 
     use super::*;
@@ -242,6 +242,7 @@ mod tests {
             epsilon: 0.0,
             closing_turn: 0.0,
             score: 1.0,
+            hold: None,
             terms: Vec::new(),
         };
         let gripper = Gripper::builtin(gripper).unwrap();
@@ -249,6 +250,7 @@ mod tests {
             grasps: vec![grasp; n],
             rejected: Rejected::default(),
             nearest_miss: None,
+            surface: SurfaceReport::of(block),
             n_candidates: n,
             n_survivors: n,
             stages_ms: Vec::new(),

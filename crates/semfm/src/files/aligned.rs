@@ -151,6 +151,10 @@ pub struct AlignedPose {
     pub camera_from_object: Sim3,
     /// Standard deviation of the scale, metres per unit of the mesh; `None` where the file does not say.
     pub scale_std: Option<f64>,
+    /// Standard deviation of the rotation about its least certain axis, radians; `None` where the file does not say.
+    pub rotation_std: Option<f64>,
+    /// Standard deviation of the position in its least certain direction, metres; `None` where the file does not say.
+    pub position_std_m: Option<f64>,
     /// Root mean square distance of the observed points to the surface, metres; `None` where the
     /// file does not say.
     pub residual_m: Option<f64>,
@@ -179,13 +183,48 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<AlignedPose> {
     if let (Some(identity), Some(mesh)) = (&file.mesh, mesh) {
         identity.check(mesh).map_err(|error| error.in_file(path))?;
     }
+    AlignedPose::of_file(file, path)
+}
+
+impl AlignedPose {
+    /// The pose of a file's content; `path` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Format`](crate::Error::Format) with the field at fault.
+    pub fn of_file(file: AlignedFile, path: &Path) -> Result<Self> {
+        checked_pose(file, path)
+    }
+
+    /// How far (metres) points of the mesh's surface may stand from where the pose puts them, one standard deviation:
+    ///
+    /// > √(position² + (rotation · r)² + (scale_std · r / scale)²), r the distance of the farthest vertex from the middle
+    ///
+    /// What the file does not say counts as certain.
+    pub fn uncertainty(&self, mesh: &Mesh) -> f64 {
+        let (low, high) = mesh.bounds();
+        let middle = low.midpoint(high);
+        let radius = mesh.vertices().iter().map(|p| p.distance(middle)).fold(0.0, f64::max);
+        let position = self.position_std_m.unwrap_or(0.0);
+        let turned = self.rotation_std.unwrap_or(0.0) * radius * self.camera_from_object.scale;
+        let scaled = self.scale_std.unwrap_or(0.0) * radius;
+        position.hypot(turned).hypot(scaled)
+    }
+}
+
+fn checked_pose(file: AlignedFile, path: &Path) -> Result<AlignedPose> {
     let camera_from_object = similarity(path, "camera_from_object", file.camera_from_object)?;
     let scale = camera_from_object.scale;
     if let Some(found) = file.scale.filter(|found| (found / scale - 1.0).abs() > SCALE_TOLERANCE) {
         let expected = format!("{scale}, the matrix's");
         return Err(FormatError::new(path, "scale", expected, found.to_string()).into());
     }
-    for (place, number) in [("scale_std", file.scale_std), ("residual_m", file.residual_m)] {
+    let numbers = [
+        ("scale_std", file.scale_std),
+        ("rotation_std", file.rotation_std),
+        ("position_std_m", file.position_std_m),
+        ("residual_m", file.residual_m),
+    ];
+    for (place, number) in numbers {
         if let Some(number) = number.filter(|x| *x < 0.0) {
             let expected = "a number of at least 0";
             return Err(FormatError::new(path, place, expected, number.to_string()).into());
@@ -196,6 +235,8 @@ pub fn read_aligned(path: &Path, mesh: Option<&Mesh>) -> Result<AlignedPose> {
     Ok(AlignedPose {
         camera_from_object,
         scale_std: file.scale_std,
+        rotation_std: file.rotation_std,
+        position_std_m: file.position_std_m,
         residual_m: file.residual_m,
         verdict: file.verdict,
         reasons: file.reasons,
@@ -239,6 +280,19 @@ mod tests {
         let path = folder.path().join("aligned.json");
         std::fs::write(&path, text).unwrap();
         read_aligned(&path, mesh)
+    }
+
+    #[test]
+    fn uncertainty_is_that_of_the_farthest_points() {
+        let text = format!(
+            r#"{{"camera_from_object": {POSE}, "position_std_m": 0.003, "rotation_std": 0.01, "scale_std": 0.02}}"#
+        );
+        let mesh = zoo::icosphere(1); // radius 1, at scale 2
+        let found = read(&text, None).unwrap().uncertainty(&mesh);
+        let expected = (0.003f64.powi(2) + 0.02f64.powi(2) + 0.02f64.powi(2)).sqrt();
+        assert!((found - expected).abs() < 1e-9, "{found} for {expected}");
+        let bare = read(&format!(r#"{{"camera_from_object": {POSE}}}"#), None).unwrap();
+        assert_eq!(bare.uncertainty(&mesh), 0.0);
     }
 
     const POSE: &str = "[[0,-2,0,1],[2,0,0,0],[0,0,2,0.5],[0,0,0,1]]";

@@ -8,7 +8,7 @@ use parry3d_f64::shape::{Shape, TypedShape};
 use semfm_align::Sim3;
 use semfm_geom::io::{FormatError, read_json};
 use semfm_geom::{Mesh, MeshIdentity};
-use semfm_grasp::Grasp;
+use semfm_grasp::{Grasp, GraspSettings, SurfaceReport};
 use semfm_robot::{Gripper, GripperPart, Role};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -37,6 +37,15 @@ pub struct GraspsFile {
     pub camera_from_object: Option<MatrixRows>,
     /// The gripper.
     pub gripper: GripperRecord,
+    /// Sides of the object's box along x, y and z, metres; absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object_size: Option<[f64; 3]>,
+    /// The shortest of them as a share of the gripper's widest opening; absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size_to_opening: Option<f64>,
+    /// Where contacts were sought, if not on the mesh itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub working_surface: Option<WorkingSurfaceRecord>,
     /// The grasps, best first.
     pub grasps: Vec<GraspRecord>,
     /// Candidates refused, by the first thing that each failed.
@@ -99,21 +108,40 @@ pub struct GraspRecord {
     pub position: [f64; 3],
     /// Rotation of the TCP, w ≥ 0.
     pub quaternion_xyzw: [f64; 4],
-    /// Distance between the closed pads.
+    /// Distance between the closed pads where nothing is touched yet: the hand is free of collisions down to it.
     pub width: f64,
+    /// Distance between the contacts along the closing direction: where the pads touch; absent in files of older
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_width: Option<f64>,
+    /// What to command to a hand that stops at a force: below contact; absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_width: Option<f64>,
     /// Distance between the pads on the way in.
     pub opening: f64,
+    /// The frame of `contacts` and `normals`: always the object's in metres.
+    #[serde(default = "object_frame")]
+    pub contact_frame: AnswerFrame,
     /// One contact for each pad, in the object's frame.
     pub contacts: [[f64; 3]; 2],
-    /// The object's unit normal at each contact.
+    /// The object's unit normal at each contact, in the object's frame.
     pub normals: [[f64; 3]; 2],
+    /// The contacts in the camera's frame, where that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_contacts: Option<[[f64; 3]; 2]>,
+    /// The normals in the camera's frame, where that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_normals: Option<[[f64; 3]; 2]>,
     /// Ferrari and Canny's ε.
     pub epsilon: f64,
     /// Angle by which the object turns while the pads close, radians; 0 in files of older versions.
     #[serde(default)]
     pub closing_turn: f64,
-    /// Weighted mean of the terms, 0 to 1.
+    /// The probability that the grasp holds, times what is asked beyond that; without a mass, as for .3 kg.
     pub score: f64,
+    /// The probability that the grasp holds; absent where no mass was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hold: Option<f64>,
     /// The terms of the score, each 0 to 1.
     pub terms: BTreeMap<String, f64>,
     /// Where the object's pose leaves something open: the share of the other poses that fit as well under
@@ -134,6 +162,30 @@ pub struct HandRecord {
     pub open: Vec<MatrixRows>,
 }
 
+/// The surface that contacts were sought on, where the mesh is very dense or noisy. Collisions are with the mesh itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WorkingSurfaceRecord {
+    /// Its triangles.
+    pub n_triangles: usize,
+    /// Whether it has fewer triangles than the mesh. Every grasp was then examined on the mesh itself, too.
+    pub simplified: bool,
+    /// Deviation of the mesh's noise along the normal, metres. Above 0 contacts and normals are those of a smooth
+    /// surface, and `width` is where the first points of the mesh stop the pads.
+    pub noise: f64,
+}
+
+impl WorkingSurfaceRecord {
+    /// `None` for the mesh itself.
+    fn of(surface: &SurfaceReport) -> Option<Self> {
+        let SurfaceReport { n_triangles, is_simplified: simplified, noise, .. } = *surface;
+        (simplified || noise > 0.0).then_some(Self { n_triangles, simplified, noise })
+    }
+}
+
+fn object_frame() -> AnswerFrame {
+    AnswerFrame::Object
+}
+
 /// The candidate that failed by least.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MissRecord {
@@ -145,6 +197,12 @@ pub struct MissRecord {
     pub by: f64,
     /// Unit of `by`.
     pub unit: String,
+    /// What to do about it, in words.
+    #[serde(default)]
+    pub advice: String,
+    /// Names of the options that would change it, the likeliest first.
+    #[serde(default)]
+    pub options: Vec<String>,
     /// The TCP in the frame of the object in metres.
     pub object_from_tcp: MatrixRows,
 }
@@ -165,10 +223,21 @@ pub struct GraspSettingsRecord {
     pub seed: u64,
     /// Friction coefficient between pad and object.
     pub friction: f64,
+    /// Force with which each pad presses; 30 in files of older versions.
+    #[serde(default = "usual_force")]
+    pub grip_force: f64,
+    /// Mass of the object in kilograms, where it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
     /// Points of the region from which candidates were grown.
     pub n_samples: usize,
     /// Version of the program.
     pub version: String,
+}
+
+/// What `grip_force` was where files did not tell it.
+fn usual_force() -> f64 {
+    GraspSettings::default().grip_force
 }
 
 impl GraspsFile {
@@ -183,6 +252,9 @@ impl GraspsFile {
             object_scale: result.object_scale,
             camera_from_object: result.camera_from_object.map(rows),
             gripper: GripperRecord::new(result.gripper),
+            object_size: Some(result.size().sides),
+            size_to_opening: Some(result.size_to_opening()),
+            working_surface: WorkingSurfaceRecord::of(&found.surface),
             grasps: found.grasps.iter().map(|grasp| GraspRecord::new(result, grasp)).collect(),
             rejected: rejected.collect(),
             nearest_miss: found.nearest_miss.as_ref().map(|miss| MissRecord {
@@ -190,6 +262,8 @@ impl GraspsFile {
                 explanation: miss.reason.explanation().into(),
                 by: miss.by,
                 unit: miss.reason.unit().into(),
+                advice: miss.reason.advice().into(),
+                options: miss.reason.options().iter().map(|&name| name.to_owned()).collect(),
                 object_from_tcp: rows(miss.grasp.object_from_tcp),
             }),
             n_candidates: found.n_candidates,
@@ -290,12 +364,22 @@ impl GraspRecord {
             position: position.to_array(),
             quaternion_xyzw: rotation.to_array(),
             width: grasp.width,
+            contact_width: Some(grasp.contact_width()),
+            command_width: Some(grasp.command_width().max(*gripper.opening.start())),
             opening: grasp.opening,
+            contact_frame: AnswerFrame::Object,
             contacts: grasp.contacts.map(|point| point.to_array()),
             normals: grasp.normals.map(|normal| normal.to_array()),
+            camera_contacts: result
+                .camera_from_object
+                .map(|camera| grasp.contacts.map(|point| (camera * point).to_array())),
+            camera_normals: result
+                .camera_from_object
+                .map(|camera| grasp.normals.map(|n| (camera.rotation * n).to_array())),
             epsilon: grasp.epsilon,
             closing_turn: grasp.closing_turn,
             score: grasp.score,
+            hold: grasp.hold,
             terms: terms.collect(),
             pose_share: None,
             hand: HandRecord {

@@ -1,14 +1,15 @@
 //! Grasps as an `isaac_grasp` file (format 1.0), the YAML that NVIDIA's Isaac Sim and Isaac ROS
 //! read: <https://nvidia-isaac-ros.github.io/concepts/manipulation/isaac_grasp.html>.
 //!
-//! Poses are those of the gripper's flange in the object's frame, quaternions with w first. Joints
-//! of the gripper are named as in its URDF.
+//! Poses are those of the gripper's flange in the object's frame, quaternions with w first. `gripper_frame` is the
+//! link whose frame the flange is, and joints are named as in the URDF: for the built-in grippers, in the published
+//! ones. `cspace_position` is where the joints would be if nothing stopped them: below contact, so that the pads press.
 
 use std::fmt::Write;
 use std::path::Path;
 
 use semfm_geom::io::{refuse_input, write_atomically};
-use semfm_robot::JointPosition;
+use semfm_robot::{Gripper, JointPosition};
 
 use crate::Result;
 use crate::grasp_result::{GraspResult, position_and_rotation};
@@ -29,7 +30,7 @@ fn isaac_yaml(result: &GraspResult<'_>) -> String {
     let _ = writeln!(
         text,
         "format: isaac_grasp\nformat_version: 1.0\n\nobject_frame: object\ngripper_frame: {}\n",
-        quoted(&result.gripper.name)
+        quoted(gripper_frame(result.gripper))
     );
     let none = if result.found.grasps.is_empty() { " {}" } else { "" };
     let _ = writeln!(text, "grasps:{none}");
@@ -41,9 +42,10 @@ fn isaac_yaml(result: &GraspResult<'_>) -> String {
         let _ = writeln!(text, "    position: {}", list(p.to_array()));
         let xyz = list([q.x, q.y, q.z]);
         let _ = writeln!(text, "    orientation: {{w: {}, xyz: {xyz}}}", number(q.w));
-        for (name, width) in
-            [("cspace_position", grasp.width), ("pregrasp_cspace_position", grasp.opening)]
-        {
+        for (name, width) in [
+            ("cspace_position", grasp.command_width()),
+            ("pregrasp_cspace_position", grasp.opening),
+        ] {
             let joints = result.gripper.joints_at(width);
             let _ = writeln!(text, "    {name}:{}", if joints.is_empty() { " {}" } else { "" });
             for JointPosition { name: joint, position } in joints {
@@ -52,6 +54,11 @@ fn isaac_yaml(result: &GraspResult<'_>) -> String {
         }
     }
     text
+}
+
+/// The link whose frame poses are of.
+fn gripper_frame(gripper: &Gripper) -> &str {
+    if gripper.flange_link.is_empty() { &gripper.name } else { &gripper.flange_link }
 }
 
 /// A number to the nanometre, with a point and without an exponent: YAML readers disagree on which

@@ -18,12 +18,22 @@ struct Column {
 }
 
 /// Numbers that stand beside the poses, in the same order.
-static COLUMNS: [Column; 3] = [
+static COLUMNS: [Column; 5] = [
     Column { topic: "/grasps/widths", label: "distance of the closed pads (m)", of: |g| g.width },
     Column {
         topic: "/grasps/openings",
         label: "distance of the pads on the way in (m)",
         of: |g| g.opening,
+    },
+    Column {
+        topic: "/grasps/contact_widths",
+        label: "distance of the contacts (m)",
+        of: Grasp::contact_width,
+    },
+    Column {
+        topic: "/grasps/command_widths",
+        label: "width to command with limited force, below contact (m)",
+        of: Grasp::command_width,
     },
     Column { topic: "/grasps/scores", label: "score (0 to 1)", of: |g| g.score },
 ];

@@ -59,5 +59,5 @@ fn franka_hand(row: &BuiltinGripper) -> Result<Gripper> {
         .into_iter()
         .filter_map(|name| DriveJoint::new(name, [(0.0, 0.0), (STROKE, STROKE / 2.0)]))
         .collect();
-    Ok(Gripper { joints, ..gripper })
+    Ok(Gripper { joints, flange_link: "panda_link8".into(), ..gripper })
 }

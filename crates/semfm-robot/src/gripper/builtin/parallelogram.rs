@@ -8,7 +8,7 @@ use semfm_geom::math::{DQuat, DVec2, DVec3};
 
 use super::{PlacedShape, box_between};
 use crate::Result;
-use crate::gripper::{Gripper, GripperPart, Motion, Role};
+use crate::gripper::{DriveJoint, Gripper, GripperPart, Motion, Role};
 
 /// Steps of a crank between open and closed: see [`Motion`].
 const N_STEPS: usize = 65;
@@ -79,7 +79,12 @@ impl Parallelogram {
         for role in [Role::Left, Role::Right] {
             parts.extend(self.finger(role));
         }
-        Gripper::new(name, 0.0..=self.stroke, self.pad, flange, parts)
+        // The published models turn the outer crank by `finger_joint`, 0 where the hand is open; the others mimic it.
+        let open = self.angle(self.stroke);
+        let drive = self.widths().map(|width| (width, open - self.angle(width)));
+        let joints = DriveJoint::new("finger_joint", drive).into_iter().collect();
+        let gripper = Gripper::new(name, 0.0..=self.stroke, self.pad, flange, parts)?;
+        Ok(Gripper { joints, flange_link: "robotiq_arg2f_base_link".into(), ..gripper })
     }
 
     fn palm_part(&self, low: [f64; 3], high: [f64; 3], palm: &Motion) -> GripperPart {

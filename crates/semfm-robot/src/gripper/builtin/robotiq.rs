@@ -5,8 +5,12 @@ use semfm_geom::math::DVec2;
 use super::BuiltinGripper;
 use super::parallelogram::Parallelogram;
 
+/// The published ROS model of the 2F-140 opens to 128.5 mm only, since its pads are 7.5 mm thick boxes at the place of
+/// the real ones, and its boxes for collisions (30 × 70 mm) are larger than the pads that it shows (27 × 65 mm). A
+/// URDF keeps its own opening, which is what its robot will do in a simulator, takes the pads from here, and says both.
 const SOURCE: &str = "instruction manual, section \"Specifications\" (strokes 85 and 140 mm, foot of \
-                      75 mm diameter), and the joints of the published ROS model for the parallelogram";
+                      75 mm diameter), and the published ROS model for the joints of the parallelogram and \
+                      the pads (22 × 37.5 and 27 × 65 mm)";
 
 pub(super) const ROBOTIQ_2F85: BuiltinGripper = BuiltinGripper {
     name: "robotiq-2f85",
