@@ -231,7 +231,10 @@ pub fn print_plan(plan: &GraspPlan, common: &Common) {
     for row in answer.gates() {
         console::message(format_args!(
             "{:8}  {:10} grasp {}: {}",
-            row.n, row.gate, row.grasp, row.obstruction
+            row.n,
+            row.gate.name(),
+            row.grasp,
+            row.obstruction
         ));
     }
     if answer.motion.is_some() {
