@@ -87,7 +87,7 @@ def test_ros_and_yaml_readers_take_the_files(grasps, tmp_path):
         made = reader.make_reader(stream, decoder_factories=[decoder.DecoderFactory()])
         messages = list(made.iter_decoded_messages())
     told = {channel.topic: (schema.name, message) for schema, channel, _, message in messages}
-    assert len(told) == len(messages) == 4
+    assert len(told) == len(messages) == 6
     name, message = told["/grasps/poses"]
     assert name == "geometry_msgs/msg/PoseArray"
     assert message.header.frame_id == "object" and len(message.poses) == len(grasps)
@@ -96,6 +96,8 @@ def test_ros_and_yaml_readers_take_the_files(grasps, tmp_path):
     for topic, values in (
         ("/grasps/widths", grasps.widths),
         ("/grasps/openings", [grasp.opening for grasp in grasps]),
+        ("/grasps/contact_widths", [grasp.contact_width for grasp in grasps]),
+        ("/grasps/command_widths", [grasp.command_width for grasp in grasps]),
         ("/grasps/scores", grasps.scores),
     ):
         name, message = told[topic]
@@ -108,7 +110,9 @@ def test_ros_and_yaml_readers_take_the_files(grasps, tmp_path):
     file = yaml.safe_load((tmp_path / "grasps.yaml").read_text())
     assert file["format"] == "isaac_grasp" and len(file["grasps"]) == len(grasps)
     best = file["grasps"]["grasp_0"]
-    assert best["cspace_position"]["panda_finger_joint1"] == pytest.approx(grasps[0].width / 2, abs=1e-8)
+    assert best["cspace_position"]["panda_finger_joint1"] == pytest.approx(
+        grasps[0].command_width / 2, abs=1e-8
+    )
 
 
 def test_nothing_found_says_why(mug, scale):
@@ -117,7 +121,28 @@ def test_nothing_found_says_why(mug, scale):
     )
     assert len(none) == 0 and none.rejected["width"] > 0
     reason, by, unit = none.nearest_miss
-    assert by > 0 and unit == "m", reason
+    assert by > 0 and unit == "m" and reason == "width"
+    assert "width_range" in none.advice
+
+
+def test_an_alignment_is_taken_whole(mug, scale, tmp_path):
+    pose = np.eye(4)
+    pose[:3, :3] *= scale
+    pose[2, 3] = 0.6
+    file = {"camera_from_object": pose.tolist(), "verdict": "check", "reasons": ["hidden"], "position_std_m": 0.004}
+    path = tmp_path / "aligned.json"
+    path.write_text(json.dumps(file))
+    grasps = semfm.find_grasps(mug.mesh, mug.region, "franka", alignment=path, n_samples=200)
+    assert len(grasps) > 0 and grasps.camera_from_tcp is not None
+    for grasp in grasps:
+        assert grasp.opening - grasp.width > 2 * 0.0038
+        assert grasp.command_width < grasp.contact_width
+    path.write_text(json.dumps({**file, "verdict": "refuse"}))
+    with pytest.raises(semfm.InvalidInput, match="refuse"):
+        semfm.find_grasps(mug.mesh, mug.region, "franka", alignment=path)
+    for both in ({}, {"alignment": path, "scale": scale}):
+        with pytest.raises(semfm.InvalidInput, match="scale and alignment"):
+            semfm.find_grasps(mug.mesh, mug.region, "franka", **both)
 
 
 @pytest.mark.parametrize(

@@ -131,14 +131,117 @@ fn other_programs_get_their_own_files() {
     assert_eq!(ros2.code, Some(0), "{ros2:?}");
     let report = inspect(&mug.at("grasps.mcap")).unwrap();
     let topics: Vec<&str> = report.channels.iter().map(|channel| channel.topic.as_str()).collect();
-    let numbers = ["/grasps/widths", "/grasps/openings", "/grasps/scores"];
-    assert_eq!((report.n_messages, topics.len(), topics.contains(&POSES_TOPIC)), (4, 4, true));
+    let numbers = [
+        "/grasps/widths",
+        "/grasps/openings",
+        "/grasps/contact_widths",
+        "/grasps/command_widths",
+        "/grasps/scores",
+    ];
+    assert_eq!((report.n_messages, topics.len(), topics.contains(&POSES_TOPIC)), (6, 6, true));
     assert!(numbers.iter().all(|topic| topics.contains(topic)), "{topics:?}");
     let isaac = mug.scaled("grasps.yaml", &["--format", "isaac"]);
     assert_eq!(isaac.code, Some(0), "{isaac:?}");
     let text = std::fs::read_to_string(mug.at("grasps.yaml")).unwrap();
     assert!(text.starts_with("format: isaac_grasp\nformat_version: 1.0\n"), "{text}");
     assert!(text.contains("\"panda_finger_joint1\": 0.") && text.contains("orientation: {w: "));
+    assert!(text.contains("gripper_frame: \"panda_link8\""), "{text}");
+    let robotiq = mug.scaled("robotiq.yaml", &["--format", "isaac", "--gripper", "robotiq-2f85"]);
+    assert_eq!(robotiq.code, Some(0), "{robotiq:?}");
+    let text = std::fs::read_to_string(mug.at("robotiq.yaml")).unwrap();
+    assert!(text.contains("gripper_frame: \"robotiq_arg2f_base_link\""), "{text}");
+    // 0 is open and .8 closed: both positions lie between, the pressing one nearer to closed.
+    let positions: Vec<f64> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("\"finger_joint\": ")?.parse().ok())
+        .collect();
+    assert!(!positions.is_empty() && positions.len().is_multiple_of(2), "{text}");
+    assert!(
+        positions.chunks(2).all(|p| p[0] > p[1] && (0.0..0.81).contains(&p[0])),
+        "{positions:?}"
+    );
+}
+
+#[test]
+fn the_keys_of_the_file_are_these() {
+    let mug = Mug::new();
+    let pose = json!({
+        "camera_from_object": Sim3 {
+            scale: mug.scale.parse().unwrap(),
+            rotation: DQuat::from_scaled_axis(DVec3::new(1.6, 0.9, -0.5)),
+            translation: DVec3::new(0.02, -0.01, 0.6),
+        }.to_rows(),
+    });
+    std::fs::write(mug.at("aligned.json"), pose.to_string()).unwrap();
+    let answer = mug.grasp("grasps.json", &["--aligned", "@aligned.json"]);
+    assert_eq!(answer.code, Some(0), "{answer:?}");
+    let file = json_file(&mug.at("grasps.json"));
+    let has = |value: &Value, keys: &[&str]| {
+        for key in keys {
+            assert!(value.get(key).is_some(), "no `{key}`");
+        }
+    };
+    has(
+        &file,
+        &["format", "mesh", "object_scale", "camera_from_object", "gripper", "grasps", "rejected"],
+    );
+    has(&file, &["nearest_miss", "n_candidates", "n_survivors", "object_size", "size_to_opening"]);
+    has(&file["nearest_miss"], &["reason", "explanation", "by", "unit", "advice", "options"]);
+    let point = |value: &Value| DVec3::from_array([0, 1, 2].map(|i| value[i].as_f64().unwrap()));
+    let ([x, y, z], origin) = self::pose(&file["camera_from_object"]);
+    for grasp in file["grasps"].as_array().unwrap() {
+        has(grasp, &["object_from_tcp", "camera_from_tcp", "flange_from_tcp", "frame", "position"]);
+        has(
+            grasp,
+            &["quaternion_xyzw", "width", "contact_width", "command_width", "opening", "terms"],
+        );
+        assert_eq!(grasp["contact_frame"], "object");
+        let [width, contact, command] =
+            ["width", "contact_width", "command_width"].map(|key| grasp[key].as_f64().unwrap());
+        assert!(command < contact && command < width && contact < width + 1e-4);
+        for i in 0..2 {
+            let (p, n) = (point(&grasp["contacts"][i]), point(&grasp["normals"][i]));
+            let turned = |v: DVec3| x * v.x + y * v.y + z * v.z;
+            assert!((turned(p) + origin).distance(point(&grasp["camera_contacts"][i])) < 1e-9);
+            assert!(turned(n).distance(point(&grasp["camera_normals"][i])) < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_refused_pose_gives_no_grasps_and_an_uncertain_one_keeps_the_hand_away() {
+    let mug = Mug::new();
+    let write = |verdict: &str, position_std: f64| {
+        let pose = Sim3 {
+            scale: mug.scale.parse().unwrap(),
+            rotation: DQuat::IDENTITY,
+            translation: DVec3::new(0.0, 0.0, 0.6),
+        };
+        let aligned = json!({
+            "camera_from_object": pose.to_rows(), "verdict": verdict, "reasons": ["half of it is hidden"],
+            "position_std_m": position_std,
+        });
+        std::fs::write(mug.at("aligned.json"), aligned.to_string()).unwrap();
+    };
+    write("refuse", 0.0);
+    let refused = mug.grasp("never.json", &["--aligned", "@aligned.json"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.err.contains("half of it is hidden") && refused.err.contains("--use-refused"));
+    assert!(!mug.at("never.json").exists());
+    let used = mug.grasp("used.json", &["--aligned", "@aligned.json", "--use-refused"]);
+    assert_eq!(used.code, Some(0), "{used:?}");
+    let room = |name: &str| {
+        let file = json_file(&mug.at(name));
+        let grasps = file["grasps"].as_array().unwrap().clone();
+        let room =
+            grasps.iter().map(|g| g["opening"].as_f64().unwrap() - g["width"].as_f64().unwrap());
+        room.fold(f64::INFINITY, f64::min)
+    };
+    write("check", 0.004);
+    let warned = mug.grasp("warned.json", &["--aligned", "@aligned.json"]);
+    assert_eq!(warned.code, Some(0), "{warned:?}");
+    assert!(warned.err.contains("`check`") && warned.err.contains("4.0 mm"), "{}", warned.err);
+    assert!(room("warned.json") > 2.0 * 0.0038, "{}", room("warned.json"));
 }
 
 #[test]
@@ -146,11 +249,15 @@ fn where_nothing_survives_the_reasons_are_told() {
     let mug = Mug::new();
     let answer = mug.scaled("none.json", &["--width-range", "0,0.001"]);
     assert_eq!(answer.code, Some(1), "{answer:?}");
-    assert!(answer.err.contains("nearest miss"), "{}", answer.err);
+    for words in ["nearest miss", "--width-range", "opening of 80 mm", "shortest side"] {
+        assert!(answer.err.contains(words), "no `{words}`: {}", answer.err);
+    }
     let file = json_file(&mug.at("none.json"));
     assert_eq!(file["grasps"], json!([]));
     assert!(file["rejected"]["width"].as_u64() > Some(0), "{}", file["rejected"]);
     assert_eq!(file["nearest_miss"]["unit"], "m");
+    assert_eq!(file["nearest_miss"]["reason"], "width");
+    assert!(file["size_to_opening"].as_f64() > Some(0.0));
 }
 
 #[test]
