@@ -51,8 +51,7 @@ impl RobotArm {
         let model =
             CollisionModel::new(opened.arm.clone(), &paths, opened.srdf.as_ref(), collision)?;
         if let Some(first) = model.missing().first() {
-            let expected =
-                "every mesh, so that no link moves unchecked: map its package (NAME=FOLDER)";
+            let expected = "every mesh, so that no link moves unchecked: map its package (--package NAME=FOLDER, or packages={NAME: FOLDER})";
             let found = format!("{} that are missing, first {first}", model.missing().len());
             return Err(Error::invalid("collision meshes of the robot", expected, found));
         }
