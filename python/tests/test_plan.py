@@ -122,6 +122,35 @@ def test_grasps_of_this_process_need_no_file(demo, robot, asked, tmp_path):
     assert done.returncode == 0 and page.is_file(), done.stderr
 
 
+def test_a_hand_that_is_not_in_the_description_is_in_the_bag(demo, robot, asked, tmp_path):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    stores = pytest.importorskip("rosbags.typesys")
+    store = stores.get_typestore(stores.Stores.ROS2_HUMBLE)
+    kettle = semfm.Mesh.read(demo / "containers_1_s0.obj")
+    region = semfm.Region.read(demo / "transfer/region.json", kettle)
+    found = semfm.find_grasps(kettle, region, "franka", scale=0.24, n_samples=300)
+    plan = semfm.plan(robot, found, **{**asked, "object": None})
+    assert any("a hand of its own" in note for note in plan.notes)
+    plan.write(tmp_path / "plan")
+    with rosbag2.Reader(tmp_path / "plan") as reader:
+        messages = list(reader.messages())
+    for connection, _, _ in messages[:8]:
+        # What the file says of a message is what every installation says.
+        ours = stores.get_types_from_msg(connection.msgdef.data, connection.msgtype)
+        assert all(fields == store.fielddefs[name] for name, fields in ours.items())
+    (raw,) = [raw for connection, _, raw in messages if connection.topic == "/hand"]
+    name = "visualization_msgs/msg/MarkerArray"
+    hand = store.deserialize_cdr(raw, name)
+    assert bytes(store.serialize_cdr(hand, name)) == bytes(raw)
+    parts = {marker.header.frame_id: marker for marker in hand.markers}
+    assert len(parts) == 7 and {marker.ns for marker in hand.markers} == {"franka"}
+    assert all(m.type == 11 and m.frame_locked and len(m.points) == 36 for m in hand.markers)
+    first = next(raw for connection, _, raw in messages if connection.topic == "/tf")
+    frames = store.deserialize_cdr(first, "tf2_msgs/msg/TFMessage").transforms
+    moved_with_tip = {f.child_frame_id for f in frames if f.header.frame_id == "flange"}
+    assert moved_with_tip == set(parts)
+
+
 def test_what_cannot_be_done_is_an_answer_with_its_gates(demo, robot, asked, tmp_path):
     far = np.eye(4)
     far[0, 3] = 4
