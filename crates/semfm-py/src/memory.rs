@@ -188,7 +188,7 @@ impl Memory {
     ///
     /// Parameters
     /// ----------
-    /// target : mesh_like, MeshFile or PreparedObject
+    /// target : mesh_like or MeshFile or PreparedObject
     ///     The object to act on.
     /// kind : str, optional
     ///     Only demonstrations of this kind.
@@ -329,7 +329,7 @@ impl MemoryTransfer {
     /// str, optional: why the answer is not accepted, where that is known.
     #[getter]
     fn why(&self) -> Option<String> {
-        self.answer.doubt()
+        self.answer.why()
     }
 
     /// float: mean IoU of the answers with the fused region, by their shares of the vote.

@@ -84,7 +84,7 @@ fn print(answer: &MemoryTransfer, target: &Prepared, write_ms: f64, common: &Com
         "verdict     {} (confidence {:.2})",
         fused.verdict, fused.confidence
     ));
-    if let Some(why) = answer.doubt() {
+    if let Some(why) = answer.why() {
         console::data(format_args!("why         {why}"));
     }
     console::data(format_args!("region      {n} of {of} vertices of the target"));

@@ -91,7 +91,7 @@ impl MemoryReportFile {
             format: FORMAT.into(),
             confidence: answer.fused.confidence,
             verdict: answer.fused.verdict,
-            why: answer.doubt(),
+            why: answer.why(),
             agreement: answer.fused.agreement,
             target: ObjectRecord::new(target),
             memory: memory.folder().display().to_string(),

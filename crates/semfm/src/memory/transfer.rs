@@ -188,7 +188,7 @@ impl Memory {
 
 impl MemoryTransfer {
     /// Why the answer is not accepted, in words; none where it is.
-    pub fn doubt(&self) -> Option<String> {
+    pub fn why(&self) -> Option<String> {
         if self.fused.verdict == Verdict::Accept {
             return None;
         }
