@@ -637,7 +637,24 @@ class FunctionalMap:
         PointMap
         """
         ...
-    def zoomout(self, source: Eigenbasis, target: Eigenbasis, *, k_final: int = 50, step: int = 5, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0, target_samples: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> FunctionalMap:
+    def to_precise_map(self, source: Eigenbasis, target: Eigenbasis, source_mesh: _MeshLike) -> PreciseMap:
+        """The precise map target → source (Ezuz & Ben-Chen 2017): each target vertex takes the nearest
+        point on the source's triangles, whose corners stand where their delta functions, sent through
+        C, come to. Exact; of equally near triangles the first.
+
+        Parameters
+        ----------
+        source : Eigenbasis
+        target : Eigenbasis
+        source_mesh : mesh_like
+            Triangles on the source's vertices, of a `Shape` its `working` mesh.
+
+        Returns
+        -------
+        PreciseMap
+        """
+        ...
+    def zoomout(self, source: Eigenbasis, target: Eigenbasis, *, k_final: int = 50, step: int = 5, source_features: Optional[ArrayLike] = None, target_features: Optional[ArrayLike] = None, feature_weight: float = 0.0, source_samples: Optional[ArrayLike] = None, target_samples: Optional[ArrayLike] = None, progress: Optional[_Progress] = None) -> FunctionalMap:
         """ZoomOut (Melzi et al. 2019): grows this map by turns of point map and projection.
 
         Parameters
@@ -653,6 +670,9 @@ class FunctionalMap:
         target_features : (n_target, d) array_like, optional
         feature_weight : float, default 0.0
             w: the search runs in ``[spectral, w √k · features]``.
+        source_samples : (r,) array_like, optional
+            Source vertices among which matches are sought while the map grows; all where none are
+            given.
         target_samples : (s,) array_like, optional
             Target vertices that are matched while the map grows; all where none are given.
         progress : progress, optional
@@ -712,6 +732,99 @@ class Grasp:
     @property
     def width(self) -> float:
         """float: distance between the closed pads, metres."""
+        ...
+
+class GraspPlan:
+    """A motion of an arm that carries out a grasp, or what kept each grasp from one: see `plan`."""
+    def at(self, times: ArrayLike) -> dict[str, Any]:
+        """The state at each of some times; before the motion begins and after it ends, that of its ends.
+
+        Parameters
+        ----------
+        times : (t,) array_like
+            Seconds.
+
+        Returns
+        -------
+        dict
+            ``positions``, ``velocities`` and ``accelerations`` (t, n), ``openings`` (t,), metres between the pads.
+        """
+        ...
+    @property
+    def duration(self) -> float:
+        """float: seconds that the motion takes; 0 without one."""
+        ...
+    @property
+    def gates(self) -> list[dict[str, Any]]:
+        """list of dict: grasps that did not become the motion, counted by the first gate that each did not pass: ``gate``,
+        ``n``, the first such ``grasp``, its ``obstruction`` with its numbers, and that in words (``text``).
+        """
+        ...
+    @property
+    def grasp(self) -> Optional[int]:
+        """int, optional: the grasp that is carried out, its place among the grasps from 0; None where none can be."""
+        ...
+    @property
+    def joint_names(self) -> list[str]:
+        """list of str: the arm's joints, base to tip: the columns of every array of joint values."""
+        ...
+    @property
+    def n_replayed(self) -> int:
+        """int: states of the finished motion, a millisecond apart, that were checked again."""
+        ...
+    @property
+    def notes(self) -> list[str]:
+        """list of str: what was found or assumed."""
+        ...
+    @property
+    def outcomes(self) -> list[dict[str, Any]]:
+        """list of dict: what became of each grasp, in their order: ``ending`` is ``"planned"``, ``"stopped"`` (at a
+        ``gate``, by an ``obstruction``) or ``"not_tried"``.
+        """
+        ...
+    def picture(self) -> bytes:
+        """A picture of the motion or, where there is none, of the nearest miss, which notebooks show by themselves.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
+    @property
+    def segments(self) -> list[Segment]:
+        """list of Segment: the motion: to the pre-grasp, approach, close, lift; empty without one."""
+        ...
+    @property
+    def start_contact(self) -> Optional[dict[str, Any]]:
+        """dict, optional: where the start itself touches something: the things ``a`` and ``b``, ``depth`` in metres and
+        ``nearest_free`` joint values.
+        """
+        ...
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `plan.json`.
+
+        Returns
+        -------
+        dict
+        """
+        ...
+    def write(self, folder: _Path, *, progress: Optional[_Progress] = None) -> list[str]:
+        """Writes what ``semfm-cli plan`` writes: `plan.json` and, of a motion, `trajectory.json`, a ROS 2 bag, a scene for
+        Foxglove, an animated model and a picture, else a picture of the nearest miss. An object that came from no file is
+        written beside them (`object.ply`).
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there.
+        progress : progress, optional
+
+        Returns
+        -------
+        list of str
+            The files.
+        """
         ...
 
 class Grasps:
@@ -1607,6 +1720,82 @@ class PointMap:
         """
         ...
 
+class PreciseMap:
+    """A map target → source that sends each target vertex to a point on a source triangle.
+
+    Ezuz & Ben-Chen, "Deblurring and Denoising of Maps between Shapes", 2017. Made by
+    `FunctionalMap.to_precise_map`.
+
+    Parameters
+    ----------
+    face_of : (n_target,) array_like
+        Source triangle of each target vertex.
+    corners : (n_target, 3) array_like
+        The source vertices of those triangles.
+    barycentric : (n_target, 3) array_like
+        Coordinates on those vertices: at least 0, sum 1.
+    n_source : int
+        Number of source vertices.
+
+    See Also
+    --------
+    PointMap : the map of vertices to vertices.
+    """
+    def __init__(self, face_of: ArrayLike, corners: ArrayLike, barycentric: ArrayLike, n_source: int) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __len__(self) -> int: ...
+    @property
+    def barycentric(self) -> NDArray[numpy.float64]:
+        """(n_target, 3) float64 array: barycentric coordinates on those vertices, a read-only view."""
+        ...
+    @property
+    def corners(self) -> NDArray[numpy.uint32]:
+        """(n_target, 3) uint32 array: the source vertices of those triangles, a read-only view."""
+        ...
+    @property
+    def face_of(self) -> NDArray[numpy.uint32]:
+        """(n_target,) uint32 array: the source triangle of each target vertex, a read-only view."""
+        ...
+    @property
+    def n_source(self) -> int:
+        """int: number of source vertices."""
+        ...
+    @property
+    def n_target(self) -> int:
+        """int: number of target vertices."""
+        ...
+    def pull_back(self, function: ArrayLike) -> NDArray[numpy.float64]:
+        """A function on the source that is linear on its triangles, as the target's vertices find it.
+
+        Parameters
+        ----------
+        function : (n_source,) array_like
+
+        Returns
+        -------
+        (n_target,) float64 array
+        """
+        ...
+    def to_csr(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.uint32], NDArray[numpy.uint32]]:
+        """The map as a matrix (n_target × n_source) by rows, for
+        ``scipy.sparse.csr_matrix((data, indices, indptr), shape)``.
+
+        Returns
+        -------
+        data : (n,) float64 array
+        indices : (n,) uint32 array
+        indptr : (n_target + 1,) uint32 array
+        """
+        ...
+    def to_point_map(self) -> PointMap:
+        """The map of vertices that takes the corner of largest weight.
+
+        Returns
+        -------
+        PointMap
+        """
+        ...
+
 class PreparedObject:
     """An object ready to be matched: its shape and its semantic cloud.
 
@@ -1909,7 +2098,7 @@ class Robot:
         """
         ...
     @staticmethod
-    def from_urdf(urdf: _Path, *, srdf: Optional[_Path] = None, limits: Optional[_Path] = None, base: Optional[str] = None, tip: Optional[str] = None, fixed: Optional[Mapping[str, Any]] = None) -> Robot:
+    def from_urdf(urdf: _Path, *, srdf: Optional[_Path] = None, limits: Optional[_Path] = None, base: Optional[str] = None, tip: Optional[str] = None, fixed: Optional[Mapping[str, Any]] = None, packages: Optional[Mapping[str, Any]] = None) -> Robot:
         """Reads an arm from its files.
 
         Parameters
@@ -1926,6 +2115,8 @@ class Robot:
             The link that the arm moves; by default the SRDF's, or the end of the one chain of joints.
         fixed : dict, optional
             Positions of joints outside the chain by name, such as fingers.
+        packages : dict, optional
+            Folders by the names of packages in ``package://NAME/…``; for `plan`, which needs every collision mesh.
 
         Returns
         -------
@@ -1993,15 +2184,15 @@ class Robot:
     def notes(self) -> list[str]:
         """list of str: what was found, assumed or passed over when the files were read."""
         ...
-    def solve_ik(self, pose: ArrayLike, *, near: Optional[ArrayLike] = None, solutions: int = 8, restarts: int = 50, seed: int = 0, preference: str = 'none') -> dict[str, Any]:
+    def solve_ik(self, pose: ArrayLike, *, near: Optional[Union[ArrayLike, str]] = None, solutions: int = 8, restarts: int = 50, seed: int = 0, preference: str = 'none') -> dict[str, Any]:
         """Joint values that bring the tip to a pose (inverse kinematics). Each solution was checked by forward kinematics.
 
         Parameters
         ----------
         pose : (4, 4) array_like
             Where the tip shall be, in the base's frame.
-        near : (n,) array_like, optional
-            Where the search begins; by default zero, or the limit next to it.
+        near : (n,) array_like or str, optional
+            Where the search begins, or a state of the SRDF; by default zero, or the limit next to it.
         solutions : int, default 8
             Distinct solutions to look for: more than .1 rad apart, whole turns aside.
         restarts : int, default 50
@@ -2040,6 +2231,165 @@ class Robot:
     @property
     def velocity_limits(self) -> NDArray[numpy.float64]:
         """(n,) float64 array: greatest speed of each joint, per second."""
+        ...
+
+class Scene:
+    """What stands around an arm, in the frame of the arm's base, metres: each thing with a name of its own. A scene does not
+    change; ``with_…`` gives a new one.
+
+    Examples
+    --------
+    >>> import semfm
+    >>> scene = semfm.Scene().with_table("table", point=[0, 0, 0]).with_box("shelf", size=[0.6, 0.3, 0.02])
+    >>> scene.names
+    ['table', 'shelf']
+    """
+    def __init__(self) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def names(self) -> list[str]:
+        """list of str: names of what stands there."""
+        ...
+    @staticmethod
+    def read(paths: Union[_Path, Iterable[_Path]]) -> Scene:
+        """Reads `scene.json`, meshes (metres) and point clouds; meshes and clouds are named after their files.
+
+        Parameters
+        ----------
+        paths : path or list of path
+            At most one of them is a `scene.json`.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_box(self, name: str, *, size: ArrayLike, pose: Optional[ArrayLike] = None) -> Scene:
+        """With a box around its own origin.
+
+        Parameters
+        ----------
+        name : str
+        size : (3,) array_like
+            Lengths along x, y and z.
+        pose : (4, 4) array_like, optional
+            Where its centre stands, and how it is turned.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_cloud(self, name: str, points: ArrayLike, *, margin: float = 0.005, pose: Optional[ArrayLike] = None) -> Scene:
+        """With observed points.
+
+        Parameters
+        ----------
+        name : str
+        points : (p, 3) array_like
+        margin : float, default 0.005
+            Distance that is kept from each point.
+        pose : (4, 4) array_like, optional
+            Of the frame in which the points are told, such as the camera's.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_cylinder(self, name: str, *, radius: float, length: float, pose: Optional[ArrayLike] = None) -> Scene:
+        """With a cylinder around its own origin, along its z.
+
+        Parameters
+        ----------
+        name : str
+        radius : float
+        length : float
+        pose : (4, 4) array_like, optional
+            Where its centre stands, and how it is turned.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_mesh(self, name: str, mesh: _MeshLike, *, scale: float = 1.0, pose: Optional[ArrayLike] = None) -> Scene:
+        """With a mesh; where it is watertight, its inside is solid.
+
+        Parameters
+        ----------
+        name : str
+        mesh : mesh_like
+        scale : float, default 1
+            Metres per unit of the mesh.
+        pose : (4, 4) array_like, optional
+            Where its origin stands, and how it is turned.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_sphere(self, name: str, *, radius: float, position: ArrayLike) -> Scene:
+        """With a ball.
+
+        Parameters
+        ----------
+        name : str
+        radius : float
+        position : (3,) array_like
+            Its centre.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+    def with_table(self, name: str, *, point: ArrayLike, normal: Optional[ArrayLike] = None) -> Scene:
+        """With a table: everything below a plane is solid.
+
+        Parameters
+        ----------
+        name : str
+        point : (3,) array_like
+            A point of the plane.
+        normal : (3,) array_like, optional
+            Away from the table, at any length; upwards by default.
+
+        Returns
+        -------
+        Scene
+        """
+        ...
+
+class Segment:
+    """A part of a motion with one purpose. Between two points each joint follows the cubic polynomial that their positions
+    and velocities determine.
+    """
+    def __len__(self) -> int: ...
+    @property
+    def accelerations(self) -> NDArray[numpy.float64]:
+        """(p, n) float64 array: per second squared."""
+        ...
+    @property
+    def kind(self) -> str:
+        """str: ``"to_pre_grasp"``, ``"approach"``, ``"close"`` or ``"lift"``."""
+        ...
+    @property
+    def openings(self) -> NDArray[numpy.float64]:
+        """(p,) float64 array: distance between the pads, metres."""
+        ...
+    @property
+    def positions(self) -> NDArray[numpy.float64]:
+        """(p, n) float64 array: joint values, radians or metres."""
+        ...
+    @property
+    def times(self) -> NDArray[numpy.float64]:
+        """(p,) float64 array: seconds since the motion began, rising."""
+        ...
+    @property
+    def velocities(self) -> NDArray[numpy.float64]:
+        """(p, n) float64 array: per second."""
         ...
 
 class SemanticCloud:
@@ -2896,6 +3246,55 @@ def mesh_formats(*, written: bool = False) -> list[str]:
     >>> import semfm
     >>> "gltf" in semfm.mesh_formats(), "gltf" in semfm.mesh_formats(written=True)
     (True, False)
+    """
+    ...
+
+def plan(robot: Robot, grasps: Union[Grasps, _Path], *, object: Optional[_MeshLike] = None, base_from_object: Optional[ArrayLike] = None, base_from_camera: Optional[ArrayLike] = None, tip_from_tcp: Optional[ArrayLike] = None, start: Optional[Union[ArrayLike, str]] = None, scene: Optional[Union[Scene, _Path]] = None, with_table: bool = True, approach_length: float = 0.1, lift_height: float = 0.1, speed: float = 1.0, line_speed: float = 0.5, iterations: Optional[int] = None, searches: Optional[int] = None, seed: int = 0, progress: Optional[_Progress] = None) -> GraspPlan:
+    """The motion of an arm that takes an object by the best of its grasps that can be carried out: reach, approach, close,
+    lift. What is answered was checked as it is timed, against the robot, the scene and the object.
+
+    That no grasp can be carried out is an answer: see `GraspPlan.gates`. The same as ``semfm-cli plan`` from the same
+    files.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm; its ``tip`` is the link that the gripper's flange sits on.
+    grasps : Grasps or path
+        From `find_grasps`, or `grasps.json`.
+    object : mesh_like, optional
+        The mesh that the grasps belong to; by default that of ``Grasps``. Without it nothing keeps the arm away from the
+        object. `trajectory.json` names the file of a path.
+    base_from_object : (4, 4) array_like, optional
+        Where the object, in metres, stands in the frame of the arm's base.
+    base_from_camera : (4, 4) array_like, optional
+        The same of the camera that the grasps were found with; one of the two must be given.
+    tip_from_tcp : (4, 4) array_like, optional
+        The TCP of the closed hand in the frame of ``Robot.tip``, where that is not the gripper's flange.
+    start : (n,) array_like or str, optional
+        Joint values, or a state of the SRDF; by default its state ``ready``, ``home`` or ``up``.
+    scene : Scene or path, optional
+        What stands around, in the frame of the arm's base.
+    with_table : bool, default True
+        Whether the table that the grasps were found with stands there, too.
+    approach_length : float, default 0.1
+        Length of the straight way to the grasp, metres.
+    lift_height : float, default 0.1
+        Height of the straight way up with the object, metres along z of the arm's base.
+    speed : float, default 1
+        Share of the joints' velocity limits that is used; accelerations follow with its square.
+    line_speed : float, default 0.5
+        The same on the straight ways.
+    iterations : int, optional
+        Most iterations of each search for a path.
+    searches : int, optional
+        Grasps for which a path is searched at most.
+    seed : int, default 0
+    progress : progress, optional
+
+    Returns
+    -------
+    GraspPlan
     """
     ...
 
