@@ -151,7 +151,7 @@ fn nonsense_pairs(dataset: &Dataset, count: usize, seed: u64) -> Result<Vec<Kind
         pairs.extend(others.map(|&target| KindPair { source, target, is_pair: false }));
     }
     if pairs.is_empty() || count == 0 {
-        let found = format!("{count} pairs of objects of {} kinds of pairs", pairs.len());
+        let found = format!("{count} asked for, of {} possible", pairs.len());
         return Err(Error::invalid("nonsense", "at least one pair, and two categories", found));
     }
     let mut pairs: Vec<KindPair> = pairs.into_iter().collect();
