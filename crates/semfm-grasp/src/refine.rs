@@ -13,15 +13,14 @@ use crate::search::{Found, Near, Search};
 use crate::select::suppress;
 use crate::settings::Separation;
 
-/// Grasps that climb. With 12 the best grasp of a hammer still depended on the seed, 64 gain nothing more.
-const CLIMBERS: usize = 32;
+/// Grasps that climb: 32 take 1.7 s where a whole search takes 10, and end where 10 do.
+const CLIMBERS: usize = 10;
 
-/// Lengths of the steps, as shares of the distance that makes two grasps two: from half a centimetre to half a
-/// millimetre.
-const STEPS: [f64; 5] = [1.0, 0.5, 0.25, 0.12, 0.06];
+/// Lengths of the steps, as shares of the distance that makes two grasps two: from a centimetre to a millimetre.
+const STEPS: [f64; 4] = [1.0, 0.5, 0.25, 0.12];
 
-/// Moves at each length at most: a handle of 15 cm is as long as these.
-const MOVES: usize = 12;
+/// Moves at each length at most.
+const MOVES: usize = 6;
 
 /// A move must raise the score by this: what rounding makes of one and the same grasp is less.
 const RISE: f64 = 1e-4;

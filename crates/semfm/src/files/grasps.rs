@@ -50,7 +50,7 @@ pub struct GraspsFile {
     pub grasps: Vec<GraspRecord>,
     /// Candidates refused, by the first thing that each failed.
     pub rejected: BTreeMap<String, usize>,
-    /// Of the refused candidates the one that came farthest.
+    /// Of the candidates refused for the main reason the one that missed by least.
     pub nearest_miss: Option<MissRecord>,
     /// Gripper poses examined.
     pub n_candidates: usize,
