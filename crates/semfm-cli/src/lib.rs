@@ -15,7 +15,7 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, grasp, ik, info, plan,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, frames, grasp, ik, info, plan,
     region, remember, show, transfer, views,
 };
 use options::Common;
@@ -39,7 +39,8 @@ enum Command {
     Demo(demo::DemoCommand),
     Views(views::ViewsCommand),
     Embed(embed::EmbedCommand),
-    Region(region::RegionCommand),
+    Region(Box<region::RegionCommand>),
+    Frames(Box<frames::FramesCommand>),
     Transfer(Box<transfer::TransferCommand>),
     Remember(remember::RememberCommand),
     Grasp(Box<grasp::GraspCommand>),
@@ -94,6 +95,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Command::Views(command) => command.run(&common),
         Command::Embed(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
+        Command::Frames(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),
         Command::Remember(command) => command.run(&common),
         Command::Grasp(command) => command.run(&common),

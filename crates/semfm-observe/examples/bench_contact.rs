@@ -54,14 +54,15 @@ fn main() -> Outcome<()> {
         let mesh = sized(&read_mesh(&path)?.mesh, size)?;
         for seed in 0..N_GRASPS {
             let Some(scene) = grasp(&mesh, seed)? else { continue };
-            for (row, iou) in measure(&mesh, &scene, seed)? {
+            let measured = measure(&mesh, &scene, seed)?;
+            eprintln!("{name} {seed}: {measured:.2?}");
+            for (row, iou) in measured {
                 match rows.iter_mut().find(|(name, _)| *name == row) {
                     Some((_, values)) => values.push(iou),
                     None => rows.push((row, vec![iou])),
                 }
             }
         }
-        eprintln!("{}", path.display());
     }
     for (row, mut values) in rows {
         values.sort_by(f64::total_cmp);

@@ -24,6 +24,8 @@ mod observation;
 mod observation_files;
 mod picture;
 mod registration;
+#[cfg(feature = "mcap")]
+mod source;
 
 #[cfg(feature = "mcap")]
 pub use bag::{BagReport, BagSettings, read_bag, write_bag};
@@ -32,7 +34,8 @@ pub use depth_image::read_depth_image;
 pub use distortion::Distortion;
 pub use error::{Error, Result};
 pub use hand::{
-    Contact, ContactSettings, Hand, HandPart, HandShift, PartContact, find_contact, merge_contacts,
+    Contact, ContactFrameRecord, ContactPartRecord, ContactReport, ContactSettings, Hand,
+    HandFiles, HandFrame, HandPart, HandShift, PartContact, find_contact, merge_contacts,
     read_hand, read_vertex_ids,
 };
 pub use intrinsics::{Calibration, read_calibration, read_intrinsics};
@@ -44,3 +47,5 @@ pub use numpy_array::{Numbers, NumpyArray};
 pub use observation::{Mask, Observation, SeenObject};
 pub use observation_files::{MaskFile, ObservationFiles};
 pub use registration::{DepthGrid, RegistrationCheck, check_registration};
+#[cfg(feature = "mcap")]
+pub use source::{SourceReport, SourceSettings, read_observations};

@@ -7,6 +7,7 @@ use semfm_geom::{
     CameraSearch, Mesh, Pinhole, PixelDepth, SurfaceIndex, Viewpoint, complete_patch,
     surface_vertices,
 };
+use semfm_observe::{Contact, ContactReport, ContactSettings, HandFrame, merge_contacts};
 
 use crate::{Error, Region, Result};
 
@@ -111,6 +112,37 @@ pub fn region_under_mask(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result
         return Err(Error::invalid("mask", "at least one visible vertex", found));
     }
     Ok(Region::from_mask(&inside))
+}
+
+/// A region that a hand touched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchedRegion {
+    /// The region, with smooth weights.
+    pub region: Region,
+    /// Which fingers touched what in each frame, and how sure that is.
+    pub report: ContactReport,
+}
+
+/// What a hand touches of a mesh, in one frame of a demonstration or in several of one grasp
+/// ([`find_contact`](semfm_observe::find_contact)); the weights of several frames are averaged.
+///
+/// # Errors
+/// [`Error::Invalid`] for no frame, for a hand that touches nothing and for frames that disagree on all of it.
+pub fn region_of_hands(
+    mesh: &Mesh,
+    frames: &[HandFrame],
+    settings: &ContactSettings,
+) -> Result<TouchedRegion> {
+    let contacts: Vec<Contact> = frames
+        .iter()
+        .map(|frame| frame.contact(mesh, settings))
+        .collect::<semfm_observe::Result<_>>()?;
+    let region = Region::from_weights(merge_contacts(&contacts)?)?;
+    if region.is_empty() {
+        let expected = "a vertex that is touched in half of the frames";
+        return Err(Error::invalid("hands", expected, "none: are these frames of one grasp?"));
+    }
+    Ok(TouchedRegion { region, report: ContactReport::new(frames, &contacts) })
 }
 
 /// The regions of several views, or frames, of one mesh as one: each vertex has the largest of its weights.

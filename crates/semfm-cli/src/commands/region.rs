@@ -17,18 +17,21 @@ use semfm::views::mcap::{SingleView, read_view};
 use semfm::{Mesh, Region};
 
 use super::Outcome;
+use super::hand_options::HandOptions;
 use crate::console;
 use crate::options::{Common, numbers};
 use crate::output::OutputFile;
 
-/// Mark a region on a mesh: by a contact and a radius, a mask in a view, paint, or vertex ids
+/// Mark a region on a mesh: by a contact and a radius, a mask in a view, a hand that touches it, paint, or vertex ids
 ///
 /// A mask shows one side of a part: --grow adds the side that the camera did not see.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("how").required(true).args(["near", "mask", "ply_color", "vertices", "region"]))]
+#[command(group = ArgGroup::new("how").required(true).multiple(true).args(["near", "mask", "ply_color", "vertices", "region", "hand", "hand_mask"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli region mug.obj -o grip.json --near 0.05,0,0.04 --radius 0.03\n  \
     semfm-cli region mug.obj -o grip.json --mask grip.png --view mug.views.mcap#003 --grow\n  \
+    semfm-cli region mug.obj -o grip.json --hand hand.obj --aligned aligned.json --hand-depth depth.png \
+    --hand-mask hand.png --hand-intrinsics K.json\n  \
     semfm-cli region painted.ply -o grip.json --ply-color")]
 pub struct RegionCommand {
     /// The mesh
@@ -41,6 +44,7 @@ pub struct RegionCommand {
         long,
         value_name = "X,Y,Z",
         requires = "radius",
+        conflicts_with_all = ["mask", "ply_color", "vertices", "region", "hand", "hand_mask"],
         allow_hyphen_values = true,
         help_heading = "How"
     )]
@@ -56,24 +60,26 @@ pub struct RegionCommand {
     radius: Option<f64>,
     /// A mask of the size of a view (a picture that is bright, or opaque, where the region is; .npy; COCO's run lengths;
     /// or one label of a picture of labels); needs --view. Several masks, each with its view, are merged
-    #[arg(long, value_name = "MASK[#LABEL]", requires = "view", help_heading = "How")]
+    #[arg(long, value_name = "MASK[#LABEL]", requires = "view", conflicts_with_all = ["ply_color", "vertices", "region", "hand", "hand_mask"], help_heading = "How")]
     mask: Vec<String>,
     /// The view of the mask: a views file and a number
     #[arg(long, value_name = "V.views.mcap#NNN", requires = "mask", help_heading = "How")]
     view: Vec<String>,
     /// The vertices painted red, or in the colour given
-    #[arg(long, value_name = "R,G,B", num_args = 0..=1, default_missing_value = "red", help_heading = "How")]
+    #[arg(long, value_name = "R,G,B", num_args = 0..=1, default_missing_value = "red", conflicts_with_all = ["vertices", "region", "hand", "hand_mask"], help_heading = "How")]
     ply_color: Option<String>,
     /// Vertex ids, 0-based
-    #[arg(long, value_name = "ID,ID,…", value_delimiter = ',', help_heading = "How")]
+    #[arg(long, value_name = "ID,ID,…", value_delimiter = ',', conflicts_with_all = ["region", "hand", "hand_mask"], help_heading = "How")]
     vertices: Option<Vec<u32>>,
     /// A region that is there already (JSON), to be completed with --grow
-    #[arg(long, value_name = "FILE", requires = "grow", help_heading = "How")]
+    #[arg(long, value_name = "FILE", requires = "grow", conflicts_with_all = ["hand", "hand_mask"], help_heading = "How")]
     region: Option<PathBuf>,
     /// Complete what one camera saw to the part that it belongs to; a region that is known all around
     /// stays as it is
     #[arg(long, help_heading = "How")]
     grow: bool,
+    #[command(flatten)]
+    hand: HandOptions,
 }
 
 impl RegionCommand {
@@ -85,6 +91,8 @@ impl RegionCommand {
         let mut inputs = vec![self.mesh.as_path()];
         inputs.extend(masks.iter().map(|mask| mask.path.as_path()));
         inputs.extend(views.iter().map(PathBuf::as_path).chain(self.region.as_deref()));
+        let hand_files = self.hand.files()?;
+        inputs.extend(hand_files.iter().map(PathBuf::as_path));
         let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         output.check_again()?;
@@ -106,6 +114,15 @@ impl RegionCommand {
                 camera = Some(seen.camera);
             }
             merge_regions(seen.into_iter().map(|seen| seen.region))?
+        } else if self.hand.is_given() {
+            let touched = self.hand.region(&file.mesh)?;
+            if !common.quiet {
+                touched.report.lines().iter().for_each(console::message);
+            }
+            if common.json {
+                console::data(serde_json::to_string(&touched.report)?);
+            }
+            touched.region
         } else if let Some(path) = &self.region {
             read_region(path, &file.mesh)?
         } else if let Some(paint) = &self.ply_color {

@@ -3,15 +3,19 @@
 mod contact;
 mod depth_of_hand;
 mod files;
+mod hand_frame;
 mod offset;
 mod part;
+mod report;
 mod signed_distance;
 mod winding;
 
 pub use contact::{Contact, ContactSettings, PartContact, find_contact, merge_contacts};
 pub use depth_of_hand::HandShift;
 pub use files::{read_hand, read_vertex_ids};
+pub use hand_frame::{HandFiles, HandFrame};
 pub use part::HandPart;
+pub use report::{ContactFrameRecord, ContactPartRecord, ContactReport};
 
 use semfm_geom::math::{DAffine3, DVec3, bounds};
 

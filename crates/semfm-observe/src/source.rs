@@ -1,0 +1,83 @@
+//! Observations out of whatever holds several: a BOP scene or a bag.
+
+use std::path::Path;
+
+use crate::bag::{BagSettings, read_bag};
+use crate::bop::BopScene;
+use crate::observation::Observation;
+use crate::{Error, Result};
+
+/// Which observations of a source are read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceSettings {
+    /// How a bag is read.
+    pub bag: BagSettings,
+    /// The first, and each that is so many further on.
+    pub every: usize,
+    /// At most so many.
+    pub most: Option<usize>,
+}
+
+impl Default for SourceSettings {
+    fn default() -> Self {
+        Self { bag: BagSettings::default(), every: 1, most: None }
+    }
+}
+
+/// What was read of a source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceReport {
+    /// Observations handed out.
+    pub n_observations: usize,
+    /// What was chosen or left out, in words.
+    pub notes: Vec<String>,
+}
+
+/// Hands each observation of a BOP scene (a folder with `scene_camera.json`) or of a bag (`.mcap`, or a folder of them) to
+/// `visit`, in order.
+///
+/// # Errors
+/// As [`BopScene`] and [`read_bag`]; [`Error::Invalid`] for an `every` of 0; the errors of `visit`.
+pub fn read_observations(
+    path: &Path,
+    settings: &SourceSettings,
+    mut visit: impl FnMut(Observation) -> Result<()>,
+) -> Result<SourceReport> {
+    if settings.every == 0 {
+        return Err(Error::invalid("every", "at least 1", 0));
+    }
+    let most = settings.most.unwrap_or(usize::MAX);
+    let mut n_observations = 0;
+    if BopScene::is_scene(path) {
+        let scene = BopScene::open(path)?;
+        for image in scene.images().step_by(settings.every).take(most) {
+            visit(scene.observation(image)?)?;
+            n_observations += 1;
+        }
+        return Ok(SourceReport { n_observations, notes: Vec::new() });
+    }
+    let mut seen = 0;
+    let report = read_bag(path, &settings.bag, |observation| {
+        let is_wanted = seen % settings.every == 0 && n_observations < most;
+        seen += 1;
+        if is_wanted {
+            n_observations += 1;
+            visit(observation)?;
+        }
+        Ok(())
+    })?;
+    let topic =
+        |kind: &str, name: &Option<String>| name.as_ref().map(|name| format!("{kind} from {name}"));
+    let mut notes: Vec<String> = [topic("colour", &report.color), topic("depth", &report.depth)]
+        .into_iter()
+        .flatten()
+        .collect();
+    notes.push(format!("camera from {}", report.camera_info));
+    if report.n_unpaired > 0 {
+        notes.push(format!(
+            "{} messages without a counterpart in time were left out",
+            report.n_unpaired
+        ));
+    }
+    Ok(SourceReport { n_observations, notes })
+}
