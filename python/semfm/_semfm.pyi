@@ -1167,6 +1167,172 @@ class Matching:
         """PointMap: target → source, between the working meshes."""
         ...
 
+class Memory:
+    """Demonstrations in a folder: objects with a region each, of one kind or of many.
+
+    Parameters
+    ----------
+    folder : path
+        A memory, or an empty or missing folder in which one begins with the first `remember`.
+    cache : cache, optional
+        Where prepared shapes and embeddings are kept: a folder, or True for the user's own.
+
+    Examples
+    --------
+    >>> import semfm, tempfile
+    >>> mug, pot, kettle = (semfm.demo_object("containers", instance=i, n_vertices=500) for i in range(3))
+    >>> memory = semfm.Memory(tempfile.mkdtemp())
+    >>> memory.remember("mug", mug.mesh, mug.region, kind="container")
+    >>> memory.remember("pot", pot.mesh, pot.region, kind="container")
+    >>> memory.names
+    ['mug', 'pot']
+    >>> answer = memory.transfer(kettle.mesh)
+    >>> answer.verdict in ("accept", "check", "refuse")
+    True
+    """
+    def __init__(self, folder: _Path, *, cache: Optional[_Cache] = None) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def encoder(self) -> Optional[dict[str, Any]]:
+        """dict, optional: the encoder behind all features; None while the memory is empty."""
+        ...
+    @property
+    def entries(self) -> list[dict[str, Any]]:
+        """list of dict: the demonstrations as `memory.json` has them: name, kind, mesh, provenance."""
+        ...
+    @property
+    def folder(self) -> str:
+        """str: the folder."""
+        ...
+    def forget(self, name: str) -> None:
+        """Takes a demonstration away.
+
+        Parameters
+        ----------
+        name : str
+        """
+        ...
+    @property
+    def names(self) -> list[str]:
+        """list of str: names of the demonstrations, in alphabetical order."""
+        ...
+    def remember(self, name: str, mesh: Union[_MeshLike, MeshFile], region: Union[Region, _Path], *, kind: Optional[str] = None, embeddings: Optional[Union[Embeddings, _Path]] = None, encoder: Optional[str] = None, replace: bool = False, progress: Optional[_Progress] = None) -> None:
+        """Adds a demonstration. Its files are complete before the memory names it.
+
+        Parameters
+        ----------
+        name : str
+            Its name in the memory.
+        mesh : mesh_like or MeshFile
+            The demonstrated object.
+        region : Region or path
+            Where one acts on it.
+        kind : str, optional
+            What kind of object it is, in your words.
+        embeddings : Embeddings or path, optional
+            Patch embeddings of its views, instead of an encoder.
+        encoder : str, optional
+            Shown rendered views in grey; that of the memory, or ``builtin``, where none is given.
+        replace : bool, default False
+            Replace the entry of that name, or with the same mesh and region.
+        progress : progress, optional
+        """
+        ...
+    def transfer(self, target: Union[_MeshLike, MeshFile, PreparedObject], *, kind: Optional[str] = None, shortlist: int = 5, embeddings: Optional[Union[Embeddings, _Path]] = None, encoder: Optional[str] = None, progress: Optional[_Progress] = None) -> MemoryTransfer:
+        """Carries what was demonstrated to an object: the most similar demonstrations are matched and their
+        answers fused.
+
+        Parameters
+        ----------
+        target : mesh_like or MeshFile or PreparedObject
+            The object to act on.
+        kind : str, optional
+            Only demonstrations of this kind.
+        shortlist : int, default 5
+            Demonstrations that are matched.
+        embeddings : Embeddings or path, optional
+            Patch embeddings of the target's views, instead of an encoder.
+        encoder : str, optional
+            Must be that of the memory, which is opened where none is given.
+        progress : progress, optional
+
+        Returns
+        -------
+        MemoryTransfer
+        """
+        ...
+
+class MemoryTransfer:
+    """What a memory says of an object: the answers of several demonstrations, fused. Made by `Memory.transfer`."""
+    @property
+    def agreement(self) -> float:
+        """float: mean IoU of the answers with the fused region, by their shares of the vote."""
+        ...
+    @property
+    def confidence(self) -> float:
+        """float: the probability that the IoU with the true region is at least one half, in [0, 1]."""
+        ...
+    @property
+    def hypotheses(self) -> list[Hypothesis]:
+        """list of Hypothesis: where the region may belong, by falling probability."""
+        ...
+    def picture(self) -> bytes:
+        """A picture of who said what, which notebooks show by themselves: `memory.png` of `write`.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the region on the target."""
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: the whole report, as ``report.json`` has it."""
+        ...
+    @property
+    def target(self) -> PreparedObject:
+        """PreparedObject: the object to act on."""
+        ...
+    @property
+    def verdict(self) -> str:
+        """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
+        ...
+    @property
+    def voices(self) -> list[dict[str, Any]]:
+        """list of dict: what each demonstration said, the most trusted first: name, kind, similarity,
+        confidence, verdict, evidence, share of the vote, agreement with the others.
+        """
+        ...
+    @property
+    def weights(self) -> NDArray[numpy.float64]:
+        """(n_target,) float64 array: weight of each target vertex, a read-only view."""
+        ...
+    @property
+    def why(self) -> Optional[str]:
+        """str, optional: why the answer is not accepted, where that is known."""
+        ...
+    def write(self, folder: _Path, *, pictures: bool = True, progress: Optional[_Progress] = None) -> list[str]:
+        """Writes every file that `semfm-cli transfer --memory` writes: region, report, painted target, picture.
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there.
+        pictures : bool, default True
+            Also draw ``memory.png``.
+        progress : progress, optional
+
+        Returns
+        -------
+        list of str
+            The files.
+        """
+        ...
+
 class Mesh:
     """A triangle mesh in its own frame and units.
 
@@ -2702,6 +2868,10 @@ class Transfer:
     @property
     def weights(self) -> NDArray[numpy.float64]:
         """(n_target,) float64 array: weight of each target vertex, a read-only view."""
+        ...
+    @property
+    def why(self) -> Optional[str]:
+        """str, optional: why the answer is not accepted, where more is known than that it is doubtful."""
         ...
     def write(self, folder: _Path, *, about: Optional[Mapping[str, Any]] = None, pictures: bool = True, progress: Optional[_Progress] = None) -> list[str]:
         """Writes every file that `semfm-cli transfer` writes: region, report, point map, painted
