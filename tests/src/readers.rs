@@ -86,6 +86,7 @@ pub fn seed_mesh() -> &'static Mesh {
 fn mesh(path: &Path) -> bool {
     let points = read_points(path).is_ok();
     let _ = read_mesh_or_points(path);
+    let _ = observe::read_hand(path);
     let Ok(file) = read_mesh(path) else { return points };
     let _ = MeshReport::new(&file.mesh);
     true
@@ -94,6 +95,7 @@ fn mesh(path: &Path) -> bool {
 fn views(path: &Path) -> bool {
     let _ = inspect(path);
     let _ = read_view(path, 0);
+    let _ = observe::read_observations(path, &Default::default(), |_| Ok(()));
     ViewsFile::read(path).is_ok()
 }
 
@@ -124,6 +126,7 @@ fn json(path: &Path) -> bool {
         read |= observe::read_mask(path, size).is_ok();
         read |= observe::read_calibration(path, 4, 3).is_ok();
         read |= observe::read_bop_models(path).is_ok();
+        read |= observe::read_vertex_ids(path).is_ok();
     }
     read |= Results::read(path).is_ok();
     read | MapResults::read(path).is_ok()
@@ -181,7 +184,8 @@ fn npy(path: &Path) -> bool {
 }
 
 fn npz(path: &Path) -> bool {
-    AnnotatedMesh::read(path).is_ok()
+    let hand = observe::read_hand(path).is_ok();
+    AnnotatedMesh::read(path).is_ok() | hand
 }
 
 fn picture(path: &Path) -> bool {

@@ -11,8 +11,8 @@ use crate::picture::picture_of;
 const HEADER_BYTES: usize = 12;
 /// Depth of 16 bits counts millimetres.
 const PER_METRE: f64 = 1000.0;
-/// No camera has more pixels on a side.
-const MAX_SIDE: u32 = 16_384;
+/// No camera has more pixels than this: a run of zeros unpacks to any number of them.
+const MAX_PIXELS: u64 = 1 << 25;
 
 /// A depth image in metres.
 #[derive(Debug, PartialEq)]
@@ -88,11 +88,10 @@ fn rvl_values(packed: &[u8]) -> Result<Values, Fault> {
     };
     let side = |at: usize| u32::from_le_bytes(sides[at..at + 4].try_into().expect("4 bytes"));
     let (width, height) = (side(0), side(4));
-    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+    if !(1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
         return Err(fault(format!("{width} × {height} pixels")));
     }
     let n = width as usize * height as usize;
-    // A zero run costs a nibble or two: what a short text could unpack to is bounded by the largest picture.
     let values = rvl::decode(words, n)
         .ok_or_else(|| fault("words that give another number of pixels".into()))?;
     Ok((width as usize, height as usize, values))

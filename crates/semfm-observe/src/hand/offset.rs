@@ -4,9 +4,9 @@ use semfm_geom::math::DVec3;
 
 use super::signed_distance::HandDistance;
 
-/// What touching counts against where the hand was said to be: the contact found at best is worth this much of a
-/// logarithm. At 3 the hand stays where it was said to be and passes through the object; at 30 it slides along to where
-/// it covers most (`bench/README.md`).
+/// What touching counts against where the hand was said to be: the most contact that is found is worth this much of a
+/// logarithm, a shift by one standard deviation costs one half. On the one grasp measured so far (`bench/README.md`) 10
+/// moves a hand that was right by enough to cost a third of the overlap: smaller values are to be tried first.
 const WORTH_OF_CONTACT: f64 = 10.0;
 /// An area that is inside the hand by one reach more than soft tissue allows counts this many times against.
 const WORTH_OF_PENETRATION: f64 = 3.0;
