@@ -3,24 +3,17 @@
 //! `plan_problems FOLDER OUT [--every N] [--seed S]` reads what `bench/planning_problems.py unpack` wrote and writes one line
 //! of JSON a problem to OUT, for `bench/planning.py`. What was counted goes to stderr.
 
+mod problem_pipeline;
 mod problems;
 
 use std::error::Error;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
+use std::path::PathBuf;
 
+use problem_pipeline::{Milliseconds, Outcome, Pipeline, Solution};
 use problems::{Problem, ProblemRobot, Problems};
-use semfm::motion::{
-    BlendSettings, CheckSettings, CollisionChecker, CollisionModel, CollisionSettings, Curve,
-    JointMotionLimit, JointRange, JointSpace, MotionLimits, PlanSettings, Planned, RetimeSettings,
-    Retimed, ShortenSettings, blend, check_trajectory, path_length, plan_path, retime, shorten,
-};
-use serde_json::{Value, json};
-
-/// Distance that plans keep from obstacles, metres; where the start or the goal is nearer, they keep the checker's own.
-const MARGIN: f64 = 2e-3;
+use semfm::motion::{Curve, Retimed, path_length};
+use serde_json::{Map, Value, json};
 
 struct Arguments {
     folder: PathBuf,
@@ -46,101 +39,35 @@ fn arguments() -> Result<Arguments, Box<dyn Error>> {
     Ok(Arguments { folder, out, every, seed })
 }
 
-/// What all problems of a robot share.
-struct Planner {
-    space: JointSpace,
-    limits: MotionLimits,
-    /// By its own contact distance, and by [`MARGIN`].
-    models: [Arc<CollisionModel>; 2],
-    seed: u64,
-}
-
-impl Planner {
-    fn new(robot: &ProblemRobot, seed: u64) -> Result<Self, Box<dyn Error>> {
-        let arm = &robot.arm;
-        let range = |joint: &semfm::robot::ArmJoint| JointRange {
-            name: joint.name.clone(),
-            lower: joint.lower,
-            upper: joint.upper,
-        };
-        let limit = |joint: &semfm::robot::ArmJoint| JointMotionLimit {
-            name: joint.name.clone(),
-            velocity: joint.velocity,
-            acceleration: joint.acceleration,
-            jerk: joint.jerk,
-        };
-        let model = |contact: f64| robot.model(contact).map(Arc::new);
-        Ok(Self {
-            space: JointSpace::new(arm.joints().iter().map(range).collect())?,
-            limits: MotionLimits::new(arm.joints().iter().map(limit).collect())?,
-            models: [model(CollisionSettings::default().contact)?, model(MARGIN)?],
-            seed,
-        })
-    }
-
-    fn solve(&self, problem: &Problem, path: &Path) -> Result<Value, Box<dyn Error>> {
-        let scene = problem.scene.contents(path)?.scene;
-        let exact = CollisionChecker::new(self.models[0].clone(), scene)?;
-        let [start, goal] = [&problem.start, &problem.goal];
-        let within = [start, goal].iter().all(|q| self.space.check("state", q).is_ok());
-        if !within {
-            return Ok(json!({ "problem": problem.name, "outcome": "out of limits" }));
+fn outcome_json(problem: &Problem, outcome: &Outcome) -> Value {
+    let name = &problem.name;
+    match outcome {
+        Outcome::OutOfLimits => json!({ "problem": name, "outcome": "out of limits" }),
+        Outcome::NotFree => json!({ "problem": name, "outcome": "not free" }),
+        Outcome::NotFound { planned, ms } => {
+            json!({ "problem": name, "outcome": format!("{planned:?}"), "ms": stages_json(ms) })
         }
-        if !exact.is_free(start) || !exact.is_free(goal) {
-            return Ok(json!({ "problem": problem.name, "outcome": "not free" }));
+        Outcome::Solved(solution) => {
+            let Solution { near, found, short, curve, timed, violation, ms } = &**solution;
+            json!({
+                "problem": name,
+                "outcome": "path",
+                "near": near,
+                "ms": stages_json(ms),
+                "iterations": found.iterations,
+                "n_nodes": found.n_nodes,
+                "found_length": found.length(),
+                "length": path_length(short),
+                "curve": curve_json(curve),
+                "trajectory": trajectory_json(timed),
+                "violation": violation.as_ref().map(ToString::to_string),
+            })
         }
-        let wide = exact.with_model(self.models[1].clone())?;
-        let near = !wide.is_free(start) || !wide.is_free(goal);
-        let checker = if near { &exact } else { &wide };
-
-        let mut clock = Clock::default();
-        let settings = PlanSettings { seed: self.seed, ..Default::default() };
-        let planned = clock.time("plan", || {
-            plan_path(&self.space, checker, start, std::slice::from_ref(goal), &settings)
-        })?;
-        let Planned::Path(found) = planned else {
-            return Ok(
-                json!({ "problem": problem.name, "outcome": format!("{planned:?}"), "ms": clock.parts }),
-            );
-        };
-        let settings = ShortenSettings { seed: self.seed, ..Default::default() };
-        let short = clock.time("shorten", || shorten(checker, &found.waypoints, &settings));
-        let curve = clock.time("blend", || blend(checker, &short, &BlendSettings::default()))?;
-        let timed = clock
-            .time("retime", || retime(&curve, &self.limits, 0.0, &RetimeSettings::default()))?;
-        let settings = CheckSettings::default();
-        let violation = clock.time("check", || {
-            check_trajectory(&self.space, &exact, &self.limits, &timed.points, &settings)
-        })?;
-        Ok(json!({
-            "problem": problem.name,
-            "outcome": "path",
-            "near": near,
-            "ms": clock.parts,
-            "iterations": found.iterations,
-            "n_nodes": found.n_nodes,
-            "found_length": found.length(),
-            "length": path_length(&short),
-            "curve": curve_json(&curve),
-            "trajectory": trajectory_json(&timed),
-            "violation": violation.map(|violation| violation.to_string()),
-        }))
     }
 }
 
-/// Milliseconds of each stage.
-#[derive(Default)]
-struct Clock {
-    parts: serde_json::Map<String, Value>,
-}
-
-impl Clock {
-    fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
-        let begun = Instant::now();
-        let answer = work();
-        self.parts.insert(stage.into(), json!(1e3 * begun.elapsed().as_secs_f64()));
-        answer
-    }
+fn stages_json(ms: &Milliseconds) -> Map<String, Value> {
+    ms.iter().map(|&(stage, ms)| (stage.to_owned(), json!(ms))).collect()
 }
 
 fn curve_json(curve: &Curve) -> Value {
@@ -165,22 +92,18 @@ fn trajectory_json(timed: &Retimed) -> Value {
 
 #[allow(clippy::print_stderr)] // The answers are what this program is for.
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments = arguments()?;
-    let path = Problems::path(&arguments.folder);
-    let content = Problems::read(&arguments.folder)?;
-    let robot = ProblemRobot::read(&arguments.folder, &content)?;
-    let planner = Planner::new(&robot, arguments.seed)?;
-    let mut out = BufWriter::new(std::fs::File::create(&arguments.out)?);
+    let Arguments { folder, out, every, seed } = arguments()?;
+    let path = Problems::path(&folder);
+    let content = Problems::read(&folder)?;
+    let robot = ProblemRobot::read(&folder, &content)?;
+    let pipeline = Pipeline::new(&robot)?;
+    let mut out = BufWriter::new(std::fs::File::create(&out)?);
     let limits: Vec<[f64; 2]> =
-        planner.limits.joints().iter().map(|joint| [joint.velocity, joint.acceleration]).collect();
-    writeln!(
-        out,
-        "{}",
-        json!({ "limits": limits, "seed": arguments.seed, "every": arguments.every })
-    )?;
+        pipeline.limits.joints().iter().map(|joint| [joint.velocity, joint.acceleration]).collect();
+    writeln!(out, "{}", json!({ "limits": limits, "seed": seed, "every": every }))?;
     let mut counts = std::collections::BTreeMap::<String, usize>::new();
-    for problem in content.problems.iter().step_by(arguments.every) {
-        let answer = planner.solve(problem, &path)?;
+    for problem in content.problems.iter().step_by(every) {
+        let answer = outcome_json(problem, &pipeline.solve(problem, &path, seed)?);
         let outcome = answer["outcome"].as_str().unwrap_or_default();
         let violated = if answer["violation"].is_string() { ", violated" } else { "" };
         *counts.entry(format!("{outcome}{violated}")).or_default() += 1;
