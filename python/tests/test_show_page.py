@@ -345,6 +345,47 @@ def test_hands_step_through_every_grasp(browser, demo):  # noqa: F811
     assert told["opened"] and told["together"] and told["translucent"]
 
 
+def test_a_grasp_is_shown_over_time_and_as_stills_where_less_motion_is_wanted(browser, demo):  # noqa: F811
+    body = """
+    const [, [panel]] = await window.semfmReady;
+    const section = panel.figure.closest("section"), aside = section.querySelector(".grasps");
+    section.scrollIntoView(); await frame(); await frame();
+    const checksum = () => pixels(panel).reduce((sum, x, i) => (sum * 31 + x * (i % 7 + 1)) % 1000003, 0);
+    const hands = panel.hands, grasp = hands.data.grasps[0], before = checksum();
+    const told = { names: [...aside.querySelectorAll(".grasping button")].map(e => e.textContent), pictures: [] };
+    told.less = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    for (const made of [...aside.querySelectorAll(".grasping button")].slice(-3)) {
+      made.click(); await frame(); await frame();
+      const place = hands.grasping.place(grasp), at = hands.grasping.poses(grasp);
+      told.pictures.push({
+        sum: checksum(), lift: Math.hypot(...hands.lift()), contacts: hands.grasping.isTouching,
+        behind: Math.hypot(...[3, 7, 11].map(k => place[k] - grasp.place[k])),
+        closed: Math.max(...at.flatMap((m, i) => m.map((x, k) => Math.abs(x - grasp.closed[i][k])))),
+        pressed: made.getAttribute("aria-pressed"),
+      });
+    }
+    // The object is lifted with the hand: what is under the pointer stays the object.
+    const [vertex] = panel.faces, [x, y] = panel.placeOf(vertex);
+    hands.grasping.moment = 0;
+    told.moved = Math.hypot(panel.placeOf(vertex)[0] - x, panel.placeOf(vertex)[1] - y);
+    aside.querySelectorAll(".steps button")[1].click(); await frame();
+    aside.querySelectorAll(".steps button")[0].click(); await frame(); await frame();
+    told.left = hands.grasping === null && checksum() === before;
+    told.gl = panel.painter.gl.getError();
+    return told;
+    """
+    for options, less in ((), False), (("--force-prefers-reduced-motion",), True):
+        told, console = probe(browser, demo / "page.html", HELPERS + body, *options)
+        assert calm(console) == [] and told["gl"] == 0
+        assert told["names"] == ([] if less else ["play"]) + ["comes", "closes", "lifts"] and told["less"] is less
+        come, closed, lifted = told["pictures"]
+        assert come["behind"] < 1e-9 and come["closed"] > 1e-3 and not come["contacts"]
+        assert closed["closed"] < 1e-9 and closed["contacts"] and closed["lift"] == 0
+        assert lifted["lift"] > 0 and lifted["pressed"] == "true" and told["moved"] > 5
+        assert len({picture["sum"] for picture in told["pictures"]}) == 3
+        assert told["left"], "another grasp is shown as it stands"
+
+
 def test_the_page_can_be_dark_and_prints_what_was_never_scrolled_to(browser, demo):  # noqa: F811
     body = """
     const ground = () => getComputedStyle(document.body).backgroundColor;
