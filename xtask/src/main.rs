@@ -9,6 +9,7 @@ mod docs;
 mod duplicates;
 mod features;
 mod package;
+mod peers;
 mod pictures;
 mod process;
 mod python;
@@ -38,6 +39,7 @@ cargo xtask stubs           writes the type stubs of the Python package anew
 cargo xtask wheel           builds the wheel (release) and checks its size and how fast it imports
 cargo xtask pictures        makes the README's pictures anew, in a browser where there is one
 cargo xtask bench           builds the benchmark programs (release) and names them
+cargo xtask bench peers     runs those beside other libraries, in an environment made for them (hours)
 cargo xtask ci              fmt, deny, lint, doc, features, package, then test --full";
 
 fn main() -> ExitCode {
@@ -64,6 +66,7 @@ fn run(words: &[&str]) -> Result<bool> {
         ["test"] => Ok(end_with(&test::run(&workspace, false))),
         ["test", "--full"] => Ok(end_with(&test::run(&workspace, true))),
         ["ci"] => Ok(ci(&workspace)),
+        ["bench", "peers"] => peers::run(&workspace).map(|()| true),
         [job] => match JOBS.iter().find(|(name, _)| name == job) {
             Some((_, work)) => work(&workspace).map(|()| true),
             None => bail!("no job `{job}`\n{USAGE}"),

@@ -72,12 +72,16 @@ impl<const WIDTH: usize> Packed<WIDTH> {
         if k > 0 {
             let parts = numbers.par_chunks_mut(GROUPS * WIDTH * k);
             parts.zip(ids.par_chunks(GROUPS * WIDTH)).for_each(|(numbers, ids)| {
+                let row_ids = rows.row_ids(ids);
                 for c in 0..k {
-                    let groups = numbers.chunks_exact_mut(WIDTH * k).zip(ids.chunks_exact(WIDTH));
-                    for (group, ids) in groups {
+                    let (column, factor) = rows.column(c);
+                    // (factor · x − mean) · scale
+                    let (factor, shift) = (factor * frame.scale, frame.mean[c] * frame.scale);
+                    let groups = row_ids.as_chunks::<WIDTH>().0.iter();
+                    for (group, ids) in numbers.chunks_exact_mut(WIDTH * k).zip(groups) {
                         let out = &mut group[c * WIDTH..][..WIDTH];
-                        for (x, entry) in out.iter_mut().zip(rows.entries(c, ids)) {
-                            *x = ((entry - frame.mean[c]) * frame.scale) as f32;
+                        for (x, &id) in out.iter_mut().zip(ids) {
+                            *x = (factor * column[id as usize] - shift) as f32;
                         }
                     }
                 }

@@ -79,6 +79,17 @@ impl<'a> Rows<'a> {
         self.columns.iter().map(move |(column, scale)| scale * column[row])
     }
 
+    /// A column of the matrix behind the rows, and what its numbers are multiplied by.
+    pub fn column(&self, c: usize) -> (&[f64], f64) {
+        let (column, scale) = &self.columns[c];
+        (column, *scale)
+    }
+
+    /// Where some rows stand in the matrix.
+    pub fn row_ids(&self, rows: &[u32]) -> Vec<u32> {
+        rows.iter().map(|&row| self.row_id(row as usize) as u32).collect()
+    }
+
     /// Number `c` of some rows.
     pub fn entries(&self, c: usize, rows: &[u32]) -> impl Iterator<Item = f64> {
         let (column, scale) = &self.columns[c];

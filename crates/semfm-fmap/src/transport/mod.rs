@@ -48,6 +48,10 @@ pub fn couple(
     Error::length("dimensions of the target's points", source.rows.ncols(), target.rows.ncols())?;
     Error::length("masses of the source's points", source.rows.nrows(), source.masses.len())?;
     Error::length("masses of the target's points", target.rows.nrows(), target.masses.len())?;
+    if settings.tolerance.is_nan() || settings.tolerance < 0.0 {
+        let found = settings.tolerance;
+        return Error::out_of_range("transport", "a tolerance of at least 0", found);
+    }
     if !(settings.blur > 0.0 && settings.kl_weight > 0.0) {
         let found = format!("blur {}, KL weight {}", settings.blur, settings.kl_weight);
         return Error::out_of_range("transport", "a positive blur and KL weight", found);
@@ -97,8 +101,8 @@ mod tests {
     fn the_stabilised_kernel_gives_the_plan_of_the_log_domain() {
         let (a, b) = (cloud(70, 1, 1.0), cloud(90, 2, 1.0));
         for settings in [
-            TransportSettings { iterations: 300, ..TransportSettings::default() },
-            TransportSettings { blur: 0.02, kl_weight: 0.5, iterations: 300 },
+            TransportSettings { iterations: 300, tolerance: 0.0, ..TransportSettings::default() },
+            TransportSettings { blur: 0.02, kl_weight: 0.5, iterations: 300, tolerance: 0.0 },
         ] {
             let (fast, exact) = both_ways(&a, &b, &settings);
             assert!(!fast.log_domain && exact.log_domain);
@@ -110,6 +114,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_plan_that_has_settled_says_the_same_as_one_of_many_iterations() {
+        let (a, b) = (cloud(300, 8, 1.0), cloud(250, 9, 1.1));
+        let default = TransportSettings::default();
+        let all = TransportSettings { iterations: 400, tolerance: 0.0, ..default };
+        let (settled, long) = (plan_of(&a, &b, &default), plan_of(&a, &b, &all));
+        assert!(settled.iterations < 60 && long.iterations > 60, "{}", settled.iterations);
+        let differ = |x: &[u32], y: &[u32]| x.iter().zip(y).filter(|(x, y)| x != y).count();
+        assert!(differ(&settled.source_of(), &long.source_of()) <= 2);
+        assert!(differ(&settled.target_of(), &long.target_of()) <= 2);
+        let function: Vec<f64> = (0..300).map(|i| f64::from(i % 2)).collect();
+        for (x, y) in settled.vote(&function).iter().zip(long.vote(&function)) {
+            assert!((x - y).abs() < 0.005, "{x} for {y}");
+        }
+        let wrong = TransportSettings { tolerance: f64::NAN, ..default };
+        let error = couple(a.weighted(), b.weighted(), &wrong, &Task::default()).unwrap_err();
+        assert!(error.to_string().contains("tolerance"), "{error}");
     }
 
     #[test]
@@ -128,7 +151,12 @@ mod tests {
     #[test]
     fn a_balanced_plan_has_the_given_masses() {
         let (a, b) = (cloud(40, 3, 1.0), cloud(30, 4, 1.0));
-        let settings = TransportSettings { blur: 0.1, kl_weight: f64::INFINITY, iterations: 500 };
+        let settings = TransportSettings {
+            blur: 0.1,
+            kl_weight: f64::INFINITY,
+            iterations: 500,
+            tolerance: 0.0,
+        };
         let (fast, _) = both_ways(&a, &b, &settings);
         for j in 0..40 {
             let arrives: f64 = (0..30).map(|i| fast.mass(i, j)).sum();

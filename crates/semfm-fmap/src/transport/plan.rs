@@ -13,6 +13,8 @@ pub struct Plan {
     pub(super) on_target: Vec<f32>,
     /// v (M_source).
     pub(super) on_source: Vec<f32>,
+    /// Iterations that were run.
+    pub iterations: usize,
     /// Largest relative change of u in the last iteration.
     pub change: f64,
     /// Whether the scaling had to move to the log domain.

@@ -102,10 +102,10 @@ impl Costs {
         let mut u = vec![1.0f32; p_target.len()];
         let mut v: Vec<f32> =
             kernel.least_of_column.iter().map(|c| (-c / blur).exp().max(1e-20)).collect();
-        let mut change = f64::INFINITY;
+        let (mut change, mut iterations) = (f64::INFINITY, 0);
         for iteration in 0..settings.iterations {
             task.step("transport", iteration, settings.iterations)?;
-            let before = u.clone();
+            let (before, v_before) = (u.clone(), v.clone());
             let shares: Vec<Option<Vec<f32>>> = u
                 .par_chunks_mut(ROWS)
                 .zip(kernel.entries.par_chunks(ROWS * n))
@@ -139,11 +139,17 @@ impl Costs {
                 .iter()
                 .zip(&before)
                 .fold(0.0, |m, (x, y)| f64::from((x - y).abs() / x.max(1e-30)).max(m));
+            iterations = iteration + 1;
+            let unevenness = unevenness(&u, &before).max(unevenness(&v, &v_before));
+            if unevenness <= settings.tolerance {
+                break;
+            }
         }
         Ok(Some(Plan {
             kernel: kernel.entries,
             on_target: u,
             on_source: v,
+            iterations,
             change,
             log_domain: false,
         }))
@@ -161,7 +167,7 @@ impl Costs {
         let exponent = if tau.is_finite() { tau / (tau + blur) } else { 1.0 };
         let mut log_u = vec![0.0f64; p_target.len()];
         let mut log_v = vec![0.0f64; n];
-        let mut change = f64::INFINITY;
+        let (mut change, mut iterations) = (f64::INFINITY, 0);
         for iteration in 0..settings.iterations {
             task.step("transport", iteration, settings.iterations)?;
             let next: Vec<f64> = (0..p_target.len())
@@ -172,14 +178,21 @@ impl Costs {
                 })
                 .collect();
             change = next.iter().zip(&log_u).fold(0.0, |m: f64, (x, y)| m.max((x - y).abs()));
+            let moved_u = range_of(next.iter().zip(&log_u).map(|(x, y)| x - y));
             log_u = next;
-            log_v = (0..n)
+            let next: Vec<f64> = (0..n)
                 .into_par_iter()
                 .map(|j| {
                     let column = (0..log_u.len()).map(|i| log_u[i] - self.cost(i, j) / blur);
                     exponent * (p_source[j].ln() - log_sum(column))
                 })
                 .collect();
+            let moved_v = range_of(next.iter().zip(&log_v).map(|(x, y)| x - y));
+            log_v = next;
+            iterations = iteration + 1;
+            if moved_u.max(moved_v).exp_m1() <= settings.tolerance {
+                break;
+            }
         }
         let mut kernel = vec![0.0; self.distances.len()];
         kernel.par_chunks_mut(n).enumerate().for_each(|(i, row)| {
@@ -191,6 +204,7 @@ impl Costs {
             kernel,
             on_target: vec![1.0; p_target.len()],
             on_source: vec![1.0; n],
+            iterations,
             change,
             log_domain: true,
         })
@@ -233,6 +247,24 @@ fn add_up(shares: Vec<Option<Vec<f32>>>, n: usize) -> Option<Vec<f32>> {
         total.iter_mut().zip(share?).for_each(|(t, s)| *t += s);
     }
     Some(total)
+}
+
+/// (maxᵢ xᵢ/yᵢ) / (minᵢ xᵢ/yᵢ) − 1 of scalings x that were y: 0 where all changed by one factor.
+fn unevenness(now: &[f32], before: &[f32]) -> f64 {
+    let changed = now.iter().zip(before).filter(|(x, y)| **x > 0.0 && **y > 0.0);
+    let (mut low, mut high) = (f32::INFINITY, 0.0f32);
+    for (x, y) in changed {
+        low = low.min(x / y);
+        high = high.max(x / y);
+    }
+    f64::from(high / low) - 1.0
+}
+
+/// Greatest less least.
+fn range_of(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (low, high) = numbers
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    high - low
 }
 
 fn least(row: &[f32]) -> f32 {
