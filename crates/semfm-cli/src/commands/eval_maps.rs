@@ -38,6 +38,9 @@ pub struct EvalMapsCommand {
     /// Samples that an error is the mean of; 0 takes all
     #[arg(long, default_value_t = MapSettings::default().n_samples, value_name = "N")]
     samples: usize,
+    /// Send vertices to points of triangles instead of vertices (Ezuz & Ben-Chen 2017)
+    #[arg(long)]
+    precise: bool,
     /// Pairs at once; 0 takes one for each thread. Results do not depend on it
     #[arg(long, default_value_t = 0, value_name = "N")]
     jobs: usize,
@@ -79,6 +82,7 @@ impl EvalMapsCommand {
     fn settings(&self, common: &Common) -> Result<MapSettings> {
         let mut settings = MapSettings {
             n_samples: self.samples,
+            precise: self.precise,
             workers: Workers::new(common.threads, self.jobs),
             cache: if self.no_cache { ShapeCache::off() } else { ShapeCache::of_user() },
             ..MapSettings::default()

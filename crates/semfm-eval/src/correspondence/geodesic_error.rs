@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use faer::Mat;
-use semfm::fmap::PointMap;
+use semfm::fmap::{PointMap, PreciseMap};
 use semfm::geom::geodesic::{HeatGeodesics, HeatSettings};
+use semfm::geom::math::DVec3;
 
 use super::annotated_shape::AnnotatedShape;
 use crate::{Error, Result};
@@ -21,6 +22,50 @@ pub(super) struct GeodesicError<'a> {
     apart: f64,
     /// √A of the source.
     unit: f64,
+}
+
+/// Where a map sends the target's vertices, on the mesh as read.
+pub(super) enum Sent {
+    /// To vertices of the source.
+    Vertices(PointMap),
+    /// To points of its triangles.
+    Points(PreciseMap),
+}
+
+/// A point of the source: on some of its vertices with weights that sum to 1.
+#[derive(Clone, Copy)]
+struct SentPoint {
+    corners: [u32; 3],
+    weights: [f64; 3],
+}
+
+impl Sent {
+    fn n_target(&self) -> usize {
+        match self {
+            Self::Vertices(map) => map.n_target(),
+            Self::Points(map) => map.n_target(),
+        }
+    }
+
+    fn of(&self, target_vertex: u32) -> SentPoint {
+        let j = target_vertex as usize;
+        match self {
+            Self::Vertices(map) => {
+                SentPoint { corners: [map.source_of[j]; 3], weights: [1.0, 0.0, 0.0] }
+            }
+            Self::Points(map) => {
+                SentPoint { corners: map.corners()[j], weights: map.barycentric()[j] }
+            }
+        }
+    }
+}
+
+impl SentPoint {
+    /// A function of the vertices, linear on the triangles; vertices without weight are not asked.
+    fn interpolated<T: std::iter::Sum>(&self, value: impl Fn(u32, f64) -> T) -> T {
+        let corners = self.corners.iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0);
+        corners.map(|(&vertex, weight)| value(vertex, weight)).sum()
+    }
 }
 
 /// Mean errors of one map × 100 / √area.
@@ -65,7 +110,7 @@ impl<'a> GeodesicError<'a> {
     }
 
     /// Errors of a map T between the meshes as read.
-    pub fn of(&self, map: &PointMap) -> Result<MapErrors> {
+    pub fn of(&self, map: &Sent) -> Result<MapErrors> {
         let expected = self.target.shape.original().n_vertices();
         if map.n_target() != expected {
             let (expected, found) = (expected.to_string(), map.n_target().to_string());
@@ -78,22 +123,24 @@ impl<'a> GeodesicError<'a> {
     }
 
     /// 100 / (|S| √A) · Σ_{s ∈ S} d(T(y_s), x_s): d the geodesic distance on the source, x_s the
-    /// source's vertex at sample s (`truth`), y_s the target's, T the map target → source.
+    /// source's vertex at sample s (`truth`), y_s the target's, T the map target → source. The distance of a point on a
+    /// triangle is linear between those of its corners.
     ///
     /// On a source in several parts a sample may be sent to a part that no path joins to where it belongs. That counts
     /// as the greatest distance between vertices that are joined, or as the straight line where that is longer: as
     /// wrong as can be, yet finite, so that one such sample does not hide all others.
-    fn mean(&self, map: &PointMap, truth: &[u32]) -> f64 {
+    fn mean(&self, map: &Sent, truth: &[u32]) -> f64 {
         let mut total = 0.0;
         for &s in &self.samples {
-            let sent = map.source_of[self.target.truth[s] as usize];
-            let along = self.distances[(sent as usize, self.column_of[&truth[s]])];
+            let sent = map.of(self.target.truth[s]);
+            let column = self.column_of[&truth[s]];
+            let along = sent.interpolated(|v, w| w * self.distances[(v as usize, column)]);
             total += if along.is_finite() {
                 along
             } else {
-                let [from, to] =
-                    [sent, truth[s]].map(|v| self.source.shape.original().vertices()[v as usize]);
-                self.apart.max(from.distance(to))
+                let vertices = self.source.shape.original().vertices();
+                let from: DVec3 = sent.interpolated(|v, w| w * vertices[v as usize]);
+                self.apart.max(from.distance(vertices[truth[s] as usize]))
             };
         }
         100.0 * total / (self.samples.len() as f64 * self.unit)

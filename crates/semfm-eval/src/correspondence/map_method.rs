@@ -16,6 +16,7 @@ use semfm::geom::suggestion::unknown_name;
 use semfm::geom::{Eigenbasis, PointIndex};
 
 use super::annotated_shape::{AnnotatedShape, K};
+use super::geodesic_error::Sent;
 use crate::{Error, Result};
 
 /// Landmarks, as far from each other as they can be on the source.
@@ -88,14 +89,16 @@ impl MapMethod {
         }
     }
 
-    /// The map target → source, between the meshes as read.
+    /// The map target → source, between the meshes as read: to vertices, or to points of triangles where it is to be
+    /// precise.
     pub(super) fn map(
         self,
         source: &AnnotatedShape,
         target: &AnnotatedShape,
         settings: &FitSettings,
+        precise: bool,
         task: &Task,
-    ) -> Result<PointMap> {
+    ) -> Result<Sent> {
         let map = match self {
             Self::Wks => map_of_descriptors(source, target, 50, &[], settings, task)?,
             Self::WksZoomOut => map_of_descriptors(source, target, 30, &[], settings, task)?,
@@ -124,7 +127,13 @@ impl MapMethod {
             };
             zoomout(map, &a, &b, &settings, task)?
         };
-        Ok(point_map(&map, &a, &b, 0.0)?.onto_originals(&source.shape, &target.shape))
+        let (on_source, on_target) = (&source.shape, &target.shape);
+        Ok(if precise {
+            let map = map.precise_map(a.basis, on_source.mesh(), b.basis)?;
+            Sent::Points(map.onto_originals(on_source, on_target))
+        } else {
+            Sent::Vertices(point_map(&map, &a, &b, 0.0)?.onto_originals(on_source, on_target))
+        })
     }
 }
 

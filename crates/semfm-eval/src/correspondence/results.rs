@@ -23,6 +23,9 @@ pub struct MapResults {
     pub dataset: String,
     /// Samples that errors are means of, at most; 0 for all.
     pub n_samples: usize,
+    /// Whether vertices were sent to points of triangles instead of vertices.
+    #[serde(default)]
+    pub precise: bool,
     /// One row per pair and method.
     pub rows: Vec<MapRow>,
     /// Every set and method.

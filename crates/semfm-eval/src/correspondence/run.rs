@@ -33,6 +33,8 @@ pub struct MapSettings {
     pub fit: FitSettings,
     /// Samples that the error is the mean of, at most, evenly out of all; 0 for all.
     pub n_samples: usize,
+    /// Whether vertices are sent to points of triangles instead of vertices.
+    pub precise: bool,
     /// How the machine is shared.
     pub workers: Workers,
     /// Where prepared shapes are kept.
@@ -47,6 +49,7 @@ impl Default for MapSettings {
             methods: MapMethod::ALL.to_vec(),
             fit: FIT,
             n_samples: 1000,
+            precise: false,
             workers: Workers::new(0, 0),
             cache: ShapeCache::off(),
             bootstrap: BootstrapSettings::default(),
@@ -83,6 +86,7 @@ pub fn run_maps(
         path: dataset.path.clone(),
         dataset: dataset.hash.clone(),
         n_samples: settings.n_samples,
+        precise: settings.precise,
         rows,
         summaries,
     })
@@ -135,18 +139,18 @@ impl MapRun<'_> {
             (Err(failure), _) | (_, Err(failure)) => return Ok(self.failed(failure)),
         };
         let measure = GeodesicError::new(source, target, self.settings.n_samples);
+        let (fit, precise) = (&self.settings.fit, self.settings.precise);
         let mut rows = Vec::new();
         for method in &self.settings.methods {
             let mut row = MapRow { method: method.name().into(), ..MapRow::default() };
             let start = Instant::now();
-            let scored =
-                method.map(source, target, &self.settings.fit, self.task).and_then(|map| {
-                    row.map_ms = Some(start.elapsed().as_secs_f64() * 1e3);
-                    let measure = measure.as_ref().map_err(|reason| {
-                        Error::invalid("pair", "one that can be measured", reason)
-                    })?;
-                    measure.of(&map)
-                });
+            let scored = method.map(source, target, fit, precise, self.task).and_then(|map| {
+                row.map_ms = Some(start.elapsed().as_secs_f64() * 1e3);
+                let measure = measure
+                    .as_ref()
+                    .map_err(|reason| Error::invalid("pair", "one that can be measured", reason))?;
+                measure.of(&map)
+            });
             match scored {
                 Err(error) if error.is_cancelled() => return Err(error),
                 Err(error) => row.failure = Some(error.to_string()),
@@ -176,9 +180,9 @@ impl MapRun<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::dataset::PAIRS;
-    use semfm::observe::testing::{npy, zip};
     use super::*;
     use semfm::Mesh;
+    use semfm::observe::testing::{npy, zip};
     use semfm_synth::{Category, ObjectSettings, make_object};
     use std::path::Path;
 
@@ -233,6 +237,14 @@ mod tests {
         let many = MapSettings { workers: Workers::new(3, 2), ..settings() };
         let again = run_maps(&dataset, &many, &Task::default()).unwrap();
         assert_eq!(again.without_times(), results.without_times());
+        let precise = MapSettings { precise: true, ..settings() };
+        let precise = run_maps(&dataset, &precise, &Task::default()).unwrap();
+        for summary in &precise.summaries {
+            let error = summary.error.unwrap();
+            let bound = if summary.method.starts_with("wks") { 60.0 } else { 3.0 };
+            assert!(error < bound, "{} to points: {error}", summary.method);
+        }
+        assert!(precise.to_markdown().contains("points of triangles"));
         let text = results.to_markdown();
         assert!(text.contains("## twins") && text.contains("`true20+zoomout`"), "{text}");
     }

@@ -34,8 +34,10 @@ impl MapResults {
     /// The results as Markdown: `table.md`.
     pub fn to_markdown(&self) -> String {
         let samples = if self.n_samples == 0 { "all".into() } else { self.n_samples.to_string() };
+        let to = if self.precise { "points of triangles" } else { "vertices" };
         let mut text = format!(
-            "# Maps against true correspondences\n\nFolder `{}`, {} rows, {samples} samples a pair. Dataset {}.\n\n\
+            "# Maps against true correspondences\n\nFolder `{}`, {} rows, {samples} samples a pair, sent to {to}. \
+             Dataset {}.\n\n\
              Mean geodesic error × 100 / √area. Mirror: against the mirrored truth. Flips: pairs whose \
              mirrored answer is the nearer one.\n",
             self.path.display(),

@@ -221,6 +221,7 @@ mod tests {
             path: "matching".into(),
             dataset: "blake3:1".into(),
             n_samples: 0,
+            precise: false,
             rows: vec![
                 row("b", "wks", Some(17.5)),
                 row("c", "wks", None),
