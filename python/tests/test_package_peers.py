@@ -266,3 +266,46 @@ def test_functions_travel_as_in_pyfm(sides, rough_map):
     source, target = sides[1]
     ours = target.reconstruct(rough_map.matrix @ source.truncated(K).project(height))
     assert np.abs(ours - model.transfer(height)).max() < 1e-12
+
+
+def test_a_precise_map_lies_as_near_as_pyfms(sides, rough_map):
+    utils = pytest.importorskip("pyFM.spectral.projection_utils")
+    sparse = pytest.importorskip("scipy.sparse")
+    theirs, ours = sides
+    faces = theirs[0].faces
+    found = rough_map.to_precise_map(*ours, semfm.Mesh(theirs[0].vertices, faces))
+    corners = ours[0].functions[:, :K] @ rough_map.matrix.T
+    queries = np.ascontiguousarray(ours[1].functions[:, :K])
+
+    def distances(face_of, barycentric):
+        points = np.einsum("ij,ijk->ik", barycentric, corners[faces[face_of]])
+        return np.linalg.norm(points - queries, axis=1)
+
+    their_faces, weights = utils.nn_query_precise_np(corners, faces, queries, n_jobs=1)
+    here, there = distances(found.face_of, found.barycentric), distances(their_faces, weights)
+    assert (here <= there + 1e-9 * there.max()).all()
+    assert np.allclose(here, there, rtol=1e-6, atol=1e-6 * there.max())
+    data, indices, indptr = found.to_csr()
+    matrix = sparse.csr_matrix((data, indices, indptr), shape=(found.n_target, found.n_source))
+    function = ours[0].functions[:, 3]
+    assert np.allclose(matrix @ function, found.pull_back(function), rtol=1e-12, atol=1e-12)
+    assert np.array_equal(found.corners, faces[found.face_of])
+
+
+def test_zoomout_among_samples_of_both_sides_is_pyfms(sides, rough_map):
+    refine = pytest.importorskip("pyFM.refine")
+    theirs, ours = sides
+    rng = np.random.default_rng(4)
+    samples = [rng.permutation(each.n_vertices)[:600] for each in ours]
+    grown = rough_map.zoomout(
+        *ours, k_final=K_FINAL, step=STEP, source_samples=samples[0], target_samples=samples[1]
+    )
+    turns = (K_FINAL - K) // STEP
+    vectors = [each.eigenvectors for each in theirs]
+    expected = refine.zoomout_refine(
+        rough_map.matrix, *vectors, nit=turns, step=STEP, subsample=samples, n_jobs=1
+    )
+    # Ours has a ridge of 1e-4 a sample, against an unregularised least squares.
+    assert np.linalg.norm(grown.matrix - expected) < 0.01 * np.linalg.norm(expected)
+    with pytest.raises(semfm.InvalidInput, match="source_samples"):
+        rough_map.zoomout(*ours, source_samples=[ours[0].n_vertices])

@@ -15,6 +15,7 @@ use crate::eigenbasis::Eigenbasis;
 use crate::interruptible::{guard, run};
 use crate::mesh::{Reduced, from_any};
 use crate::point_map::PointMap;
+use crate::precise_map::PreciseMap;
 use crate::shared::Shared;
 use crate::{arrays_out, errors, json};
 
@@ -204,6 +205,9 @@ impl FunctionalMap {
     /// target_features : (n_target, d) array_like, optional
     /// feature_weight : float, default 0.0
     ///     w: the search runs in ``[spectral, w √k · features]``.
+    /// source_samples : (r,) array_like, optional
+    ///     Source vertices among which matches are sought while the map grows; all where none are
+    ///     given.
     /// target_samples : (s,) array_like, optional
     ///     Target vertices that are matched while the map grows; all where none are given.
     /// progress : progress, optional
@@ -213,7 +217,7 @@ impl FunctionalMap {
     /// FunctionalMap
     #[pyo3(signature = (
         source, target, *, k_final=50, step=5, source_features=None, target_features=None,
-        feature_weight=0.0, target_samples=None, progress=None
+        feature_weight=0.0, source_samples=None, target_samples=None, progress=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
     fn zoomout(
@@ -225,6 +229,7 @@ impl FunctionalMap {
         source_features: Option<&Bound<'_, PyAny>>,
         target_features: Option<&Bound<'_, PyAny>>,
         feature_weight: f64,
+        source_samples: Option<&Bound<'_, PyAny>>,
         target_samples: Option<&Bound<'_, PyAny>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -235,23 +240,16 @@ impl FunctionalMap {
             let found = feature_weight.to_string();
             return Err(errors::invalid(py, "feature_weight", "a number of at least 0", &found));
         }
-        let samples = match target_samples {
-            Some(samples) => arrays_in::ids(samples, "target_samples", &[Axis::Any("s")])?.0,
-            None => Vec::new(),
-        };
-        let n = target.n_vertices();
-        if let Some(id) = samples.iter().find(|&&id| id as usize >= n) {
-            let (expected, found) = (format!("ids below {n}"), id.to_string());
-            return Err(errors::invalid(py, "target_samples", &expected, &found));
-        }
+        let on_source_alone = samples(source_samples, "source_samples", source.n_vertices())?;
+        let on_target_alone = samples(target_samples, "target_samples", target.n_vertices())?;
         let start = (*self.inner).clone();
         let settings = ZoomOutSettings { k_start: 1, k_final, step, feature_weight };
         let grown = run(py, progress, move |task| {
             let (on_source, on_target) = on_both
                 .as_ref()
                 .map_or((None, None), |(a, b)| (Some(a.as_ref()), Some(b.as_ref())));
-            let source = MapSide { basis: &source, features: on_source, samples: &[] };
-            let target = MapSide { basis: &target, features: on_target, samples: &samples };
+            let source = MapSide { basis: &source, features: on_source, samples: &on_source_alone };
+            let target = MapSide { basis: &target, features: on_target, samples: &on_target_alone };
             Ok(zoomout::zoomout(start, &source, &target, &settings, task)?)
         })?;
         Ok(Self { inner: Arc::new(grown) })
@@ -307,6 +305,36 @@ impl FunctionalMap {
             })
         })?;
         Ok(PointMap { inner: Shared::new(found), n_source })
+    }
+
+    /// The precise map target → source (Ezuz & Ben-Chen 2017): each target vertex takes the nearest
+    /// point on the source's triangles, whose corners stand where their delta functions, sent through
+    /// C, come to. Exact; of equally near triangles the first.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : Eigenbasis
+    /// target : Eigenbasis
+    /// source_mesh : mesh_like
+    ///     Triangles on the source's vertices, of a `Shape` its `working` mesh.
+    ///
+    /// Returns
+    /// -------
+    /// PreciseMap
+    #[pyo3(signature = (source, target, source_mesh))]
+    fn to_precise_map(
+        &self,
+        source: &Bound<'_, Eigenbasis>,
+        target: &Bound<'_, Eigenbasis>,
+        source_mesh: &Bound<'_, PyAny>,
+    ) -> PyResult<PreciseMap> {
+        let py = source.py();
+        let mesh = from_any(source_mesh, "source_mesh")?;
+        let (source, target) = (source.get().inner.clone(), target.get().inner.clone());
+        self.check_bases(py, &source, &target)?;
+        let map = self.inner.clone();
+        let inner = run(py, None, move |_| Ok(map.precise_map(&source, &mesh, &target)?))?;
+        Ok(PreciseMap { inner })
     }
 
     /// (k_target, k_source) float64 array: C, a read-only view.
@@ -423,6 +451,19 @@ fn check_size(py: Python<'_>, name: &str, k: usize, basis: &geom::Eigenbasis) ->
     }
     let expected = format!("a basis of at least {k} pairs");
     Err(errors::invalid(py, name, &expected, &format!("{} pairs", basis.k())))
+}
+
+/// Vertex ids below `n`; none where none are given.
+fn samples(ids: Option<&Bound<'_, PyAny>>, name: &str, n: usize) -> PyResult<Vec<u32>> {
+    let Some(given) = ids else { return Ok(Vec::new()) };
+    let (ids, _) = arrays_in::ids(given, name, &[Axis::Any("s")])?;
+    match ids.iter().find(|&&id| id as usize >= n) {
+        None => Ok(ids),
+        Some(id) => {
+            let expected = format!("ids below {n}");
+            Err(errors::invalid(given.py(), name, &expected, &id.to_string()))
+        }
+    }
 }
 
 /// The features of both sides, or of neither.

@@ -35,6 +35,7 @@ mod pictures;
 mod pinhole;
 mod plan;
 mod point_map;
+mod precise_map;
 mod prepared;
 mod region;
 mod robot;
@@ -97,6 +98,8 @@ mod _semfm {
     use crate::plan::{GraspPlan, Segment, plan};
     #[pymodule_export]
     use crate::point_map::PointMap;
+    #[pymodule_export]
+    use crate::precise_map::PreciseMap;
     #[pymodule_export]
     use crate::prepared::{_restore_prepared, PreparedObject, prepare};
     #[pymodule_export]
