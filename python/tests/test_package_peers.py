@@ -297,15 +297,14 @@ def test_zoomout_among_samples_of_both_sides_is_pyfms(sides, rough_map):
     theirs, ours = sides
     rng = np.random.default_rng(4)
     samples = [rng.permutation(each.n_vertices)[:600] for each in ours]
+    # One turn: matches are the same then, and what is left is our ridge of 1e-4 a sample.
     grown = rough_map.zoomout(
-        *ours, k_final=K_FINAL, step=STEP, source_samples=samples[0], target_samples=samples[1]
+        *ours, k_final=K + STEP, step=STEP, source_samples=samples[0], target_samples=samples[1]
     )
-    turns = (K_FINAL - K) // STEP
     vectors = [each.eigenvectors for each in theirs]
     expected = refine.zoomout_refine(
-        rough_map.matrix, *vectors, nit=turns, step=STEP, subsample=samples, n_jobs=1
+        rough_map.matrix, *vectors, nit=1, step=STEP, subsample=samples, n_jobs=1
     )
-    # Ours has a ridge of 1e-4 a sample, against an unregularised least squares.
-    assert np.linalg.norm(grown.matrix - expected) < 0.01 * np.linalg.norm(expected)
+    assert np.linalg.norm(grown.matrix - expected) < 0.002 * np.linalg.norm(expected)
     with pytest.raises(semfm.InvalidInput, match="source_samples"):
         rough_map.zoomout(*ours, source_samples=[ours[0].n_vertices])
