@@ -2,24 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
+use semfm::Region;
+use semfm::files::write_region;
+use semfm::geom::io::{read_mesh, write_mesh};
+use semfm_synth::{Category, ObjectSettings, make_object};
 use semfm_tests::shell::{Answer, json, run};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Three procedural containers with their regions.
+/// Four procedural containers, each with its region beside it.
 fn containers() -> (TempDir, Vec<PathBuf>) {
     let folder = tempfile::tempdir().unwrap();
-    let mut meshes = Vec::new();
-    for seed in ["0", "1"] {
-        let at = folder.path().join(seed);
-        let at = at.to_str().unwrap();
-        let answer =
-            run(&["demo", "--quiet", "--category", "containers", "--seed", seed, "-o", at]);
-        assert_eq!(answer.code, Some(0), "{answer:?}");
-        for i in 0..2 {
-            meshes.push(folder.path().join(seed).join(format!("containers_{i}_s{seed}.obj")));
-        }
-    }
+    let settings = ObjectSettings { n_vertices: 600, ..ObjectSettings::default() };
+    let meshes = (0..4).map(|instance| {
+        let object = make_object(Category::Containers, instance, &settings).unwrap();
+        let path = folder.path().join(object.name()).with_extension("obj");
+        write_mesh(&path, &object.mesh).unwrap();
+        let mesh = read_mesh(&path).unwrap().mesh;
+        let region = Region::from_mask(&object.region);
+        write_region(&path.with_extension("json"), &region, &mesh).unwrap();
+        path
+    });
+    let meshes = meshes.collect();
     (folder, meshes)
 }
 

@@ -107,7 +107,7 @@ pub struct GraspOptions {
     /// Vertices of the surface on which contacts are sought on larger meshes; 0: on the mesh as it is, not simplified
     /// and, where it is noisy, not smoothed. Collisions are always with the mesh as it is
     #[arg(long, value_name = "N", help_heading = "Grasps")]
-    working_vertices: Option<usize>,
+    contact_vertices: Option<usize>,
     /// Friction coefficient between pad and object
     #[arg(long, default_value_t = GraspSettings::default().friction, value_name = "MU", help_heading = "Grasps")]
     friction: f64,
@@ -242,7 +242,7 @@ impl GraspOptions {
             diversity,
             random: false,
             samples: n_samples,
-            working_vertices: None,
+            contact_vertices: None,
             friction,
             mass: None,
             grip_force,
@@ -273,7 +273,7 @@ impl GraspOptions {
             .context("--gripper")?;
         let pose_margin = request.settings.pose_margin;
         request.settings = GraspSettings { pose_margin, ..self.settings(seed) };
-        if let Some(working_vertices) = self.working_vertices {
+        if let Some(working_vertices) = self.contact_vertices {
             let smooth = working_vertices > 0;
             request.surface = SurfaceSettings { working_vertices, smooth };
         }
