@@ -1,16 +1,16 @@
 """Fits and judges the score of a grasp by trials in MuJoCo (bench/physics.py).
 
-    python bench/grasp_score.py collect FOLDER [--shared ../shared] [--semfm semfm-cli] [--random 8]
+    python bench/grasp_score.py collect FOLDER [--shared ../shared] [--semfm semfm-cli] [--random 6]
     python bench/grasp_score.py fit FOLDER
     python bench/grasp_score.py judge FOLDER
     python bench/grasp_score.py diversity FOLDER
 
-``collect`` asks for 200 random survivors of each object and hand (``grasp --random``), tries some of them at
+``collect`` asks for 100 random survivors of each object and hand (``grasp --random``), tries some of them at
 the usual grip (friction .5, 30 N a pad, the object's own mass) and, for the calibration, under another
 friction, force or mass each, and keeps everything in FOLDER: a later call goes on where an earlier one
 stopped. ``fit`` fits log-odds of "holds, with less than 1 cm and 20°" to the terms that the program gives
 (logistic regression), each object left out in turn, and prints the weights, the area under the ROC curve, how
-well the probability is calibrated, and what each term is worth. ``judge`` ranks the 200 survivors of each
+well the probability is calibrated, and what each term is worth. ``judge`` ranks the 100 survivors of each
 object with the fit of all others, tries the ten best, and does the same for the program's own score;
 ``diversity`` tries the top 20 of the program for several ``--diversity``.
 
@@ -85,7 +85,7 @@ HANDS = ("franka", "robotiq-2f85", "robotiq-2f140")
 USUAL = (0.5, 30.0)
 FRICTIONS, FORCES, MASS_FACTORS = (0.3, 0.5, 0.8), (15.0, 30.0, 60.0), (0.5, 1.0, 2.0)
 #: Survivors asked for.
-POOL = 200
+POOL = 100
 
 
 def cases(arguments) -> list[tuple[str, Path, float, float, str]]:
@@ -134,7 +134,7 @@ def grasps_of(arguments, case, *options, tag: str) -> dict | None:
     if not path.exists() or arguments.again:
         region = everywhere(mesh, arguments.folder)
         words = ["--region", region, "--gripper", hand, "--scale", scale, "--mass", mass]
-        words += ["--samples", 200, *options, "-q", "-o", path]
+        words += ["--samples", 70, *options, "-q", "-o", path]
         run(arguments, "grasp", mesh, *words, "--force")
     answer = json.loads(path.read_text())
     return answer if answer["grasps"] else None
@@ -214,7 +214,7 @@ def left_out(records: list[dict], names: list[str]) -> np.ndarray:
 
 
 #: Terms that the score weighs for physics; the others are preferences of whoever asks.
-PHYSICAL = ["contact", "friction", "epsilon", "gravity", "lever", "bite", "closing", "weight", "evenness", "centred"]
+PHYSICAL = ["contact", "friction", "epsilon", "gravity", "weight", "lever", "evenness", "centred"]
 
 
 def fit(arguments) -> None:
@@ -333,8 +333,8 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--shared", type=Path, default=os.environ.get("SEMFM_SHARED", "../shared"))
     parser.add_argument("--semfm", default="semfm-cli")
-    parser.add_argument("--random", type=int, default=8, help="random survivors to try, for each object and hand")
-    parser.add_argument("--shares", type=float, nargs="+", default=[0.0, 0.1, 0.3, 0.6, 1.0])
+    parser.add_argument("--random", type=int, default=6, help="random survivors to try, for each object and hand")
+    parser.add_argument("--shares", type=float, nargs="+", default=[0.0, 0.05, 0.1, 0.3, 1.0])
     parser.add_argument("--every", type=int, default=3, help="diversity: every how many-th object")
     parser.add_argument("--again", action="store_true", help="ask the program anew (its score has changed)")
     arguments = parser.parse_args()

@@ -33,7 +33,7 @@ impl GraspDistance {
 }
 
 /// The angle of a rotation, radians in [0, π].
-fn angle(q: DQuat) -> f64 {
+pub(crate) fn angle(q: DQuat) -> f64 {
     2.0 * q.xyz().length().atan2(q.w.abs())
 }
 
