@@ -722,8 +722,20 @@ class Grasp:
         """(3,) float64 array: the TCP, between the pads, in the object's frame, metres."""
         ...
     @property
+    def closing_turn(self) -> float:
+        """float: angle by which the object turns while the pads close, radians."""
+        ...
+    @property
+    def hold(self) -> Optional[float]:
+        """float, optional: the probability that the grasp holds while the object is lifted, shaken and tilted;
+        None where no `mass` was given.
+        """
+        ...
+    @property
     def score(self) -> float:
-        """float: weighted mean of the terms, 0 to 1."""
+        """float: the probability that the grasp holds, times what is asked beyond that; without a `mass`, as for
+        an object of .3 kg.
+        """
         ...
     @property
     def terms(self) -> dict[str, Any]:
@@ -3227,7 +3239,7 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
     Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
@@ -3260,6 +3272,12 @@ def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gr
         Points of the region from which candidates are grown.
     friction : float, optional
         Coulomb coefficient between pad and object.
+    diversity : float, optional
+        Share of the score that grasps may give up to differ from each other; 0 returns the best, however near.
+    mass : float, optional
+        Kilograms: `hold` is then the probability that the grasp holds.
+    grip_force : float, optional
+        Force with which each pad presses, newtons.
     width_range : tuple of float, float, optional
         Least and largest distance between the closed pads, metres.
     approach : (3,) array_like, optional
