@@ -698,16 +698,34 @@ class Grasp:
         """
         ...
     @property
+    def closing_turn(self) -> float:
+        """float: angle by which the object turns while the pads close, radians."""
+        ...
+    @property
+    def command_width(self) -> float:
+        """float: what to tell a hand that stops at a force, metres: below contact, so that the pads press."""
+        ...
+    @property
+    def contact_width(self) -> float:
+        """float: distance between the two contacts along the closing direction, metres: where the pads touch."""
+        ...
+    @property
     def contacts(self) -> NDArray[numpy.float64]:
-        """(2, 3) float64 array: one contact for each pad, metres."""
+        """(2, 3) float64 array: one contact for each pad, in the object's frame, metres."""
         ...
     @property
     def epsilon(self) -> float:
         """float: Ferrari and Canny's ε."""
         ...
     @property
+    def hold(self) -> Optional[float]:
+        """float, optional: the probability that the grasp holds while the object is lifted, shaken and tilted;
+        None where no `mass` was given.
+        """
+        ...
+    @property
     def normals(self) -> NDArray[numpy.float64]:
-        """(2, 3) float64 array: the object's unit normal at each contact."""
+        """(2, 3) float64 array: the object's unit normal at each contact, in the object's frame."""
         ...
     @property
     def object_from_tcp(self) -> NDArray[numpy.float64]:
@@ -722,16 +740,6 @@ class Grasp:
         """(3,) float64 array: the TCP, between the pads, in the object's frame, metres."""
         ...
     @property
-    def closing_turn(self) -> float:
-        """float: angle by which the object turns while the pads close, radians."""
-        ...
-    @property
-    def hold(self) -> Optional[float]:
-        """float, optional: the probability that the grasp holds while the object is lifted, shaken and tilted;
-        None where no `mass` was given.
-        """
-        ...
-    @property
     def score(self) -> float:
         """float: the probability that the grasp holds, times what is asked beyond that; without a `mass`, as for
         an object of .3 kg.
@@ -743,7 +751,7 @@ class Grasp:
         ...
     @property
     def width(self) -> float:
-        """float: distance between the closed pads, metres."""
+        """float: distance between the closed pads where they touch nothing yet, metres."""
         ...
 
 class GraspPlan:
@@ -845,6 +853,12 @@ class Grasps:
     A sequence of `Grasp`.
     """
     def __len__(self) -> int: ...
+    @property
+    def advice(self) -> Optional[str]:
+        """str, optional: what kept most candidates from being grasps, what to do about it, and the options of
+        `find_grasps` that would change it.
+        """
+        ...
     @property
     def camera_from_tcp(self) -> Optional[NDArray[numpy.float64]]:
         """(g, 4, 4) float64 array, optional: the same in the camera's frame, where one is known."""
@@ -3239,7 +3253,7 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: float, camera_from_object: Optional[ArrayLike] = None, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: Optional[float] = None, camera_from_object: Optional[ArrayLike] = None, alignment: Optional[Union[Alignment, _Path]] = None, use_refused: Optional[bool] = False, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, working_vertices: Optional[int] = None, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
     Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
@@ -3254,8 +3268,13 @@ def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gr
         Where the pads shall close; of the mesh.
     gripper : Gripper or path
         A gripper, or what `Gripper` takes.
-    scale : float
-        Metres per unit of the mesh; 1 for a mesh in metres.
+    scale : float, optional
+        Metres per unit of the mesh; 1 for a mesh in metres. Not with `alignment`, needed without.
+    alignment : Alignment or path, optional
+        Pose and scale before a camera, from `align` or `aligned.json`: in place of `scale` and `camera_from_object`.
+        What is uncertain of the pose keeps the gripper away until the pads close.
+    use_refused : bool, optional
+        Take an alignment whose verdict is `refuse`, which is an error otherwise.
     camera_from_object : (4, 4) array_like, optional
         Rigid pose of the object, scaled to metres, before a camera. Scene, table and directions
         are then given in the camera's frame, else in the object's in metres.
@@ -3270,6 +3289,9 @@ def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gr
         Grasps to return.
     n_samples : int, optional
         Points of the region from which candidates are grown.
+    working_vertices : int, optional
+        Vertices of the surface on which contacts are sought on larger meshes; 0: on the mesh as it is, neither
+        simplified nor, where it is noisy, smoothed. Collisions are always with the mesh as it is.
     friction : float, optional
         Coulomb coefficient between pad and object.
     diversity : float, optional
