@@ -8,6 +8,7 @@ use semfm_geom::math::DVec3;
 
 use super::body::{CollisionBody, Frame, body_gap};
 use super::convex::depth;
+use super::joint_frames::{JointFrame, JointFrames};
 use super::model::CollisionModel;
 use super::moving_body::{Carried, MovingBody, RigidGroup};
 use super::scene::Scene;
@@ -42,6 +43,7 @@ pub struct CollisionChecker {
     allowed: Vec<[String; 2]>,
     /// Links with a shape, then attached bodies.
     pub(super) bodies: Arc<[MovingBody]>,
+    joints: Arc<JointFrames>,
     /// The same bodies, by what moves them.
     pub(super) groups: Arc<[RigidGroup]>,
     pub(super) group_pairs: Vec<GroupPair>,
@@ -69,8 +71,11 @@ pub(super) struct ScenePair {
 /// Memory of one thread for one question after the other.
 #[derive(Default)]
 pub(super) struct Scratch {
-    pub(super) base_from_link: Vec<Pose>,
-    pub(super) frames: Vec<Frame>,
+    pub(super) joints: Vec<JointFrame>,
+    /// Frames of the bodies; only of groups that are marked as placed.
+    frames: Vec<Frame>,
+    /// Which groups' bodies have their frames: most groups are far from everything, and theirs are not asked for.
+    placed: Vec<bool>,
     /// Centres of the groups' spheres.
     pub(super) centres: Vec<DVec3>,
     pub(super) carried: Vec<Carried>,
@@ -95,7 +100,9 @@ impl CollisionChecker {
         let bodies: Arc<[MovingBody]> = model.moving_bodies().into();
         let (attached, allowed) = (Vec::new(), Vec::new());
         let (groups, group_pairs, scene_pairs) = (Arc::default(), Vec::new(), Vec::new());
-        Self { model, scene, attached, allowed, bodies, groups, group_pairs, scene_pairs }.paired()
+        let joints = Arc::new(JointFrames::new(model.arm()));
+        Self { model, scene, attached, allowed, bodies, joints, groups, group_pairs, scene_pairs }
+            .paired()
     }
 
     /// The same in another scene; what may touch stays.
@@ -113,7 +120,8 @@ impl CollisionChecker {
     pub fn with_model(&self, model: Arc<CollisionModel>) -> Result<Self> {
         let attached = self.attached.iter().map(|attached| attached.on(&model));
         let bodies = model.moving_bodies().iter().cloned().chain(attached).collect();
-        Self { bodies, model, ..self.clone() }.paired()
+        let joints = Arc::new(JointFrames::new(model.arm()));
+        Self { bodies, joints, model, ..self.clone() }.paired()
     }
 
     /// The same with a body that a link carries. It is checked against the scene, other bodies, and the links that move
@@ -222,6 +230,7 @@ impl CollisionChecker {
         let contact = self.contact();
         let mut contacts = with_scratch(|scratch| {
             self.place(q, scratch);
+            (0..self.groups.len()).for_each(|group| self.place_bodies(group, scratch));
             let frames = &scratch.frames;
             let mut contacts = Vec::new();
             for pair in &self.scene_pairs {
@@ -261,24 +270,34 @@ impl CollisionChecker {
         q.len() == self.model.arm().n_joints() && q.iter().all(|value| value.is_finite())
     }
 
-    /// Puts all bodies where the arm holds them.
+    /// Puts joints and groups where they are at `q`; bodies follow when they are asked for.
     pub(super) fn place(&self, q: &[f64], scratch: &mut Scratch) {
-        self.model.arm().link_poses(q, &mut scratch.base_from_link);
-        scratch.frames.clear();
-        scratch.frames.extend(self.bodies.iter().map(|body| body.frame(&scratch.base_from_link)));
+        self.joints.place(q, &mut scratch.joints);
+        scratch.placed.clear();
+        scratch.placed.resize(self.groups.len(), false);
+        scratch.frames.resize(self.bodies.len(), Frame::new(Pose::IDENTITY));
         scratch.centres.clear();
-        let centres = self.groups.iter().map(|group| group.centre(&scratch.base_from_link));
-        scratch.centres.extend(centres);
+        scratch.centres.extend(self.groups.iter().map(|group| group.centre(&scratch.joints)));
+    }
+
+    fn place_bodies(&self, group: usize, scratch: &mut Scratch) {
+        if !scratch.placed[group] {
+            scratch.placed[group] = true;
+            for (body, frame) in self.groups[group].frames(&scratch.joints) {
+                scratch.frames[body] = frame;
+            }
+        }
     }
 
     /// A lower bound of the distance between a group and an obstacle, exact where it is small; `most` where it is that
     /// or more, 0 where they meet.
-    pub(super) fn scene_gap(&self, pair: &ScenePair, scratch: &Scratch, most: f64) -> f64 {
+    pub(super) fn scene_gap(&self, pair: &ScenePair, scratch: &mut Scratch, most: f64) -> f64 {
         let obstacle = &self.scene.obstacles()[pair.obstacle];
         let group = &self.groups[pair.group];
         if obstacle.bound_distance(scratch.centres[pair.group]) - group.radius >= most {
             return most;
         }
+        self.place_bodies(pair.group, scratch);
         let mut least = most;
         for &body in &pair.bodies {
             least = obstacle.gap(&self.bodies[body].body, &scratch.frames[body], least);
@@ -287,11 +306,13 @@ impl CollisionChecker {
     }
 
     /// The same between two groups.
-    pub(super) fn group_gap(&self, pair: &GroupPair, scratch: &Scratch, most: f64) -> f64 {
+    pub(super) fn group_gap(&self, pair: &GroupPair, scratch: &mut Scratch, most: f64) -> f64 {
         let apart = scratch.centres[pair.a].distance(scratch.centres[pair.b]);
         if apart - self.groups[pair.a].radius - self.groups[pair.b].radius >= most {
             return most;
         }
+        self.place_bodies(pair.a, scratch);
+        self.place_bodies(pair.b, scratch);
         let mut least = most;
         for &[a, b] in &pair.bodies {
             least = self.body_gap(a, b, &scratch.frames, least);
@@ -337,7 +358,7 @@ impl CollisionChecker {
                 !bodies[a].is_fixed_to(&bodies[b]) && !may_touch(&bodies[a].name, &bodies[b].name)
             })
             .collect();
-        let groups = RigidGroup::of_bodies(self.model.arm(), bodies);
+        let groups = RigidGroup::of_bodies(self.model.arm(), &self.joints, bodies);
         self.group_pairs = group_pairs(&groups, &checked);
         // The hand is nearest to what it works on: of all links it is the likeliest to touch, so it comes first.
         let moving = groups.iter().enumerate().rev().filter(|(_, group)| !group.path.is_empty());

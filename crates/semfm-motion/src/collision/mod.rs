@@ -11,6 +11,7 @@ mod checker;
 mod checker_tests;
 mod convex;
 mod hull;
+mod joint_frames;
 mod model;
 mod motion;
 mod moving_body;

@@ -66,9 +66,9 @@ impl CollisionChecker {
         q.extend(from.iter().zip(to).map(|(from, to)| from + time * (to - from)));
         self.place(&q, scratch);
         scratch.q = q;
-        let Scratch { base_from_link, centres, carried, travel, .. } = scratch;
+        let Scratch { joints, centres, carried, travel, .. } = &mut *scratch;
         for ((group, carried), &centre) in self.groups.iter().zip(carried).zip(&*centres) {
-            group.set_state(travel, base_from_link, centre, carried);
+            group.set_state(travel, joints, centre, carried);
         }
         let contact = self.contact();
         let kept = 0.5 * contact;

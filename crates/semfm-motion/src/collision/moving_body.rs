@@ -5,6 +5,7 @@ use semfm_geom::math::DVec3;
 use semfm_robot::{Arm, JointKind};
 
 use super::body::{CollisionBody, Frame};
+use super::joint_frames::{JointFrame, JointFrames};
 
 /// Stands for a reach without bound, metres.
 const UNBOUNDED: f64 = 1e9;
@@ -25,8 +26,10 @@ pub(crate) struct MovingBody {
 pub(crate) struct RigidGroup {
     /// Places in the list of bodies, ascending.
     pub(crate) members: Vec<usize>,
-    /// The link in whose frame the sphere's centre is told.
-    link: usize,
+    /// The joint in whose frame the group is told; `None` for that of the base.
+    joint: Option<usize>,
+    /// One a member.
+    joint_from_body: Vec<JointFrame>,
     centre: DVec3,
     pub(crate) radius: f64,
     /// The joints that move it, base to link.
@@ -42,6 +45,8 @@ pub(crate) struct PathJoint {
     pub(crate) joint: usize,
     /// How much it moves when the value changes by one.
     pub(crate) factor: f64,
+    /// Its place in the list of frames; only in paths of groups.
+    frame: usize,
     /// The link after it, whose frame's origin lies on its axis.
     child: usize,
     /// Its axis in that frame; `None` where it slides.
@@ -94,7 +99,7 @@ impl MovingBody {
 
 impl RigidGroup {
     /// Sorts bodies into groups, in the order of their first members.
-    pub(crate) fn of_bodies(arm: &Arm, bodies: &[MovingBody]) -> Vec<Self> {
+    pub(crate) fn of_bodies(arm: &Arm, joints: &JointFrames, bodies: &[MovingBody]) -> Vec<Self> {
         let mut members: Vec<Vec<usize>> = Vec::new();
         for (i, body) in bodies.iter().enumerate() {
             match members.iter_mut().find(|group| bodies[group[0]].is_fixed_to(body)) {
@@ -104,10 +109,17 @@ impl RigidGroup {
         }
         let mut poses = Vec::new();
         arm.link_poses(&vec![0.0; arm.n_joints()], &mut poses);
-        members.into_iter().map(|members| Self::new(arm, bodies, members, &poses)).collect()
+        let group = |members| Self::new(arm, joints, bodies, members, &poses);
+        members.into_iter().map(group).collect()
     }
 
-    fn new(arm: &Arm, bodies: &[MovingBody], members: Vec<usize>, poses: &[Pose]) -> Self {
+    fn new(
+        arm: &Arm,
+        joints: &JointFrames,
+        bodies: &[MovingBody],
+        members: Vec<usize>,
+        poses: &[Pose],
+    ) -> Self {
         let link = bodies[members[0]].link;
         let ball = |&i: &usize| {
             let at = poses[link].inv_mul(&(poses[bodies[i].link] * bodies[i].link_from_body));
@@ -122,13 +134,31 @@ impl RigidGroup {
         let centre = if let [only] = balls[..] { only.0 } else { low.midpoint(high) };
         let reach = balls.iter().map(|ball| ball.0.distance(centre) + ball.1);
         let radius = reach.fold(0.0, f64::max);
-        let path = path(arm, link, centre, radius);
-        Self { members, link, centre, radius, path }
+        let mut path = path(arm, link, centre, radius);
+        for joint in &mut path {
+            joint.frame = joints.of_joint(joint.joint).unwrap_or(0);
+        }
+        let place = |&i: &usize| {
+            let MovingBody { link, link_from_body, .. } = &bodies[i];
+            JointFrame::new(&(joints.link(*link).joint_from_link * *link_from_body))
+        };
+        let joint_from_body = members.iter().map(place).collect();
+        let first = joints.link(link);
+        let centre = first.joint_from_link * centre;
+        Self { members, joint: first.joint, joint_from_body, centre, radius, path }
     }
 
     /// Where the centre of the group's sphere is.
-    pub(crate) fn centre(&self, base_from_link: &[Pose]) -> DVec3 {
-        base_from_link[self.link] * self.centre
+    pub(crate) fn centre(&self, frames: &[JointFrame]) -> DVec3 {
+        self.joint.map_or(self.centre, |joint| frames[joint].point(self.centre))
+    }
+
+    /// Where the members are, in the order of the list.
+    pub(crate) fn frames(&self, frames: &[JointFrame]) -> impl Iterator<Item = (usize, Frame)> {
+        let joint = self.joint.map(|joint| frames[joint]);
+        self.members.iter().zip(&self.joint_from_body).map(move |(&member, body)| {
+            (member, joint.map_or(*body, |joint| joint.then(body)).as_frame())
+        })
     }
 
     /// Number of joints that move this group and the other alike.
@@ -159,7 +189,7 @@ impl RigidGroup {
     pub(crate) fn set_state(
         &self,
         travel: &[f64],
-        base_from_link: &[Pose],
+        frames: &[JointFrame],
         centre: DVec3,
         carried: &mut Carried,
     ) {
@@ -168,11 +198,11 @@ impl RigidGroup {
         let mut sum = 0.0;
         for joint in &self.path {
             let way = (travel[joint.variable] * joint.factor).abs();
-            let pose = &base_from_link[joint.child];
-            let arm_length = joint.axis.map_or(1.0, |axis| {
-                let from_axis = (centre - pose.translation).cross(pose.rotation * axis);
-                from_axis.length() + self.radius
-            });
+            let frame = &frames[joint.frame];
+            let arm_length = match joint.axis {
+                Some(_) => (centre - frame.at).cross(frame.turn.z_axis).length() + self.radius,
+                None => 1.0,
+            };
             sum += way * arm_length;
             carried.here.push(sum);
         }
@@ -244,7 +274,15 @@ fn path(arm: &Arm, link: usize, centre: DVec3, radius: f64) -> Vec<PathJoint> {
         if let Some(variable) = variable.filter(|_| joint.kind.has_position()) {
             let axis = (joint.kind != JointKind::Prismatic).then_some(joint.axis);
             let factor = one[index] - zero[index];
-            path.push(PathJoint { variable, joint: index, factor, child: below, axis, reach: 1.0 });
+            path.push(PathJoint {
+                variable,
+                joint: index,
+                factor,
+                frame: 0,
+                child: below,
+                axis,
+                reach: 1.0,
+            });
         }
         below = joint.parent;
     }

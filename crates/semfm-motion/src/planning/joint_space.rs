@@ -2,8 +2,6 @@
 
 use std::f64::consts::{PI, TAU};
 
-use rand::{Rng, RngExt};
-
 use crate::{Error, Result};
 
 /// By how much a value may pass a limit and still count as within, radians or metres: files round their numbers.
@@ -116,16 +114,6 @@ impl JointSpace {
                 },
             )
             .collect()
-    }
-
-    /// Joint values drawn evenly from the whole space; continuous joints from −π … π.
-    pub fn sample(&self, random: &mut impl Rng, q: &mut Vec<f64>) {
-        q.clear();
-        q.extend(self.joints.iter().map(|joint| {
-            let (lower, upper) =
-                if joint.is_continuous() { (-PI, PI) } else { (joint.lower, joint.upper) };
-            lower + (upper - lower) * random.random::<f64>()
-        }));
     }
 }
 

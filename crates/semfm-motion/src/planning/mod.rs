@@ -8,6 +8,7 @@ mod curve;
 mod edges;
 pub(crate) mod joint_space;
 mod rrt_connect;
+mod sample_window;
 mod shorten;
 #[cfg(test)]
 pub(crate) mod test_worlds;

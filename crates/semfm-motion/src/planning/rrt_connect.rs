@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::edges::edge_is_free;
 use super::joint_space::{JointSpace, between};
+use super::sample_window::SampleWindow;
 use super::tree::Tree;
 use super::validity::Validity;
 use crate::{Error, Result};
@@ -120,9 +121,10 @@ pub fn plan_path(
     for &goal in &free_goals {
         from_goals.add_root(&goals[goal]);
     }
+    let window = SampleWindow::new(space, start, free_goals.iter().map(|&goal| &goals[goal]));
     let mut sample = Vec::with_capacity(space.n_joints());
     for iteration in 1..=settings.iterations {
-        space.sample(&mut random, &mut sample);
+        window.sample(iteration - 1, &mut random, &mut sample);
         let start_grows = from_start.len() <= from_goals.len();
         let (growing, other) = if start_grows {
             (&mut from_start, &mut from_goals)
