@@ -41,7 +41,10 @@ impl Mug {
         let text = |name: &str| self.at(name).to_str().unwrap().to_owned();
         let mut arguments = vec!["grasp".to_owned(), text("mug.obj")];
         arguments.extend(["--region".into(), text("grip.json"), "-o".into(), text(output)]);
-        arguments.extend(["--gripper".into(), "franka".into(), "--samples".into(), "300".into()]);
+        arguments.extend(["--samples".into(), "300".into()]);
+        if !more.contains(&"--gripper") {
+            arguments.extend(["--gripper".into(), "franka".into()]);
+        }
         arguments.extend(more.iter().map(|&word| match word.strip_prefix('@') {
             Some(name) => text(name),
             None => word.to_owned(),

@@ -2,7 +2,9 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use semfm_align::{AlignSettings, Alignment, DepthImage, Error, ObservedCloud, Sim3, Verdict, align};
+use semfm_align::{
+    AlignSettings, Alignment, DepthImage, Error, ObservedCloud, Sim3, Verdict, align,
+};
 use semfm_geom::math::{DAffine3, DQuat, DVec3};
 use semfm_geom::sampling::sample_uniform;
 use semfm_geom::{Intrinsics, Mesh, Pinhole, SurfaceIndex, Task, zoo};

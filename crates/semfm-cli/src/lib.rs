@@ -15,8 +15,8 @@ use std::ffi::OsString;
 use clap::{Parser, Subcommand};
 
 use commands::{
-    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, frames, grasp, ik, info, plan,
-    region, remember, show, transfer, views,
+    NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, frames, grasp, ik, info,
+    plan, region, remember, show, transfer, views,
 };
 use options::Common;
 pub use process::own_process;

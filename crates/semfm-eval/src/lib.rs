@@ -53,8 +53,8 @@ pub use memory::{
     MEMORY_FORMAT, MemoryEvalSettings, MemoryResults, MemoryRow, MemorySummary, ScoredAnswer,
     run_memory,
 };
-pub use prepared_objects::PreparationSettings;
 pub use output_folder::OutputFolder;
+pub use prepared_objects::PreparationSettings;
 pub use report::ReportSettings;
 pub use results::{About, Results};
 pub use row::{AnchorRow, Failure, ObjectRow, Row, VlmDetails};

@@ -69,7 +69,7 @@ impl<'a> EmbeddedTriangles<'a> {
     }
 
     /// The nearest point of some triangles.
-    fn closest_among(&self, query: &[f64], reached: &mut Vec<Reached>) -> TrianglePoint {
+    fn closest_among(&self, query: &[f64], reached: &mut [Reached]) -> TrianglePoint {
         reached.sort_unstable_by(|a, b| a.at_least.total_cmp(&b.at_least).then(a.id.cmp(&b.id)));
         let mut best = TrianglePoint { square: f64::INFINITY, ..TrianglePoint::default() };
         for ball in reached.iter() {

@@ -154,7 +154,8 @@ fn ids_where(mask: &[bool], wanted: bool) -> Vec<u32> {
 /// Squared distance of each query to the nearest of the points, rows in one space.
 fn squares_to_nearest(queries: &Mat<f64>, points: &Mat<f64>) -> Vec<f64> {
     let nearest = nearest_rows(queries.as_ref(), points.as_ref());
-    let nearest = nearest.expect("features of a cloud are finite, and there is a point inside and one outside");
+    let nearest = nearest
+        .expect("features of a cloud are finite, and there is a point inside and one outside");
     let rows = nearest.iter().enumerate();
     rows.map(|(q, &p)| square(queries.row(q), points.row(p as usize))).collect()
 }
@@ -189,7 +190,8 @@ mod tests {
         ] {
             assert!(worse.probability(&weights) < sure.probability(&weights));
         }
-        let lost = Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0, likeness: None };
+        let lost =
+            Evidence { ambiguity: MOST_AMBIGUITY, margin: -0.1, round_trip: 0.0, likeness: None };
         assert_eq!(verdict(lost.probability(&weights)), Verdict::Refuse);
         assert!(probability_by_agreement(0.9) > 0.9 && probability_by_agreement(0.2) < 0.5);
     }

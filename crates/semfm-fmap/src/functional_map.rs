@@ -151,11 +151,12 @@ mod tests {
         for i in 0..20 {
             for j in 0..20 {
                 let expected = f64::from(u8::from(i == j));
-                assert!((map.matrix()[(i, j)] - expected).abs() < 1e-9, "C[{i}, {j}]");
+                // Eigenfunctions of a shape are rounded to f32.
+                assert!((map.matrix()[(i, j)] - expected).abs() < 1e-6, "C[{i}, {j}]");
             }
         }
         assert!(
-            map.orthogonality() < 1e-9 && map.commutativity(shape.basis(), shape.basis()) < 1e-9
+            map.orthogonality() < 1e-6 && map.commutativity(shape.basis(), shape.basis()) < 1e-6
         );
         assert_eq!(map.point_map(shape.basis(), shape.basis()).unwrap(), identity);
         assert_eq!(map.adjoint_point_map(shape.basis(), shape.basis()).unwrap(), identity);

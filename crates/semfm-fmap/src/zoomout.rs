@@ -254,8 +254,8 @@ fn check_vertices(what: &'static str, ids: &[u32], basis: &Eigenbasis) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faer::Mat;
     use crate::test_objects::{blob, shape};
+    use faer::Mat;
 
     /// Share of vertices that the map sends to themselves or to somewhere very near.
     fn right(map: &PointMap, shape: &semfm_geom::Shape) -> f64 {

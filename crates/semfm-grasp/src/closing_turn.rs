@@ -37,9 +37,8 @@ pub(crate) fn settle(view: &PadView, friction: f64, force: f64) -> Option<Settle
     let mut pressures = pressed(view, rotation, LOADS[0] * force)?;
     for load in LOADS {
         let mut last = DVec3::ZERO;
-        loop {
-            // What has turned away from under a pad is held as well as it was.
-            let Some(now) = pressed(view, rotation, load * force) else { break };
+        // What has turned away from under a pad is held as well as it was.
+        while let Some(now) = pressed(view, rotation, load * force) {
             pressures = now;
             let apart = pressures[0].centre - pressures[1].centre;
             let across = DVec3::new(apart.x, 0.0, apart.z);

@@ -48,11 +48,11 @@ pub use gripper_geometry::{BoxGripper, GripperExtents, GripperGeometry};
 pub use object::GraspObject;
 pub use rejection::{Miss, Reason, Rejected};
 pub use scene::{Scene, Table};
+pub use score_weights::{ScoreWeights, TERMS};
 /// A rotation and a translation, metres: the pose type of the whole crate.
 pub use semfm_robot::Pose;
-pub use working_surface::{SurfaceReport, SurfaceSettings};
-pub use score_weights::{ScoreWeights, TERMS};
 pub use settings::{ApproachCone, GraspSettings, Limits, Selection, Separation};
+pub use working_surface::{SurfaceReport, SurfaceSettings};
 
 #[cfg(test)]
 mod tests {

@@ -4,6 +4,12 @@
 //!
 //! `cargo run --release -p semfm-observe --example bench_contact [FOLDER OF OBJECTS]`
 
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "the numbers are what this program is for"
+)]
+
 mod capsule_hand;
 
 use std::path::{Path, PathBuf};
@@ -135,7 +141,7 @@ fn measure(mesh: &Mesh, scene: &GraspedObject, seed: u64) -> Outcome<Vec<(&'stat
     let middle = scene.hand.points().iter().sum::<DVec3>() / scene.hand.points().len() as f64;
     let mut rows = Vec::new();
     let any = direction(&mut random);
-    let ray = (middle - eye).normalize() * if seed % 2 == 0 { 1.0 } else { -1.0 };
+    let ray = (middle - eye).normalize() * if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
     for (row, by) in [
         ("no error", DVec3::ZERO),
         ("5 mm, any direction", 0.005 * any),

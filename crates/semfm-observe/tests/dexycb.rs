@@ -1,6 +1,8 @@
 //! The registered-depth trap on a real frame: `shared/data/rgbd/dexycb_frame` holds depth that was registered to the
 //! colour and the intrinsics of both cameras.
 
+#![allow(clippy::print_stdout, reason = "a skipped test says so")]
+
 use std::path::PathBuf;
 
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
@@ -62,7 +64,6 @@ fn the_depth_of_dexycb_is_found_to_lie_on_the_colour() {
             else {
                 continue;
             };
-            println!("label {id}: {found:?}");
             assert_ne!(found.grid, DepthGrid::Depth, "label {id}: {found:?}");
             n_decided += usize::from(found.grid == DepthGrid::Color);
         }
@@ -84,6 +85,5 @@ fn the_wrong_intrinsics_put_the_bottle_elsewhere() {
         points.iter().sum::<DVec3>() / points.len() as f64
     };
     let off = mean(&color()).distance(mean(&depth_camera()));
-    println!("off by {:.1} mm", 1e3 * off);
     assert!((0.012..0.03).contains(&off), "{off}");
 }

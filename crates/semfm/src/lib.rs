@@ -83,7 +83,9 @@ pub use fmap::{
 pub use geom::{Mesh, Task};
 pub use grasp::find_grasps;
 pub use grasp_plan::{GraspPlan, PlanObject, PlanRequest, plan};
-pub use grasp_request::{GraspProblem, GraspRequest, Obstacle, MOST_POSE_MARGIN, POINT_MARGIN, Table};
+pub use grasp_request::{
+    GraspProblem, GraspRequest, MOST_POSE_MARGIN, Obstacle, POINT_MARGIN, Table,
+};
 pub use grasp_result::{AnswerFrame, GraspResult};
 pub use motion_scene::{
     FingerJoint, FrameOwner, MotionFrame, MotionObject, MotionObstacle, MotionRobot, MotionScene,

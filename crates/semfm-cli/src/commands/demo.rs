@@ -89,7 +89,8 @@ impl DemoCommand {
         let arm = DemoArm::write(&self.output, &target_mesh.mesh, scale)?;
         let gripper = arm.urdf.display().to_string();
         let grasps = GraspOptions::at_scale(scale).prepare(&gripper, self.seed, for_grasps)?;
-        let motion = arm.options().prepare(&arm.urdf, &[], &[arm.scene.clone()], self.seed)?;
+        let motion =
+            arm.options().prepare(&arm.urdf, &[], std::slice::from_ref(&arm.scene), self.seed)?;
 
         let (prepared_source, prepared_target) = match &encoded {
             Some(pair) => (

@@ -96,7 +96,7 @@ impl FramesCommand {
                 }
                 all
             }
-            None => vec![self.from_files()?],
+            None => vec![self.observation_of_files()?],
         };
         let is_bag = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
         if is_bag {
@@ -131,7 +131,7 @@ impl FramesCommand {
         Ok(SourceSettings { bag, every: self.every, most: self.most })
     }
 
-    fn from_files(&self) -> Result<Observation> {
+    fn observation_of_files(&self) -> Result<Observation> {
         let calibration = self.intrinsics.clone().context("--intrinsics is needed")?;
         let pose = self.pose.as_deref().map(|path| read_rigid_pose(path, "camera_from_world"));
         let pose = pose.transpose()?.map(|pose| {

@@ -16,9 +16,8 @@ use crate::options::Common;
 
 /// Preparation and matching for a memory: those of the default method.
 pub fn settings(no_cache: bool, seed: u64) -> PipelineSettings {
-    let mut settings = PipelineSettings::default();
-    settings.cache = if no_cache { ShapeCache::off() } else { ShapeCache::of_user() };
-    settings.with_seed(seed)
+    let cache = if no_cache { ShapeCache::off() } else { ShapeCache::of_user() };
+    PipelineSettings { cache, ..PipelineSettings::default() }.with_seed(seed)
 }
 
 /// The embeddings of an object of a memory: those in `file`; else made by the encoder of `options`, or by the

@@ -85,8 +85,8 @@ pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
 pub use scene::{
-    BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord,
-    SceneFile, SphereRecord, TablePlaneRecord, read_scene,
+    BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord, SceneFile,
+    SphereRecord, TablePlaneRecord, read_scene,
 };
 pub use stored_transfer::StoredTransfer;
 pub use trajectory::{

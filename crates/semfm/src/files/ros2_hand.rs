@@ -25,10 +25,16 @@ pub(super) fn hand_markers(hand: &MountedHand, frames: &[MotionFrame]) -> Vec<u8
         cdr.header(0, frame.map_or("", |frame| &frame.name));
         cdr.string(&hand.name);
         // Neither numbers of markers nor kinds are negative, so that their bits are those of unsigned ones.
-        [u32::try_from(i).unwrap_or(u32::MAX), TRIANGLE_LIST, ADD].map(|number| cdr.u32(number));
+        for number in [u32::try_from(i).unwrap_or(u32::MAX), TRIANGLE_LIST, ADD] {
+            cdr.u32(number);
+        }
         cdr.pose(DVec3::ZERO, DQuat::IDENTITY);
-        [1.0; 3].map(|scale| cdr.f64(scale));
-        COLOR.map(|channel| cdr.f32(channel));
+        for scale in [1.0; 3] {
+            cdr.f64(scale);
+        }
+        for channel in COLOR {
+            cdr.f32(channel);
+        }
         cdr.time(0); // lifetime: for ever
         cdr.bool(true); // locked to its frame
         let corners = triangles(part);
