@@ -29,9 +29,6 @@ const MOST_PAIRS: usize = 4;
 /// Share of half the pad's length by which the contacts may lie off its middle.
 const OFF_CENTRE: f64 = 0.7;
 
-/// Pads longer than this, metres, also hold with their tips alone: what is short to hold on leaves no room for all of one.
-const LONG_PAD: f64 = 0.03;
-
 /// The part of a pad's length that is its tip.
 const TIP: f64 = 0.3;
 
@@ -48,7 +45,7 @@ pub(crate) fn antipodal(
     rng: &mut impl Rng,
     out: &mut Vec<Candidate>,
 ) {
-    let Surface::Mesh { normals, .. } = &object.touched().surface else { return };
+    let Surface::Mesh { normals, .. } = object.surface() else { return };
     if seed.normal == DVec3::ZERO {
         return;
     }
@@ -104,7 +101,7 @@ fn pair(
         let share = rng.random::<f64>();
         let off = match k % 4 {
             0 | 2 => 0.0,
-            1 if gripper.pad()[1] > LONG_PAD => -0.5 + TIP * (0.2 + 0.8 * share),
+            1 if gripper.has_long_pads() => -0.5 + TIP * (0.2 + 0.8 * share),
             _ => OFF_CENTRE * (share - 0.5),
         };
         let place = middle + approach * (off * gripper.pad()[1]);

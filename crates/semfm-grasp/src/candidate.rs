@@ -6,7 +6,7 @@ use semfm_geom::math::{DMat3, DVec3};
 /// Where the gripper might go, before anybody has checked it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
-    /// object_from_tcp; the place along y is settled when the pads close.
+    /// object_from_tcp; the place along y is found when the pads close.
     pub(crate) tcp: Pose,
     /// An interval along the TCP's y axis that the grasp is to hold, metres.
     pub(crate) seed: [f64; 2],

@@ -17,9 +17,9 @@ const STEP: f64 = 0.0087; // half a degree
 /// Beyond this the object is no longer the one that was grasped, radians.
 const MOST: f64 = 0.7;
 
-/// The object between closing pads, at rest in the end.
+/// The object between pads that have closed, where friction holds it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Settled {
+pub(crate) struct TurnedObject {
     /// Angle by which it has turned, radians in [0, [`MOST`]].
     pub(crate) turn: f64,
     /// The pressure of each pad then, at the full force.
@@ -32,7 +32,7 @@ pub(crate) struct Settled {
 /// across that axis they turn the object; friction in both contacts holds it where d ≤ μ w, with `w` the
 /// distance of the centres along the axis (both forces then lie in both friction cones, Nguyen 1988). Inertia
 /// and weight are left out. `None` where a pad has nothing before it.
-pub(crate) fn settle(view: &PadView, friction: f64, force: f64) -> Option<Settled> {
+pub(crate) fn turn_until_held(view: &PadView, friction: f64, force: f64) -> Option<TurnedObject> {
     let mut rotation = Rotation::IDENTITY;
     let mut pressures = pressed(view, rotation, LOADS[0] * force)?;
     for load in LOADS {
@@ -54,7 +54,7 @@ pub(crate) fn settle(view: &PadView, friction: f64, force: f64) -> Option<Settle
             rotation = DQuat::from_axis_angle(axis, STEP) * rotation;
         }
     }
-    Some(Settled { turn: angle(rotation), pressures })
+    Some(TurnedObject { turn: angle(rotation), pressures })
 }
 
 /// The pressures on the object turned about the TCP.
@@ -87,14 +87,14 @@ mod tests {
     #[test]
     fn a_block_stays_and_a_turned_block_turns_until_it_lies_flat() {
         let block = view(|_| -0.01, |_| 0.01);
-        assert_eq!(settle(&block, 0.5, 30.0).unwrap().turn, 0.0);
+        assert_eq!(turn_until_held(&block, 0.5, 30.0).unwrap().turn, 0.0);
         // A bar of 2 cm, askew by 8°: its corners' contacts lie 18 mm apart, more than μ w = 10 mm.
         let slope = 8f64.to_radians().tan();
         let askew = view(|x| -0.01 + slope * x, |x| 0.01 + slope * x);
-        let settled = settle(&askew, 0.5, 30.0).unwrap();
-        assert!((4f64.to_radians()..=8.5f64.to_radians()).contains(&settled.turn), "{settled:?}");
+        let turned = turn_until_held(&askew, 0.5, 30.0).unwrap();
+        assert!((4f64.to_radians()..=8.5f64.to_radians()).contains(&turned.turn), "{turned:?}");
         // More friction holds it earlier.
-        assert!(settle(&askew, 2.0, 30.0).unwrap().turn < settled.turn);
+        assert!(turn_until_held(&askew, 2.0, 30.0).unwrap().turn < turned.turn);
     }
 
     #[test]
@@ -103,17 +103,17 @@ mod tests {
         let slope = 3f64.to_radians().tan();
         let plate =
             view(|x| -1e-3 + slope * x, |x| 1e-3 + slope * x + if x > 6e-3 { 2e-4 } else { 0.0 });
-        let settled = settle(&plate, 0.5, 30.0).unwrap();
-        assert!(settled.turn < 5f64.to_radians(), "{settled:?}");
+        let turned = turn_until_held(&plate, 0.5, 30.0).unwrap();
+        assert!(turned.turn < 5f64.to_radians(), "{turned:?}");
     }
 
     #[test]
     fn a_cylinder_across_the_pads_does_not_turn() {
         let y = |x: f64| (0.02f64.powi(2) - x * x).sqrt();
-        let settled = settle(&view(|x| -y(x), y), 0.3, 30.0).unwrap();
-        assert_eq!(settled.turn, 0.0);
-        assert!(settled.pressures[0].area < 0.5 * 0.018 * 0.018);
+        let turned = turn_until_held(&view(|x| -y(x), y), 0.3, 30.0).unwrap();
+        assert_eq!(turned.turn, 0.0);
+        assert!(turned.pressures[0].area < 0.5 * 0.018 * 0.018);
         let nothing = PadView { points: [Vec::new(), Vec::new()], ..view(|_| 0.0, |_| 0.0) };
-        assert!(settle(&nothing, 0.3, 30.0).is_none());
+        assert!(turn_until_held(&nothing, 0.3, 30.0).is_none());
     }
 }

@@ -59,7 +59,7 @@ struct Piece {
     cut: bool,
     /// Whether `low` and `high` are those of the part inside; else they enclose them. Cutting is most of the work,
     /// and what lies within the held stretch as a whole need not be cut to know that.
-    settled: bool,
+    is_exact: bool,
     low: f64,
     high: f64,
 }
@@ -164,7 +164,7 @@ impl Prism {
             }
             let cut = (high.cmpgt(self.half) | low.cmplt(-self.half)).any();
             let (low, high) = (low.y.max(-self.half.y), high.y.min(self.half.y));
-            pieces.push(Piece { corners, item, cut, settled: !cut, low, high });
+            pieces.push(Piece { corners, item, cut, is_exact: !cut, low, high });
         }
         pieces
     }
@@ -175,7 +175,7 @@ impl Prism {
         for mut piece in self.pieces(body) {
             let end = |piece: &Piece| if side < 0.0 { -piece.low } else { piece.high };
             if most.is_none_or(|most| end(&piece) > most) {
-                self.settle(&mut piece);
+                self.cut_piece(&mut piece);
                 if piece.low <= piece.high && most.is_none_or(|most| end(&piece) > most) {
                     most = Some(end(&piece));
                 }
@@ -185,10 +185,10 @@ impl Prism {
     }
 
     /// Cuts a piece, so that its extent is that of the part inside: empty (low above high) where there is none.
-    fn settle(&self, piece: &mut Piece) {
-        if !piece.settled {
+    fn cut_piece(&self, piece: &mut Piece) {
+        if !piece.is_exact {
             [piece.low, piece.high] = self.extent(piece.corners, [piece.low, piece.high]);
-            piece.settled = true;
+            piece.is_exact = true;
         }
     }
 
@@ -229,7 +229,7 @@ impl Prism {
                 if is_within || !is_near(piece) {
                     continue;
                 }
-                self.settle(piece);
+                self.cut_piece(piece);
                 if is_near(piece) {
                     held = [held[0].min(piece.low), held[1].max(piece.high)];
                 }
@@ -244,13 +244,13 @@ impl Prism {
     fn extent_near(&self, pieces: &mut [Piece], half: f64) -> Option<[f64; 2]> {
         let reaches_in = |piece: &Piece| piece.low <= half && piece.high >= -half;
         let mut held = [f64::INFINITY, f64::NEG_INFINITY];
-        for settled in [true, false] {
-            for piece in pieces.iter_mut().filter(|piece| piece.settled == settled) {
+        for is_exact in [true, false] {
+            for piece in pieces.iter_mut().filter(|piece| piece.is_exact == is_exact) {
                 let is_within = piece.low >= held[0] && piece.high <= held[1];
                 if is_within || !reaches_in(piece) {
                     continue;
                 }
-                self.settle(piece);
+                self.cut_piece(piece);
                 if reaches_in(piece) {
                     held = [held[0].min(piece.low), held[1].max(piece.high)];
                 }

@@ -29,8 +29,7 @@ const INITIAL_BITE: f64 = 0.3;
 /// ... but at most this, metres: the tips of long pads hold, too.
 const LONGEST_BITE: f64 = 6e-3;
 
-/// Pads longer than this, metres, are also tried with their tips alone, this deep.
-const LONG_PAD: f64 = 0.03;
+/// How deep the tips of long pads hold, metres.
 const TIP_BITE: f64 = 0.012;
 
 /// Placements of the gripper along its closing axis, over the width of its opening.
@@ -164,7 +163,7 @@ impl<'a> Gpg<'a> {
             let shallow = (front + (reach.tip + self.gripper.pad()[1] / 2.0)).min(tip);
             let deeper = tip - shallow > bite;
             let tips = front + TIP_BITE;
-            let with_tips = self.gripper.pad()[1] > LONG_PAD && tip.min(shallow) - tips > bite;
+            let with_tips = self.gripper.has_long_pads() && tip.min(shallow) - tips > bite;
             let depths = [Some(tip), deeper.then_some(shallow), with_tips.then_some(tips)];
             for tip in depths.into_iter().flatten() {
                 let middle = tip - reach.tip;

@@ -3,8 +3,10 @@
 use parry3d_f64::math::Pose;
 use semfm_geom::math::DVec3;
 
+use crate::settings::PAD_COMPLIANCE;
+
 /// How far beyond its contact each pad is told to go, metres: the depth within which pads give way.
-const PRESS: f64 = 1.5e-3;
+const PRESS: f64 = PAD_COMPLIANCE;
 
 /// One parallel-jaw grasp of an object.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,6 +12,10 @@ use crate::solid::Convex;
 use crate::{Error, Result};
 use semfm_robot::{Gripper, MAX_SPAN, Role};
 
+/// Pads longer than this, metres, also hold with their tips alone: what is short to hold on leaves no room for all of
+/// one.
+const LONG_PAD: f64 = 0.03;
+
 type Motion = Arc<dyn Fn(f64) -> Vec<Pose> + Send + Sync>;
 
 /// A parallel-jaw gripper prepared once and asked often, from any thread.
@@ -51,7 +55,7 @@ pub struct GripperExtents {
 
 /// A gripper of three boxes, by its dimensions in metres: the simplest gripper that grasps.
 ///
-/// The default has the dimensions of the Franka gripper.
+/// The default has the dimensions of the Franka Hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxGripper {
     /// Distances between the pads.
@@ -171,6 +175,11 @@ impl GripperGeometry {
     /// The pads' rectangle: extent along x and along z, metres.
     pub fn pad(&self) -> [f64; 2] {
         self.pad
+    }
+
+    /// Whether the pads are so long that their tips alone are tried, too.
+    pub(crate) fn has_long_pads(&self) -> bool {
+        self.pad[1] > LONG_PAD
     }
 
     /// Lengths of the open gripper.

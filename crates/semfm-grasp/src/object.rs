@@ -195,7 +195,8 @@ impl GraspObject {
         self.report
     }
 
-    /// Centre of the volume where the mesh is watertight, otherwise of the area, or of the points.
+    /// Centre of the volume where the mesh is watertight, otherwise of the area, or of the points; in the object's
+    /// frame, metres.
     pub fn centre_of_mass(&self) -> DVec3 {
         self.centre_of_mass
     }
@@ -340,7 +341,7 @@ impl Region {
             .map(|working| working.to_given.iter().map(|&id| weights[id as usize]).collect());
         let touched = working.as_ref().unwrap_or(&weights);
         let mut total = 0.0;
-        let mut cumulative: Vec<f64> = match &object.touched().surface {
+        let mut cumulative: Vec<f64> = match object.surface() {
             Surface::Mesh { mesh, .. } => (0..mesh.n_faces())
                 .map(|face| {
                     let mean = mesh.faces()[face].iter().map(|&v| touched[v as usize]).sum::<f64>();
@@ -376,7 +377,7 @@ impl Region {
         let pick = rng.random::<f64>() * total;
         let item = self.cumulative.partition_point(|&sum| sum <= pick);
         let item = item.min(self.cumulative.len() - 1);
-        match &object.touched().surface {
+        match object.surface() {
             Surface::Mesh { mesh, normals } => {
                 let [a, b, c] = mesh.corners(item);
                 let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());

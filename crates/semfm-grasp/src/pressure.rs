@@ -1,7 +1,5 @@
 //! How the force of a grip is spread over a pad.
 
-use std::cmp::Ordering;
-
 use semfm_geom::math::DVec3;
 
 /// Stiffness of a pad, N/m³: rubber of 1.5 MPa, 3 mm thick; 30 N press a full pad of 18 mm in by .2 mm.
@@ -33,7 +31,7 @@ impl Pressure {
         // Heights above the first point: the pad moves against rising -side · y.
         let height = |p: &DVec3| -side * p.y;
         let mut heights: Vec<f64> = points.iter().map(height).collect();
-        heights.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+        heights.sort_by(f64::total_cmp);
         let first = *heights.first()?;
         let stop = stop(&heights, force / (FOUNDATION * cell_area));
         let pressed = || points.iter().map(|p| (p, stop - height(p))).filter(|(_, d)| *d > 0.0);

@@ -8,7 +8,6 @@ use crate::Result;
 use crate::candidate::Candidate;
 use crate::grasp::Grasp;
 use crate::neighbours::steps;
-use crate::rejection::Rejected;
 use crate::search::{Found, Near, Search};
 use crate::select::suppress;
 use crate::settings::Separation;
@@ -101,42 +100,5 @@ impl Search<'_> {
         }
         exact.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(Found { kept: exact, n_survivors, sampled })
-    }
-}
-
-/// The stage that kept most candidates from being grasps: of those that reached it, it let the smallest share through.
-///
-/// Each share is that of one more than passed, so that the last stage, which passes none where nothing is found,
-/// counts for little where few came so far.
-pub(crate) fn main_reason(rejected: &Rejected, n_candidates: usize) -> Option<crate::Reason> {
-    let mut reached = n_candidates;
-    let mut main = None;
-    for (reason, count) in rejected.iter() {
-        let passed = reached.saturating_sub(count);
-        let share = (passed + 1) as f64 / (reached + 1) as f64;
-        if main.is_none_or(|(_, least)| share < least) {
-            main = Some((reason, share));
-        }
-        reached = passed;
-    }
-    main.map(|(reason, _)| reason)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Reason;
-
-    #[test]
-    fn the_main_reason_is_what_keeps_most_back() {
-        let counts = |rows: &[(Reason, usize)]| rows.iter().copied().collect::<Rejected>();
-        // Too thick, but ten that a gripper could span run into the object.
-        let thick =
-            counts(&[(Reason::ForceClosure, 6000), (Reason::Width, 3990), (Reason::Collision, 10)]);
-        assert_eq!(main_reason(&thick, 10_000), Some(Reason::Width));
-        // Good grasps all of them, but for what is asked last.
-        let near = counts(&[(Reason::ForceClosure, 9000), (Reason::Clearance, 1000)]);
-        assert_eq!(main_reason(&near, 10_000), Some(Reason::Clearance));
-        assert_eq!(main_reason(&Rejected::default(), 0), None);
     }
 }

@@ -98,9 +98,7 @@ impl Reason {
             Self::Clearance => "the open gripper is nearer to something than asked",
         }
     }
-}
 
-impl Reason {
     /// Names of the options (of the settings, of Python's `find_grasps`, with `-` for `_` of the shell) that would
     /// change it, the likeliest first.
     pub fn options(self) -> &'static [&'static str] {
@@ -201,6 +199,25 @@ impl Rejected {
         Reason::ALL.into_iter().map(|reason| (reason, self.count(reason))).filter(|row| row.1 > 0)
     }
 
+    /// The stage that kept most candidates from being grasps: of those that reached it, it let the smallest share
+    /// through. `None` where nothing was refused.
+    ///
+    /// Each share is that of one more than passed, so that the last stage, which passes none where nothing is found,
+    /// counts for little where few came so far.
+    pub(crate) fn main_reason(&self, n_candidates: usize) -> Option<Reason> {
+        let mut reached = n_candidates;
+        let mut main = None;
+        for (reason, count) in self.iter() {
+            let passed = reached.saturating_sub(count);
+            let share = (passed + 1) as f64 / (reached + 1) as f64;
+            if main.is_none_or(|(_, least)| share < least) {
+                main = Some((reason, share));
+            }
+            reached = passed;
+        }
+        main.map(|(reason, _)| reason)
+    }
+
     pub(crate) fn add(&mut self, reason: Reason, n: usize) {
         self.counts[reason as usize] += n;
     }
@@ -237,5 +254,18 @@ mod tests {
         counts.merge(&counts.clone());
         assert_eq!(counts.iter().collect::<Vec<_>>(), [(Reason::Width, 2)]);
         assert_eq!(counts.total(), 2);
+    }
+
+    #[test]
+    fn the_main_reason_is_what_keeps_most_back() {
+        let counts = |rows: &[(Reason, usize)]| rows.iter().copied().collect::<Rejected>();
+        // Too thick, but ten that a gripper could span run into the object.
+        let thick =
+            counts(&[(Reason::ForceClosure, 6000), (Reason::Width, 3990), (Reason::Collision, 10)]);
+        assert_eq!(thick.main_reason(10_000), Some(Reason::Width));
+        // Good grasps all of them, but for what is asked last.
+        let near = counts(&[(Reason::ForceClosure, 9000), (Reason::Clearance, 1000)]);
+        assert_eq!(near.main_reason(10_000), Some(Reason::Clearance));
+        assert_eq!(Rejected::default().main_reason(0), None);
     }
 }

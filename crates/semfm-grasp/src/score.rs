@@ -2,7 +2,7 @@
 
 use semfm_geom::math::DVec3;
 
-use crate::closing_turn::{Settled, settle};
+use crate::closing_turn::{TurnedObject, turn_until_held};
 use crate::collision::{FAR, Fit};
 use crate::contact::{Closing, Patch};
 use crate::force_closure::{SoftContact, ferrari_canny};
@@ -95,18 +95,18 @@ impl<'a> Scorer<'a> {
         });
         let epsilon = ferrari_canny(&contacts, friction, self.object.radius());
         let arm = com - left.contact.midpoint(right.contact);
-        let settled = self.settled(closing);
+        let turned = self.turned(closing);
         let mut terms = vec![
             ("contact", self.pad_share(closing) / FULL_CONTACT),
             ("friction", 1.0 - angle / friction.atan()),
             ("epsilon", epsilon / self.best_epsilon.max(1e-12)),
-            ("gravity", self.share_of_torque(&settled, self.turning_arm(closing, arm))),
+            ("gravity", self.share_of_torque(&turned, self.turning_arm(closing, arm))),
             ("weight", self.share_of_force()),
             ("lever", 1.0 - arm.length() / self.object.radius()),
             ("bite", self.bite(left).min(self.bite(right))),
-            ("evenness", self.evenness(&settled)),
-            ("centred", self.centred(&settled)),
-            ("closing", 1.0 - settled.turn / FULL_TURN),
+            ("evenness", self.evenness(&turned)),
+            ("centred", self.centred(&turned)),
+            ("closing", 1.0 - turned.turn / FULL_TURN),
             ("clearance", fit.clearance / FAR),
             ("region", left.region.midpoint(right.region)),
         ];
@@ -121,26 +121,26 @@ impl<'a> Scorer<'a> {
             score: hold * weights.preference(&terms),
             hold: self.settings.mass.map(|_| hold),
             epsilon,
-            closing_turn: settled.turn,
+            closing_turn: turned.turn,
             terms,
         }
     }
 
     /// The object at rest between the pads; where a pad meets less than a cell of its grid, it meets a point.
-    fn settled(&self, closing: &Closing) -> Settled {
+    fn turned(&self, closing: &Closing) -> TurnedObject {
         let view = PadView::new(self.object, self.gripper, closing);
         let GraspSettings { friction, grip_force, .. } = *self.settings;
-        settle(&view, friction, grip_force).unwrap_or_else(|| {
+        turn_until_held(&view, friction, grip_force).unwrap_or_else(|| {
             let points = closing.patches.map(|patch| closing.tcp.inverse() * patch.contact);
             let pressures = points.map(|point| Pressure::of_point(point, view.cell_area));
-            Settled { turn: 0.0, pressures }
+            TurnedObject { turn: 0.0, pressures }
         })
     }
 
     /// The torque that both pads can hold about the closing axis, against that and the torque of the load on an
     /// arm of `arm` metres.
-    fn share_of_torque(&self, settled: &Settled, arm: f64) -> f64 {
-        let [one, other] = settled.pressures;
+    fn share_of_torque(&self, turned: &TurnedObject, arm: f64) -> f64 {
+        let [one, other] = turned.pressures;
         let GraspSettings { friction, grip_force, .. } = self.settings;
         let held = friction * grip_force * (one.radius + other.radius);
         held / (held + self.load() * arm)
@@ -158,17 +158,17 @@ impl<'a> Scorer<'a> {
     }
 
     /// How evenly the less even pad is pressed: the area of an even pressure against the pad's.
-    fn evenness(&self, settled: &Settled) -> f64 {
-        let least = settled.pressures.iter().map(|p| p.area).fold(f64::INFINITY, f64::min);
+    fn evenness(&self, turned: &TurnedObject) -> f64 {
+        let least = turned.pressures.iter().map(|p| p.area).fold(f64::INFINITY, f64::min);
         least / (self.pad[0] * self.pad[1])
     }
 
     /// How far from the pads' rims the forces act: a hand that comes a little beside still meets the object.
-    fn centred(&self, settled: &Settled) -> f64 {
+    fn centred(&self, turned: &TurnedObject) -> f64 {
         let off = |p: &Pressure| {
             (2.0 * p.centre.x.abs() / self.pad[0]).max(2.0 * p.centre.z.abs() / self.pad[1])
         };
-        1.0 - settled.pressures.iter().map(off).fold(0.0, f64::max)
+        1.0 - turned.pressures.iter().map(off).fold(0.0, f64::max)
     }
 
     /// Share of the pad's length that a patch fills.

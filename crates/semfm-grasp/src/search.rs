@@ -22,7 +22,6 @@ use crate::grasp::Grasp;
 use crate::gripper_geometry::GripperGeometry;
 use crate::neighbours::neighbours;
 use crate::object::{Body, GraspObject, Region, Surface};
-use crate::refine::main_reason;
 use crate::rejection::{Miss, Reason, Refusal, Rejected};
 use crate::scene::Scene;
 use crate::score::Scorer;
@@ -341,8 +340,8 @@ impl Sampled {
 
     /// Of the candidates refused for the main reason the one that missed by least.
     pub(crate) fn nearest(&mut self) -> Option<Near> {
-        let main = main_reason(&self.rejected, self.n_candidates)?;
-        // Seeds without any candidate have the reason but no pose: the next that came far speaks for them.
+        let main = self.rejected.main_reason(self.n_candidates)?;
+        // Seeds without any candidate have the reason but no pose: the nearest of the latest stage with one is returned then.
         let of_main = self.nearest[main as usize].take();
         of_main.or_else(|| self.nearest.iter_mut().rev().find_map(Option::take))
     }

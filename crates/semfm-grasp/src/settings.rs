@@ -7,8 +7,11 @@ use semfm_geom::math::DVec3;
 use crate::score_weights::ScoreWeights;
 use crate::{Error, Result};
 
-/// Settings of [`find_grasps`](crate::find_grasps); the default fits grippers and objects of the size
-/// of a human gripper.
+/// Depth within which pads give way unless [`GraspSettings::compliance`] says otherwise, metres.
+pub(crate) const PAD_COMPLIANCE: f64 = 1.5e-3;
+
+/// Settings of [`find_grasps`](crate::find_grasps); the default fits grippers and objects of a size
+/// that a human hand holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraspSettings {
     /// Surface points from which candidates are grown; each gives some twenty.
@@ -107,7 +110,7 @@ impl Default for GraspSettings {
             friction: 0.5,
             grip_force: 30.0,
             mass: None,
-            compliance: 1.5e-3,
+            compliance: PAD_COMPLIANCE,
             retreat: 0.1,
             top: 20,
             diversity: 0.1,

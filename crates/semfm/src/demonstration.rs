@@ -83,7 +83,7 @@ fn far_contact(mesh: &Mesh, surface: &SurfaceIndex, contact: DVec3, distance: f6
 
 /// How far behind the visible surface a vertex may lie and still be seen, as a share of the
 /// bounding-sphere radius. Less loses vertices at grazing angles, more paints through thin walls.
-const SIGHT_TOLERANCE: f64 = 0.01;
+const OCCLUSION_TOLERANCE: f64 = 0.01;
 
 /// All vertices that `camera` sees inside `mask` (height × width, row-major).
 ///
@@ -96,7 +96,7 @@ pub fn region_under_mask(mesh: &Mesh, camera: &Pinhole, mask: &[bool]) -> Result
         return Err(Error::invalid("mask", expected, format!("{} pixels", mask.len())));
     }
     let surface = SurfaceIndex::new(mesh)?;
-    let margin = SIGHT_TOLERANCE * mesh.bounding_sphere().1;
+    let margin = OCCLUSION_TOLERANCE * mesh.bounding_sphere().1;
     let eye = camera.eye();
     let inside: Vec<bool> = mesh
         .vertices()

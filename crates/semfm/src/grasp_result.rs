@@ -7,7 +7,7 @@
 use parry3d_f64::math::Pose;
 use semfm_geom::Mesh;
 use semfm_geom::math::{DQuat, DVec3};
-use semfm_grasp::Grasps;
+use semfm_grasp::{Grasp, Grasps};
 use semfm_robot::Gripper;
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +59,12 @@ impl GraspResult<'_> {
     pub fn size_to_opening(&self) -> f64 {
         let shortest = self.size().sides.into_iter().fold(f64::INFINITY, f64::min);
         shortest / self.gripper.opening.end()
+    }
+
+    /// What a hand that stops at a force is told for a grasp, metres: [`Grasp::command_width`], but no less than the
+    /// gripper can close to.
+    pub fn command_width(&self, grasp: &Grasp) -> f64 {
+        grasp.command_width().max(*self.gripper.opening.start())
     }
 
     /// The frame that poses are given in.

@@ -176,9 +176,9 @@ mod tests {
     use super::*;
 
     /// A torso that a mimic of the elbow turns, an arm on it whose base is the torso, a slide, a side branch.
-    const URDF: &str = r#"<robot name="r"><link name="floor"/><link name="torso"/><link name="a"/><link name="b"/>
+    const URDF: &str = r#"<robot name="r"><link name="ground"/><link name="torso"/><link name="a"/><link name="b"/>
         <link name="c"/><link name="tip"/><link name="side"/>
-        <joint name="waist" type="revolute"><parent link="floor"/><child link="torso"/><origin xyz="0 0.1 0.5" rpy="0.3 0 0.2"/>
+        <joint name="waist" type="revolute"><parent link="ground"/><child link="torso"/><origin xyz="0 0.1 0.5" rpy="0.3 0 0.2"/>
           <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/><mimic joint="elbow" multiplier="-0.5" offset="0.2"/></joint>
         <joint name="shoulder" type="continuous"><parent link="torso"/><child link="a"/><origin xyz="0.2 0 0.1" rpy="0 1 0"/><axis xyz="0.6 0 0.8"/></joint>
         <joint name="fix" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0.3 0" rpy="0.1 0.2 0.3"/></joint>
@@ -190,9 +190,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn links_are_where_the_arm_has_them(q in prop::array::uniform3(-2.0..2.0_f64), from_floor in any::<bool>()) {
+        fn links_are_where_the_arm_has_them(q in prop::array::uniform3(-2.0..2.0_f64), from_ground in any::<bool>()) {
             let robot = RobotDescription::parse(URDF.as_bytes(), Path::new("r.urdf")).unwrap().tree().unwrap();
-            let base = if from_floor { "floor" } else { "torso" };
+            let base = if from_ground { "ground" } else { "torso" };
             let settings = ArmSettings { base: Some(base.into()), tip: Some("tip".into()), ..Default::default() };
             let arm = Arm::new(Arc::new(robot), &settings).unwrap();
             let q = &q[..arm.n_joints()];

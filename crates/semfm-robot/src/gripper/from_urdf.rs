@@ -27,7 +27,7 @@ const TOUCH: f64 = 1e-9;
 /// A known hand's opening that differs by more is another, metres.
 const OTHER_OPENING: f64 = 2e-3;
 
-/// Pads that differ by less are the same.
+/// Pads whose sides differ by less than this share are the same.
 const SAME_PAD: f64 = 0.02;
 
 /// Shapes for collisions of a known hand's pads are larger than the pads by at most this share.

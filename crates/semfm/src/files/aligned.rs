@@ -197,7 +197,8 @@ impl AlignedPose {
 
     /// How far (metres) points of the mesh's surface may stand from where the pose puts them, one standard deviation:
     ///
-    /// > √(position² + (rotation · r)² + (scale_std · r / scale)²), r the distance of the farthest vertex from the middle
+    /// > √(position² + (rotation · r)² + (scale_std · r / scale)²), r (metres) the distance of the farthest vertex
+    /// > from the middle
     ///
     /// What the file does not say counts as certain.
     pub fn uncertainty(&self, mesh: &Mesh) -> f64 {

@@ -308,7 +308,8 @@ impl GraspsFile {
     ///
     /// # Errors
     /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format,
-    /// [`Error::Format`](crate::Error::Format) for another mesh or a scale that is not positive.
+    /// [`Error::Format`](crate::Error::Format) for another format, another mesh or a scale that is not
+    /// positive.
     pub fn read(path: &Path, mesh: &Mesh) -> Result<Self> {
         let file = Self::read_alone(path)?;
         file.mesh.check(mesh).map_err(|error| error.in_file(path))?;
@@ -365,7 +366,7 @@ impl GraspRecord {
             quaternion_xyzw: rotation.to_array(),
             width: grasp.width,
             contact_width: Some(grasp.contact_width()),
-            command_width: Some(grasp.command_width().max(*gripper.opening.start())),
+            command_width: Some(result.command_width(grasp)),
             opening: grasp.opening,
             contact_frame: AnswerFrame::Object,
             contacts: grasp.contacts.map(|point| point.to_array()),

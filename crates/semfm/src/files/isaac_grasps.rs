@@ -43,7 +43,7 @@ fn isaac_yaml(result: &GraspResult<'_>) -> String {
         let xyz = list([q.x, q.y, q.z]);
         let _ = writeln!(text, "    orientation: {{w: {}, xyz: {xyz}}}", number(q.w));
         for (name, width) in [
-            ("cspace_position", grasp.command_width()),
+            ("cspace_position", result.command_width(grasp)),
             ("pregrasp_cspace_position", grasp.opening),
         ] {
             let joints = result.gripper.joints_at(width);

@@ -94,6 +94,7 @@ impl MemoryFile {
     /// # Errors
     /// [`semfm_geom::Error::Io`].
     pub fn write(&self, path: &Path) -> Result<()> {
+        // Not the `write_json` of these files, which refuses to replace what was read: a memory is changed in place.
         Ok(semfm_geom::io::write_json(path, &self.to_json())?)
     }
 

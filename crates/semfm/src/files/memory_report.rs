@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use semfm_fmap::fusion::Trust;
 use semfm_fmap::{Evidence, Stages};
-use semfm_geom::io::{StagedFolder, read_json};
+use semfm_geom::io::{FormatError, StagedFolder, read_json};
 use semfm_geom::{Mesh, Verdict};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use super::transfer_folder::{put_transfer, write_upright, write_weighted};
 use super::transfer_report::{ObjectRecord, Provenance};
 use super::transferred_region::{HypothesisRecord, TransferredRegionFile};
 use super::write_json;
-use crate::memory::{Memory, MemoryTransfer, Voice};
+use crate::memory::{EntryAnswer, Memory, MemoryTransfer};
 use crate::{Prepared, Result};
 
 /// The format that is written.
@@ -43,7 +43,7 @@ pub struct MemoryReportFile {
     /// The encoder behind all features.
     pub encoder: Option<MemoryEncoder>,
     /// What each demonstration said, the most trusted first.
-    pub voices: Vec<VoiceRecord>,
+    pub answers: Vec<EntryAnswerRecord>,
     /// Milliseconds by stage.
     pub stages_ms: Stages,
     /// Where the answer came from.
@@ -53,7 +53,7 @@ pub struct MemoryReportFile {
 
 /// What one demonstration said.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct VoiceRecord {
+pub struct EntryAnswerRecord {
     /// Name of the entry.
     pub name: String,
     /// Its kind.
@@ -97,7 +97,7 @@ impl MemoryReportFile {
             memory: memory.folder().display().to_string(),
             n_entries: answer.n_entries,
             encoder: memory.encoder().cloned(),
-            voices: answer.voices.iter().map(VoiceRecord::new).collect(),
+            answers: answer.answers.iter().map(EntryAnswerRecord::new).collect(),
             stages_ms,
             provenance,
         }
@@ -114,23 +114,28 @@ impl MemoryReportFile {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format.
+    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or lacks a field,
+    /// [`Error::Format`](crate::Error::Format) for another format.
     pub fn read(path: &Path) -> Result<Self> {
-        Ok(read_json(path)?)
+        let file: Self = read_json(path)?;
+        if file.format != FORMAT {
+            return Err(FormatError::new(path, "format", FORMAT, file.format).into());
+        }
+        Ok(file)
     }
 }
 
-impl VoiceRecord {
-    fn new(voice: &Voice) -> Self {
+impl EntryAnswerRecord {
+    fn new(said: &EntryAnswer) -> Self {
         Self {
-            name: voice.entry.name.clone(),
-            kind: voice.entry.kind.clone(),
-            similarity: voice.similarity,
-            confidence: voice.transfer.confidence,
-            verdict: voice.transfer.verdict,
-            evidence: voice.transfer.report.evidence,
-            n_vertices: voice.transfer.region.vertices().len(),
-            trust: voice.trust,
+            name: said.entry.name.clone(),
+            kind: said.entry.kind.clone(),
+            similarity: said.similarity,
+            confidence: said.transfer.confidence,
+            verdict: said.transfer.verdict,
+            evidence: said.transfer.report.evidence,
+            n_vertices: said.transfer.region.vertices().len(),
+            trust: said.trust,
         }
     }
 }

@@ -71,7 +71,7 @@ pub use memory::{
 };
 #[cfg(feature = "mcap")]
 pub use memory_report::{
-    FORMAT as MEMORY_REPORT_FORMAT, MemoryReportFile, VoiceRecord, write_memory_answer,
+    EntryAnswerRecord, FORMAT as MEMORY_REPORT_FORMAT, MemoryReportFile, write_memory_answer,
 };
 pub use obstacle::read_obstacle;
 pub use plan::{

@@ -35,8 +35,10 @@ pub fn read_rigid_pose(path: &Path, name: &str) -> Result<Pose> {
     Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
 }
 
-/// The rotation and translation of a matrix whose scale is 1 to within 1e-4; else what was found, in words: wherever a
-/// pose of something that keeps its size comes from.
+/// The rotation and translation of a 4 × 4 matrix, rows first, points as columns, whose scale is 1 to within 1e-4.
+///
+/// # Errors
+/// What was found in its place, in words.
 pub fn rigid_pose(rows: MatrixRows) -> std::result::Result<Pose, String> {
     let motion = Sim3::from_rows(rows).map_err(|error| error.to_string())?;
     if (motion.scale - 1.0).abs() > SCALE_TOLERANCE {

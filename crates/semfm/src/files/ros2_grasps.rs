@@ -14,28 +14,32 @@ use crate::grasp_result::{GraspResult, position_and_rotation};
 struct Column {
     topic: &'static str,
     label: &'static str,
-    of: fn(&Grasp) -> f64,
+    of: fn(&GraspResult<'_>, &Grasp) -> f64,
 }
 
 /// Numbers that stand beside the poses, in the same order.
 static COLUMNS: [Column; 5] = [
-    Column { topic: "/grasps/widths", label: "distance of the closed pads (m)", of: |g| g.width },
+    Column {
+        topic: "/grasps/widths",
+        label: "distance of the closed pads (m)",
+        of: |_, g| g.width,
+    },
     Column {
         topic: "/grasps/openings",
         label: "distance of the pads on the way in (m)",
-        of: |g| g.opening,
+        of: |_, g| g.opening,
     },
     Column {
         topic: "/grasps/contact_widths",
         label: "distance of the contacts (m)",
-        of: Grasp::contact_width,
+        of: |_, g| g.contact_width(),
     },
     Column {
         topic: "/grasps/command_widths",
         label: "width to command with limited force, below contact (m)",
-        of: Grasp::command_width,
+        of: |result, g| result.command_width(g),
     },
-    Column { topic: "/grasps/scores", label: "score (0 to 1)", of: |g| g.score },
+    Column { topic: "/grasps/scores", label: "score (0 to 1)", of: |_, g| g.score },
 ];
 
 /// Writes the gripper's poses (TCP), best first, in the frame `camera`, or `object` where no camera
@@ -50,8 +54,10 @@ pub fn write_ros2_grasps(path: &Path, result: &GraspResult<'_>) -> Result<()> {
         .iter()
         .map(|grasp| position_and_rotation(result.in_frame(grasp.object_from_tcp)))
         .collect();
-    let columns: Vec<Vec<f64>> =
-        COLUMNS.iter().map(|column| grasps.iter().map(column.of).collect()).collect();
+    let columns: Vec<Vec<f64>> = COLUMNS
+        .iter()
+        .map(|column| grasps.iter().map(|grasp| (column.of)(result, grasp)).collect())
+        .collect();
     let numbers: Vec<PoseNumbers<'_>> = COLUMNS
         .iter()
         .zip(&columns)

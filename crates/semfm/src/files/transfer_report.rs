@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use semfm_fmap::{Stages, TransferReport};
-use semfm_geom::io::read_json;
+use semfm_geom::io::{FormatError, read_json};
 use semfm_geom::{MeshIdentity, ShapeReport, Verdict};
 use semfm_views::LiftSettings;
 use serde::{Deserialize, Serialize};
@@ -150,9 +150,14 @@ impl TransferReportFile {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format.
+    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or lacks a field,
+    /// [`Error::Format`](crate::Error::Format) for another format.
     pub fn read(path: &Path) -> Result<Self> {
-        Ok(read_json(path)?)
+        let file: Self = read_json(path)?;
+        if file.format != FORMAT {
+            return Err(FormatError::new(path, "format", FORMAT, file.format).into());
+        }
+        Ok(file)
     }
 }
 
