@@ -308,8 +308,8 @@ impl GraspsFile {
     ///
     /// # Errors
     /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format,
-    /// [`Error::Format`](crate::Error::Format) for another format, another mesh or a scale that is not
-    /// positive.
+    /// [`Error::Format`](crate::Error::Format) for another format, another mesh, a scale that is not
+    /// positive, and a hand with other poses than one for each part.
     pub fn read(path: &Path, mesh: &Mesh) -> Result<Self> {
         let file = Self::read_alone(path)?;
         file.mesh.check(mesh).map_err(|error| error.in_file(path))?;
@@ -328,6 +328,17 @@ impl GraspsFile {
         if !(file.object_scale > 0.0 && file.object_scale.is_finite()) {
             let found = file.object_scale.to_string();
             return Err(FormatError::new(path, "object_scale", "a positive number", found).into());
+        }
+        let n_parts = file.gripper.parts.len();
+        for (i, grasp) in file.grasps.iter().enumerate() {
+            for (name, poses) in [("closed", &grasp.hand.closed), ("open", &grasp.hand.open)] {
+                if poses.len() != n_parts {
+                    let place = format!("grasps[{i}].hand.{name}");
+                    let expected = format!("{n_parts} poses, one for each part of the gripper");
+                    let found = poses.len().to_string();
+                    return Err(FormatError::new(path, place, expected, found).into());
+                }
+            }
         }
         Ok(file)
     }

@@ -46,9 +46,14 @@ impl PointMapFile {
     /// Reads the file.
     ///
     /// # Errors
-    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is not of this format.
+    /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or lacks a field,
+    /// [`Error::Format`](crate::Error::Format) for another format.
     pub fn read(path: &Path) -> Result<Self> {
-        Ok(read_json(path)?)
+        let file: Self = read_json(path)?;
+        if file.format != FORMAT {
+            return Err(FormatError::new(path, "format", FORMAT, file.format).into());
+        }
+        Ok(file)
     }
 
     /// Refuses arrays of other lengths than the meshes, and ids beyond the source. `path` is named
