@@ -17,7 +17,7 @@ pub struct GraspSettings {
     /// Surface points from which candidates are grown; each gives some twenty.
     pub n_samples: usize,
     /// Rounds in which neighbours of the grasps found are tried: each finds what the samples missed
-    /// one step farther out.
+    /// one step farther out. With 0 the best ones are not moved to where each is best, either.
     pub neighbour_rounds: usize,
     /// The same seed gives the same grasps at every thread count.
     pub seed: u64,
