@@ -1328,7 +1328,7 @@ class MemoryTransfer:
         """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
         ...
     @property
-    def voices(self) -> list[dict[str, Any]]:
+    def answers(self) -> list[dict[str, Any]]:
         """list of dict: what each demonstration said, the most trusted first: name, kind, similarity,
         confidence, verdict, evidence, share of the vote, agreement with the others.
         """

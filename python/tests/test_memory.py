@@ -31,8 +31,8 @@ def test_what_is_remembered_is_listed_and_asked(memory, containers, tmp_path):
     assert isinstance(answer, semfm.MemoryTransfer)
     assert answer.verdict in ("accept", "check", "refuse")
     assert (answer.why is None) or answer.verdict != "accept"
-    assert sum(voice["share"] for voice in answer.voices) == pytest.approx(1)
-    assert {voice["name"] for voice in answer.voices} == {"a", "b", "c"}
+    assert sum(said["share"] for said in answer.answers) == pytest.approx(1)
+    assert {said["name"] for said in answer.answers} == {"a", "b", "c"}
     assert answer.weights.shape == (containers[3].mesh.n_vertices,)
     prepared = semfm.prepare(containers[3].mesh)
     same = memory.transfer(prepared)
@@ -45,7 +45,7 @@ def test_what_is_remembered_is_listed_and_asked(memory, containers, tmp_path):
     assert report["confidence"] == answer.confidence
     assert answer.picture().startswith(b"\x89PNG")
     one = memory.transfer(prepared, shortlist=1)
-    assert len(one.voices) == 1
+    assert len(one.answers) == 1
 
 
 def test_a_memory_opened_again_answers_the_same(memory, containers):

@@ -68,11 +68,11 @@ fn a_memory_is_filled_listed_asked_and_emptied() {
     let answer = run(&["transfer", target, "--memory", at, "-o", to, "--quiet", "--json"]);
     assert!(matches!(answer.code, Some(0 | 1)), "{answer:?}");
     let told: Value = serde_json::from_str(&answer.out).unwrap();
-    assert_eq!(told["voices"].as_array().unwrap().len(), 3);
+    assert_eq!(told["answers"].as_array().unwrap().len(), 3);
     let report = json(&out.join("report.json"));
     assert_eq!(report["format"], "semfm.memory_report/1");
-    let shares = report["voices"].as_array().unwrap().iter();
-    let total: f64 = shares.map(|voice| voice["share"].as_f64().unwrap()).sum();
+    let shares = report["answers"].as_array().unwrap().iter();
+    let total: f64 = shares.map(|said| said["share"].as_f64().unwrap()).sum();
     assert!((total - 1.0).abs() < 1e-9, "{total}");
     for name in ["region.json", "target.ply", "target.glb", "memory.png"] {
         assert!(out.join(name).is_file(), "{name}");

@@ -109,7 +109,8 @@ fn lens_of(path: &Path, value: &Value) -> Result<Option<Distortion>> {
                         the intrinsics of what comes out";
         crate::Error::from(FormatError::new(path, field, expected, found))
     };
-    if model.contains("inverse") {
+    let is_foreign = ["inverse", "ftheta", "thin_prism"].iter().any(|name| model.contains(name));
+    if is_foreign || model == "fov" {
         return Err(fault(format!("the model `{model}`")));
     }
     let listed = value.as_object().and_then(|fields| {
@@ -127,7 +128,10 @@ fn lens_of(path: &Path, value: &Value) -> Result<Option<Distortion>> {
         None => return Err(fault(coefficient.to_string())),
     };
     let lens = if is_fisheye {
-        Distortion::equidistant(&coefficients[..coefficients.len().min(4)]).map(Some)
+        // librealsense lists five, the last of them 0.
+        let (known, further) = coefficients.split_at(coefficients.len().min(4));
+        let is_plain = further.iter().all(|&x| x == 0.0);
+        Distortion::equidistant(if is_plain { known } else { &coefficients }).map(Some)
     } else {
         Distortion::brown(&coefficients)
     };

@@ -1,7 +1,7 @@
 //! What cameras and hands leave behind, brought into one form.
 //!
 //! * **Observations**: colour, depth, masks, camera and pose of one moment ([`Observation`]), from single files
-//!   ([`ObservationFiles`]) from folders of the BOP benchmark ([`BopScene`], [`write_bop`])
+//!   ([`ObservationFiles`]), from folders of the BOP benchmark ([`BopScene`], [`write_bop`])
 //!   and, with the feature `mcap`, from bags of ROS 2 (`read_bag`, `write_bag`).
 //!   [`check_registration`] tells which camera a depth image belongs to.
 //! * **Hands**: what pose estimators reconstruct ([`read_hand`]), brought to its measured depth

@@ -84,9 +84,13 @@ pub fn read_labelled_mask(path: &Path, of: MaskedPicture, id: u32) -> Result<Vec
         let mut there: Vec<i64> = labels.iter().map(|&label| label as i64).collect();
         there.sort_unstable();
         there.dedup();
+        let n = there.len();
         there.truncate(20);
+        let further =
+            if n > there.len() { format!(" and {} more", n - there.len()) } else { String::new() };
         let expected = format!("pixels with the label {id}");
-        return Err(FormatError::new(path, "labels", expected, format!("only {there:?}")).into());
+        let found = format!("only {there:?}{further}");
+        return Err(FormatError::new(path, "labels", expected, found).into());
     }
     check_marks(path, marked, "a pixel of the label")
 }

@@ -80,10 +80,10 @@ pub fn check_registration(
     let color = color_camera.posed(color_from_depth)?;
     let carried: Vec<[f64; 2]> = jumps
         .iter()
-        .map(|&(column, row, z)| {
+        .filter_map(|&(column, row, z)| {
             let [u, v] = centre(column, row);
             let seen = color.project(own.unproject(semfm_geom::PixelDepth { u, v, z }));
-            [seen.u, seen.v]
+            (seen.z > 0.0).then_some([seen.u, seen.v])
         })
         .collect();
     let color_pixels = mean_distance(&outline, &as_it_lies, width, height);

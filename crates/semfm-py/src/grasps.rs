@@ -627,7 +627,13 @@ fn accepted_pose(
 ) -> PyResult<AlignedPose> {
     let pose = match alignment.cast::<Alignment>() {
         Ok(alignment) => alignment.get().pose(),
-        Err(_) => read_aligned(&alignment.extract::<PathBuf>()?, Some(mesh)),
+        Err(_) => {
+            let path: PathBuf = alignment.extract().map_err(|_| {
+                let expected = "an Alignment, or the path of aligned.json";
+                errors::wrong_type("alignment", expected, alignment)
+            })?;
+            read_aligned(&path, Some(mesh))
+        }
     };
     let pose = pose.map_err(|error| errors::raise(py, &error))?;
     if pose.verdict == Some(Verdict::Refuse) && !use_refused {

@@ -1,7 +1,8 @@
 //! `Memory`: demonstrations in a folder, asked for new objects.
 
 use std::path::PathBuf;
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, TryLockError};
+use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -48,13 +49,55 @@ use crate::{arrays_out, errors, json, pictures};
 /// True
 #[pyclass(frozen, module = "semfm")]
 pub struct Memory {
-    inner: Arc<RwLock<Demonstrations>>,
+    /// Replaced as a whole by changes: work on a pool's thread that held a lock could wait for itself.
+    inner: RwLock<Arc<Demonstrations>>,
+    /// Held by the calling thread of a change, never by a worker.
+    changing: Mutex<()>,
 }
 
+/// Between two looks at whether another thread's change has ended.
+const NAP: Duration = Duration::from_millis(10);
+
 impl Memory {
+    /// The memory as it is now.
+    fn now(&self) -> Arc<Demonstrations> {
+        Arc::clone(&self.inner.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Reads something off the memory.
     fn read<T>(&self, read: impl FnOnce(&Demonstrations) -> T) -> T {
-        read(&self.inner.read().unwrap_or_else(PoisonError::into_inner))
+        read(&self.now())
+    }
+
+    /// Waits, without the interpreter's lock, for the changes of other threads.
+    fn alone(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, ()>> {
+        loop {
+            match self.changing.try_lock() {
+                Ok(alone) => return Ok(alone),
+                Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) => {
+                    py.detach(|| std::thread::sleep(NAP));
+                    py.check_signals()?;
+                }
+            }
+        }
+    }
+
+    /// Changes a copy of the memory and takes it over.
+    fn change(
+        &self,
+        py: Python<'_>,
+        progress: Option<&Bound<'_, PyAny>>,
+        change: impl FnOnce(&mut Demonstrations, &Task) -> semfm::Result<()> + Send + 'static,
+    ) -> PyResult<()> {
+        let _alone = self.alone(py)?;
+        let mut memory = (*self.now()).clone();
+        let changed = run(py, progress, move |task| {
+            change(&mut memory, task)?;
+            Ok(memory)
+        })?;
+        *self.inner.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(changed);
+        Ok(())
     }
 
     /// The encoder of this name, or the memory's own where none is given.
@@ -76,7 +119,7 @@ impl Memory {
         let settings = PipelineSettings { cache: cache_of(cache)?, ..PipelineSettings::default() };
         let memory =
             guard(py, || Ok(Demonstrations::open_or_begin(folder)?.with_settings(settings)))?;
-        Ok(Self { inner: Arc::new(RwLock::new(memory)) })
+        Ok(Self { inner: RwLock::new(Arc::new(memory)), changing: Mutex::new(()) })
     }
 
     /// str: the folder.
@@ -155,8 +198,7 @@ impl Memory {
             }
             (None, encoder) => Features::Encoder(self.open_encoder(py, encoder)?),
         };
-        let memory = Arc::clone(&self.inner);
-        run(py, progress, move |task| {
+        self.change(py, progress, move |memory, task| {
             let embeddings = given.of(&object, task)?;
             let demonstration = Demonstration {
                 name,
@@ -167,7 +209,6 @@ impl Memory {
                 mesh_file: None,
                 region_file: None,
             };
-            let mut memory = memory.write().unwrap_or_else(PoisonError::into_inner);
             memory.remember(&demonstration, replace, task)?;
             Ok(())
         })
@@ -179,8 +220,7 @@ impl Memory {
     /// ----------
     /// name : str
     fn forget(&self, py: Python<'_>, name: String) -> PyResult<()> {
-        let memory = Arc::clone(&self.inner);
-        run(py, None, move |_| memory.write().unwrap_or_else(PoisonError::into_inner).forget(&name))
+        self.change(py, None, move |memory, _| memory.forget(&name))
     }
 
     /// Carries what was demonstrated to an object: the most similar demonstrations are matched and their
@@ -216,7 +256,7 @@ impl Memory {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<MemoryTransfer> {
         let settings = MemorySettings { kind, shortlist, ..MemorySettings::default() };
-        let memory = Arc::clone(&self.inner);
+        let memory = self.now();
         let target = match target.cast::<PreparedObject>() {
             Ok(prepared) => {
                 if embeddings.is_some() || encoder.is_some() {
@@ -238,7 +278,6 @@ impl Memory {
             }
         };
         run(py, progress, move |task| {
-            let memory = memory.read().unwrap_or_else(PoisonError::into_inner);
             let target = match target {
                 Target::Ready(prepared) => prepared,
                 Target::Raw(object, given) => {
@@ -347,8 +386,8 @@ impl MemoryTransfer {
     /// list of dict: what each demonstration said, the most trusted first: name, kind, similarity,
     /// confidence, verdict, evidence, share of the vote, agreement with the others.
     #[getter]
-    fn voices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        json::to_python(py, &self.report.voices)
+    fn answers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json::to_python(py, &self.report.answers)
     }
 
     /// dict: the whole report, as ``report.json`` has it.
@@ -413,9 +452,9 @@ impl MemoryTransfer {
         let fused = &self.answer.fused;
         let (n, of) = (fused.region.vertices().len(), fused.region.n_vertices());
         let (verdict, confidence) = (fused.verdict, fused.confidence);
-        let voices = self.answer.voices.len();
+        let answers = self.answer.answers.len();
         format!(
-            "MemoryTransfer({verdict}, confidence {confidence:.2}, {n} of {of} vertices, {voices} demonstrations)"
+            "MemoryTransfer({verdict}, confidence {confidence:.2}, {n} of {of} vertices, {answers} demonstrations)"
         )
     }
 }

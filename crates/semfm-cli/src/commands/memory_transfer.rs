@@ -58,11 +58,11 @@ impl MemoryQuestion<'_> {
                 "confidence": answer.fused.confidence,
                 "agreement": answer.fused.agreement,
                 "n_vertices": answer.fused.region.vertices().len(),
-                "voices": answer.voices.iter().map(|voice| json!({
-                    "name": voice.entry.name,
-                    "kind": voice.entry.kind,
-                    "confidence": voice.transfer.confidence,
-                    "share": voice.trust.share,
+                "answers": answer.answers.iter().map(|said| json!({
+                    "name": said.entry.name,
+                    "kind": said.entry.kind,
+                    "confidence": said.transfer.confidence,
+                    "share": said.trust.share,
                 })).collect::<Vec<_>>(),
                 "files": files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
                 "stages_ms": answer.stages_ms,
@@ -90,17 +90,17 @@ fn print(answer: &MemoryTransfer, target: &Prepared, write_ms: f64, common: &Com
     console::data(format_args!("region      {n} of {of} vertices of the target"));
     console::data(format_args!(
         "asked       {} of {} demonstrations, which agree to {:.0} %",
-        answer.voices.len(),
+        answer.answers.len(),
         answer.n_entries,
         100.0 * fused.agreement
     ));
-    for voice in &answer.voices {
+    for said in &answer.answers {
         console::data(format_args!(
             "  {:24} {:3.0} % of the vote, alone {} (confidence {:.2})",
-            printable(&voice.entry.name),
-            100.0 * voice.trust.share,
-            voice.transfer.verdict,
-            voice.transfer.confidence
+            printable(&said.entry.name),
+            100.0 * said.trust.share,
+            said.transfer.verdict,
+            said.transfer.confidence
         ));
     }
     if fused.hypotheses.len() > 1 {

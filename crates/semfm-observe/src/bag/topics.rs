@@ -102,9 +102,10 @@ fn pick(
     match bases[..] {
         [] => Ok(None),
         [one] => {
-            let mut same = names.iter().filter(|name| base(name) == one);
             let raw = names.iter().find(|name| **name == one);
-            Ok(raw.or_else(|| same.next()).map(|name| topic(name)))
+            // By name `compressedDepth` comes after `compressed`, which loses depth.
+            let packed = names.iter().rfind(|name| base(name) == one);
+            Ok(raw.or(packed).map(|name| topic(name)))
         }
         _ => Err(Fault::new(format!("the name of one {kind} topic"), bases.join(", "))),
     }

@@ -45,38 +45,53 @@ impl Transforms {
     /// farther than `gap` from it.
     pub fn lookup(&self, fixed: &str, child: &str, time: u64, gap: u64) -> Result<DAffine3, Fault> {
         let fixed = fixed.trim_start_matches('/');
-        let (of_child, of_fixed) = (self.chain(child, time, gap)?, self.chain(fixed, time, gap)?);
-        let meeting = of_child.iter().find_map(|(name, root_from_child)| {
-            let other = of_fixed.iter().find(|(other, _)| other == name)?;
+        let (of_child, of_fixed) = (self.chain(child, time, gap), self.chain(fixed, time, gap));
+        // What is missing above the frame where both meet does not matter.
+        let meeting = of_child.frames.iter().find_map(|(name, root_from_child)| {
+            let other = of_fixed.frames.iter().find(|(other, _)| other == name)?;
             Some(other.1.inverse() * *root_from_child)
         });
         meeting.ok_or_else(|| {
-            let names: Vec<&str> = of_child.iter().map(|(name, _)| name.as_str()).collect();
-            let expected = format!("transforms that lead from `{child}` to `{fixed}`");
-            Fault::new(expected, format!("only {}", names.join(" → ")))
+            of_child.broken.or(of_fixed.broken).unwrap_or_else(|| {
+                let names: Vec<&str> = of_child.frames.iter().map(|(n, _)| n.as_str()).collect();
+                let expected = format!("transforms that lead from `{child}` to `{fixed}`");
+                Fault::new(expected, format!("only {}", names.join(" → ")))
+            })
         })
     }
 
-    /// The frames above one, itself first, with how it stands in each.
-    fn chain(&self, child: &str, time: u64, gap: u64) -> Result<Vec<(String, DAffine3)>, Fault> {
+    /// The frames above one, as far up as the transforms lead.
+    fn chain(&self, child: &str, time: u64, gap: u64) -> Chain {
         let child = child.trim_start_matches('/');
-        let mut chain = vec![(child.to_owned(), DAffine3::IDENTITY)];
-        while let Some((name, motion)) = chain.last() {
+        let mut frames = vec![(child.to_owned(), DAffine3::IDENTITY)];
+        let mut broken = None;
+        while let Some((name, motion)) = frames.last() {
             let Some(frame) = self.frames.get(name) else { break };
-            if chain.len() > LONGEST_CHAIN {
-                return Err(Fault::new("frames that form a tree", format!("a circle at `{name}`")));
+            if frames.len() > LONGEST_CHAIN {
+                let found = format!("a circle at `{name}`");
+                broken = Some(Fault::new("frames that form a tree", found));
+                break;
             }
-            let pose = frame.at(time, gap).ok_or_else(|| {
+            let Some(pose) = frame.at(time, gap) else {
                 let expected = format!("a transform of `{name}` within {:.3} s", gap as f64 / 1e9);
                 let (first, last) = frame.span();
                 let found = format!("time {time} ns, and transforms from {first} to {last} ns");
-                Fault::new(expected, found)
-            })?;
+                broken = Some(Fault::new(expected, found));
+                break;
+            };
             let entry = (frame.parent.clone(), pose * *motion);
-            chain.push(entry);
+            frames.push(entry);
         }
-        Ok(chain)
+        Chain { frames, broken }
     }
+}
+
+/// A frame and those above it.
+struct Chain {
+    /// Names, the frame itself first, and how it stands in each.
+    frames: Vec<(String, DAffine3)>,
+    /// Why it ends below the root, where it does.
+    broken: Option<Fault>,
 }
 
 impl Frame {
@@ -131,6 +146,7 @@ mod tests {
         assert_eq!(x("table", 200).unwrap(), 7.5, "up to the frame that both share, and down");
         assert_eq!(x("camera", 150).unwrap(), 0.0);
         assert_eq!(x("base", 250).unwrap(), 3.5);
+        assert_eq!(x("tool", 900).unwrap(), 0.5, "what lies above the tool is not needed");
         assert!(x("base", 900).unwrap_err().found.contains("100 to 200"));
         assert!(x("map", 150).unwrap_err().found.contains("camera → tool → base"));
         assert!(all.add(step(0, "hand", "camera", 0.0), true).is_err());

@@ -48,7 +48,9 @@ pub fn read_bop_models(path: &Path) -> Result<BTreeMap<u32, BopModel>> {
         let fault = |what: &str, expected: &str, found: String| {
             FormatError::new(path, format!("{key}.{what}"), expected, found)
         };
-        let id: u32 = key.parse().map_err(|_| fault("", "the number of an object", key.clone()))?;
+        let id: u32 = key.parse().map_err(|_| {
+            FormatError::new(path, "keys", "numbers of objects", format!("`{key}`"))
+        })?;
         if !(record.diameter > 0.0 && record.diameter.is_finite()) {
             let found = record.diameter.to_string();
             return Err(fault("diameter", "a positive length in millimetres", found).into());

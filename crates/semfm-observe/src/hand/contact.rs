@@ -74,8 +74,8 @@ pub struct PartContact {
 }
 
 /// Finds where a hand touches a mesh; both are in the mesh's frame and units. The hand is first moved by what makes it
-/// rest on the surface, within what `settings` say it may be off. The weights are smooth: 1 within the hand, one half at
-/// the reach, 0 at twice the reach, averaged over the offsets that are likely.
+/// rest on the surface, within what `settings` say it may be off. The weights are smooth: 1 up to half the reach, one
+/// half at the reach, 0 from one and a half reaches on, averaged over the offsets that are likely.
 ///
 /// # Errors
 /// [`Error::Invalid`] for settings out of range, a hand that cannot be one in metres, and a hand that touches nothing,

@@ -34,7 +34,7 @@ pub fn read_hand(path: &Path) -> Result<Hand> {
         MeshOrPoints::Points(cloud) => (cloud.points, Vec::new()),
     };
     from_opengl(&mut points);
-    named(path, Hand::new(points, faces))
+    Hand::new(points, faces).map_err(|error| named(path, error))
 }
 
 fn from_arrays(path: &Path) -> Result<Hand> {
@@ -62,11 +62,17 @@ fn from_arrays(path: &Path) -> Result<Hand> {
     let faces = match array(&FACES)? {
         Some((name, faces)) => {
             let whole = rows(path, &name, faces)?;
-            whole.iter().map(|row| row.to_array().map(|x| x as u32)).collect()
+            let ids = whole.iter().map(|row| {
+                let [a, b, c] = row.to_array().map(id_of);
+                a.zip(b).zip(c).map(|((a, b), c)| [a, b, c]).ok_or(row)
+            });
+            ids.collect::<std::result::Result<_, _>>().map_err(|row| {
+                FormatError::new(path, &name, "ids of vertices, from 0", row.to_string())
+            })?
         }
         None => Vec::new(),
     };
-    let hand = named(path, Hand::new(points, faces))?;
+    let hand = Hand::new(points, faces).map_err(|error| named(path, error))?;
     match array(&JOINTS)? {
         Some((name, joints)) => {
             let mut joints = rows(path, &name, joints)?;
@@ -91,14 +97,14 @@ fn rows(path: &Path, name: &str, array: NumpyArray) -> Result<Vec<DVec3>> {
     Ok(array.into_f64().as_chunks::<3>().0.iter().map(|&row| DVec3::from_array(row)).collect())
 }
 
-/// An error about a hand with the file that it came from.
-fn named(path: &Path, hand: Result<Hand>) -> Result<Hand> {
-    hand.map_err(|error| match error {
+/// An error with the file that it is about.
+pub(super) fn named(path: &Path, error: Error) -> Error {
+    match error {
         Error::Invalid { what, expected, found } => {
             FormatError::new(path, what, expected, found).into()
         }
         other => other,
-    })
+    }
 }
 
 /// Reads ids of vertices: a JSON list, a NumPy array, or numbers between white space.
@@ -125,11 +131,15 @@ pub fn read_vertex_ids(path: &Path) -> Result<Vec<u32>> {
             words.enumerate().map(number).collect::<Result<_>>()?
         }
     };
-    let id = |(at, &x): (usize, &f64)| match x {
-        x if x >= 0.0 && x < f64::from(u32::MAX) && x.fract() == 0.0 => Ok(x as u32),
-        x => Err(fault(format!("number {}", at + 1), x.to_string())),
+    let id = |(at, &x): (usize, &f64)| {
+        id_of(x).ok_or_else(|| fault(format!("number {}", at + 1), x.to_string()))
     };
     numbers.iter().enumerate().map(id).collect()
+}
+
+/// A number as the id of a vertex, where it can be one.
+fn id_of(x: f64) -> Option<u32> {
+    (x >= 0.0 && x < f64::from(u32::MAX) && x.fract() == 0.0).then_some(x as u32)
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use semfm_align::Sim3;
 use semfm_geom::Mesh;
-use semfm_geom::io::FormatError;
 use semfm_geom::math::{DAffine3, DMat4, DVec3};
 
+use super::files::named;
 use super::{
     Contact, ContactSettings, Hand, HandShift, LARGEST, find_contact, read_hand, read_vertex_ids,
 };
@@ -113,16 +113,6 @@ impl HandFrame {
             ..*settings
         };
         find_contact(mesh, &hand, &settings)
-    }
-}
-
-/// An error with the file that it is about.
-fn named(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Invalid { what, expected, found } => {
-            FormatError::new(path, what, expected, found).into()
-        }
-        other => other,
     }
 }
 

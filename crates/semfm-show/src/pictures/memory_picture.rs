@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use semfm::memory::{MemoryTransfer, Voice};
+use semfm::memory::{EntryAnswer, MemoryTransfer};
 use semfm::views::{RenderSettings, SurfaceColor, View, render};
 use semfm::{Mesh, Prepared, Task};
 
@@ -33,14 +33,14 @@ pub fn write_memory_picture(
         "{}, confidence {:.2}, agreement {:.2}",
         fused.verdict, fused.confidence, fused.agreement
     )];
-    for voice in &answer.voices {
-        pictures.push(of_voice(voice, mesh, &on_target, task)?);
+    for said in &answer.answers {
+        pictures.push(of_answer(said, mesh, &on_target, task)?);
         titles.push(format!(
             "{}: {:.0} % of the vote, alone {} ({:.2})",
-            voice.entry.name,
-            100.0 * voice.trust.share,
-            voice.transfer.verdict,
-            voice.transfer.confidence
+            said.entry.name,
+            100.0 * said.trust.share,
+            said.transfer.verdict,
+            said.transfer.confidence
         ));
     }
     let rows: Vec<Row<'_>> = titles
@@ -54,11 +54,16 @@ pub fn write_memory_picture(
 }
 
 /// A demonstration beside its own answer.
-fn of_voice(voice: &Voice, target: &Mesh, seen: &Viewpoints, task: &Task) -> Result<Vec<View>> {
-    let (mesh, weights) = (voice.mesh(), voice.region().weights());
+fn of_answer(
+    said: &EntryAnswer,
+    target: &Mesh,
+    seen: &Viewpoints,
+    task: &Task,
+) -> Result<Vec<View>> {
+    let (mesh, weights) = (said.mesh(), said.region().weights());
     let own = viewpoints(mesh, weights, PICTURE_SIDE, task)?;
     let mut pictures = drawn(mesh, weights, &[own.best], task)?;
-    pictures.extend(drawn(target, voice.transfer.weights(), &[seen.best], task)?);
+    pictures.extend(drawn(target, said.transfer.weights(), &[seen.best], task)?);
     Ok(pictures)
 }
 

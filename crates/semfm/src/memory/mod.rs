@@ -17,6 +17,7 @@ mod transfer;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use semfm_geom::io::FormatError;
 
@@ -25,7 +26,7 @@ use crate::{Error, PipelineSettings, Result};
 
 pub use remember::Demonstration;
 pub use shortlist::{Candidate, shortlist};
-pub use transfer::{MemorySettings, MemoryTransfer, Voice};
+pub use transfer::{EntryAnswer, MemorySettings, MemoryTransfer};
 
 use entry_objects::EntryObjects;
 
@@ -38,20 +39,22 @@ const MESH: &str = "mesh.ply";
 const REGION: &str = "region.json";
 const EMBEDDINGS: &str = "embeddings.emb.mcap";
 
-/// Demonstrations in a folder. Prepared objects are kept while the value lives.
+/// Demonstrations in a folder. Prepared objects are kept while the value or a clone of it lives; clones share them, and
+/// do not hear of each other's changes.
+#[derive(Clone)]
 pub struct Memory {
     folder: PathBuf,
     file: MemoryFile,
     settings: PipelineSettings,
-    objects: EntryObjects,
+    objects: Arc<EntryObjects>,
 }
 
 impl Memory {
     /// Opens a memory that is there.
     ///
     /// # Errors
-    /// [`Error::Format`](crate::Error::Format) for a folder that is none and for a `memory.json` whose
-    /// entries do not belong together; [`Error::Geom`](crate::Error::Geom) where it cannot be read.
+    /// [`Error::Format`] for a folder that is none and for a `memory.json` whose
+    /// entries do not belong together; [`Error::Geom`] where it cannot be read.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
         let index = folder.join(INDEX);
@@ -86,13 +89,13 @@ impl Memory {
 
     fn of(folder: &Path, file: MemoryFile) -> Self {
         let settings = PipelineSettings::default();
-        Self { folder: folder.to_owned(), file, settings, objects: EntryObjects::default() }
+        Self { folder: folder.to_owned(), file, settings, objects: Arc::default() }
     }
 
     /// How objects are prepared and matched; by default as [`PipelineSettings::default`] says, without a cache.
     #[must_use]
     pub fn with_settings(self, settings: PipelineSettings) -> Self {
-        Self { settings, objects: EntryObjects::default(), ..self }
+        Self { settings, objects: Arc::default(), ..self }
     }
 
     /// How objects are prepared and matched.

@@ -197,6 +197,9 @@ impl Demonstration<'_> {
         }
         let about = &self.embeddings.metadata;
         content.update(format!("{} {} {}", about.encoder, about.revision, about.rolls).as_bytes());
+        for x in descriptor {
+            content.update(&x.to_le_bytes());
+        }
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH);
         EntryRecord {
             name: self.name.clone(),

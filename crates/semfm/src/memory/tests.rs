@@ -86,8 +86,8 @@ fn what_was_remembered_is_carried_to_a_new_object_in_whatever_order_it_was_added
     let prepared = target.prepared();
     let (answer, same) = (ask(&memory, &prepared), ask(&other, &prepared));
     assert!(iou(&answer.fused.region, &target.grip) > 0.7);
-    assert_eq!((answer.voices.len(), answer.n_entries), (3, 3));
-    let shares: f64 = answer.voices.iter().map(|voice| voice.trust.share).sum();
+    assert_eq!((answer.answers.len(), answer.n_entries), (3, 3));
+    let shares: f64 = answer.answers.iter().map(|said| said.trust.share).sum();
     assert!((shares - 1.0).abs() < 1e-12);
     assert_eq!(answer.fused.region, same.fused.region);
     assert_eq!(answer.fused.confidence, same.fused.confidence);
@@ -110,7 +110,7 @@ fn one_demonstration_answers_as_a_transfer_from_it_does() {
         semfm_fmap::transfer(&source.object, &prepared.object, &a.grip, settings, &task).unwrap();
     assert_eq!(answer.fused.region.mask(), alone.region.mask());
     assert_eq!(answer.fused.confidence, alone.confidence);
-    assert_eq!(answer.voices[0].trust.agreement, None);
+    assert_eq!(answer.answers[0].trust.agreement, None);
 }
 
 #[test]
@@ -127,8 +127,8 @@ fn a_bad_demonstration_does_not_ruin_the_answer() {
     let answer = ask(&memory, &prepared);
     let after = iou(&answer.fused.region, &target.grip);
     assert!(after > before - 0.05, "{before} became {after}");
-    assert_eq!(answer.voices[2].entry.name, "the wrong end");
-    assert!(answer.voices[2].trust.share < 0.2, "{:?}", answer.voices[2].trust);
+    assert_eq!(answer.answers[2].entry.name, "the wrong end");
+    assert!(answer.answers[2].trust.share < 0.2, "{:?}", answer.answers[2].trust);
 }
 
 #[test]
@@ -225,7 +225,7 @@ fn an_empty_memory_and_what_is_none_say_what_to_do() {
 
     let memory = memory_of(&folder.path().join("tools"), &[("a", a)]);
     let of = |settings: MemorySettings| {
-        memory.transfer(&b.prepared(), &settings, &task).map(|answer| answer.voices.len())
+        memory.transfer(&b.prepared(), &settings, &task).map(|answer| answer.answers.len())
     };
     let kind = |kind: &str| MemorySettings { kind: Some(kind.into()), ..settings.clone() };
     assert_eq!(of(kind("tool")).unwrap(), 1);

@@ -41,7 +41,7 @@ pub struct MemoryTransfer {
     /// The answer.
     pub fused: FusedAnswer,
     /// What each demonstration said, the most trusted first.
-    pub voices: Vec<Voice>,
+    pub answers: Vec<EntryAnswer>,
     /// Demonstrations of the memory.
     pub n_entries: usize,
     /// The method that matched.
@@ -52,7 +52,7 @@ pub struct MemoryTransfer {
 
 /// One demonstration and what it said.
 #[derive(Clone, Debug)]
-pub struct Voice {
+pub struct EntryAnswer {
     /// The entry.
     pub entry: EntryRecord,
     /// Cosine of its mean feature with that of the target.
@@ -64,7 +64,7 @@ pub struct Voice {
     object: Arc<EntryObject>,
 }
 
-impl Voice {
+impl EntryAnswer {
     /// The demonstrated object.
     pub fn source(&self) -> &Prepared {
         &self.object.prepared
@@ -137,8 +137,8 @@ impl Memory {
         let fused = fuse(&target.object, &answers, &settings.fusion)?;
         book("fuse");
         let said = chosen.into_iter().zip(objects).zip(transfers).zip(&fused.trusts);
-        let mut voices: Vec<Voice> = said
-            .map(|(((candidate, object), transfer), trust)| Voice {
+        let mut answers: Vec<EntryAnswer> = said
+            .map(|(((candidate, object), transfer), trust)| EntryAnswer {
                 entry: self.entries()[candidate.place].clone(),
                 similarity: candidate.similarity,
                 trust: *trust,
@@ -146,12 +146,12 @@ impl Memory {
                 object,
             })
             .collect();
-        voices.sort_by(|a, b| {
+        answers.sort_by(|a, b| {
             let by_share = b.trust.share.total_cmp(&a.trust.share);
             by_share.then_with(|| a.entry.name.cmp(&b.entry.name))
         });
         let (n_entries, method) = (self.entries().len(), self.settings().transfer.method);
-        Ok(MemoryTransfer { fused, voices, n_entries, method, stages_ms })
+        Ok(MemoryTransfer { fused, answers, n_entries, method, stages_ms })
     }
 
     fn object(&self, candidate: &Candidate, task: &Task) -> Result<Arc<EntryObject>> {
@@ -192,8 +192,8 @@ impl MemoryTransfer {
         if self.fused.verdict == Verdict::Accept {
             return None;
         }
-        let unlike = self.voices.iter().all(|voice| voice.transfer.report.is_not_alike());
-        Some(match self.voices.len() {
+        let unlike = self.answers.iter().all(|said| said.transfer.report.is_not_alike());
+        Some(match self.answers.len() {
             _ if unlike => "not alike: no demonstration shows an object of this kind".into(),
             _ if self.fused.region.is_empty() => {
                 "no place is enough like what was demonstrated".into()
