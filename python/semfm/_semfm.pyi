@@ -1295,6 +1295,12 @@ class MemoryTransfer:
         """float: mean IoU of the answers with the fused region, by their shares of the vote."""
         ...
     @property
+    def answers(self) -> list[dict[str, Any]]:
+        """list of dict: what each demonstration said, the most trusted first: name, kind, similarity,
+        confidence, verdict, evidence, share of the vote, agreement with the others.
+        """
+        ...
+    @property
     def confidence(self) -> float:
         """float: the probability that the IoU with the true region is at least one half, in [0, 1]."""
         ...
@@ -1326,12 +1332,6 @@ class MemoryTransfer:
     @property
     def verdict(self) -> str:
         """str: ``"accept"``, ``"check"`` or ``"refuse"``."""
-        ...
-    @property
-    def answers(self) -> list[dict[str, Any]]:
-        """list of dict: what each demonstration said, the most trusted first: name, kind, similarity,
-        confidence, verdict, evidence, share of the vote, agreement with the others.
-        """
         ...
     @property
     def weights(self) -> NDArray[numpy.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -53,6 +54,24 @@ def test_a_memory_opened_again_answers_the_same(memory, containers):
     assert again.names == memory.names
     target = semfm.prepare(containers[3].mesh)
     assert np.array_equal(again.transfer(target).weights, memory.transfer(target).weights)
+
+
+def test_a_memory_is_asked_while_it_changes(containers, tmp_path):
+    memory = semfm.Memory(tmp_path / "memory")
+    lengths = []
+    first, target = containers[0], containers[3].mesh
+    memory.remember("a", first.mesh, first.region, progress=lambda *_: lengths.append(len(memory)))
+    assert set(lengths) <= {0}
+    with ThreadPoolExecutor() as threads:
+        changes = [
+            threads.submit(memory.remember, name, demo.mesh, demo.region)
+            for name, demo in zip("bc", containers[1:])
+        ]
+        answers = [threads.submit(memory.transfer, target) for _ in range(3)]
+        for change in changes:
+            change.result(timeout=300)
+        assert all(1 <= len(answer.result(timeout=300).answers) <= 3 for answer in answers)
+    assert memory.names == ["a", "b", "c"]
 
 
 def test_what_does_not_fit_is_refused_with_a_reason(memory, containers, tmp_path):

@@ -174,6 +174,13 @@ mod tests {
         let depth = chosen.depth.unwrap().name;
         assert_eq!(depth, "/camera/aligned_depth_to_color/image_raw/compressedDepth");
         assert_eq!(chosen.camera_info, "/camera/aligned_depth_to_color/camera_info");
+        let packed = topics(&[
+            ("/d/depth/image/compressed", COMPRESSED),
+            ("/d/depth/image/compressedDepth", COMPRESSED),
+            ("/d/depth/camera_info", CAMERA_INFO),
+        ]);
+        let depth = choose(&packed, &Asked::default()).unwrap().depth.unwrap().name;
+        assert_eq!(depth, "/d/depth/image/compressedDepth");
         let lidar = topics(&[("/points", POINT_CLOUD), ("/camera_info", CAMERA_INFO)]);
         assert_eq!(choose(&lidar, &Asked::default()).unwrap().depth.unwrap().schema, POINT_CLOUD);
     }
