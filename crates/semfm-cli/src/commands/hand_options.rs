@@ -69,6 +69,9 @@ impl HandOptions {
 
     fn frames(&self, pose: impl Fn(&Path) -> Result<Option<Sim3>>) -> Result<Vec<HandFiles>> {
         let n = self.hand.len().max(self.hand_mask.len());
+        if n == 0 && !self.aligned.is_empty() {
+            bail!("--aligned: expected --hand or --hand-mask beside it, found neither");
+        }
         let check = |flag: &str, found: usize| match found {
             found if found <= 1 || found == n => Ok(()),
             found => bail!("{flag}: expected 1 or {n}, one for each frame, found {found}"),
