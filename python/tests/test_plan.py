@@ -115,7 +115,7 @@ def test_grasps_of_this_process_need_no_file(demo, robot, asked, tmp_path):
     tcp = (robot.forward(q) @ flange_from_tcp)[:3, 3]
     assert np.linalg.norm(tcp - wanted[:3]) < 2e-3
     names = {Path(path).name for path in plan.write(tmp_path / "plan")}
-    assert "object.ply" in names, "nothing that the trajectory could name"
+    assert "planned_object.ply" in names, "nothing that the trajectory could name"
     page = tmp_path / "page.html"
     show = [semfm_cli(), "show", tmp_path / "plan", "-o", page]
     done = subprocess.run(show, capture_output=True, text=True)

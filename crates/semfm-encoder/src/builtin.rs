@@ -73,7 +73,7 @@ pub fn builtin_encoder() -> Result<Arc<NetEncoder>> {
     BUILTIN_ENCODERS[0].encoder()
 }
 
-/// Likeness in the features of encoders outside, measured on procedural objects (`eval --synthetic --nonsense`): the
+/// Likeness in the features of encoders outside, measured once on fifteen procedural objects (`docs/memory.md`): the
 /// digits of the hash over configuration and weights that end their version, and the scale.
 const MEASURED_SCALES: [(&str, LikenessScale); 1] = [
     // MobileNetV2 (ImageNet) as ONNX, outputs of stride 16.

@@ -22,6 +22,7 @@ mod embeddings;
 mod errors;
 mod functional_map;
 mod geodesic;
+mod grasp;
 mod grasp_pickle;
 mod grasps;
 mod gripper;
@@ -75,7 +76,9 @@ mod _semfm {
     #[pymodule_export]
     use crate::geodesic::{_restore_heat, HeatGeodesics, geodesic_distances};
     #[pymodule_export]
-    use crate::grasps::{_restore_grasp, _restore_grasps, Grasp, Grasps, find_grasps};
+    use crate::grasp::{_restore_grasp, Grasp};
+    #[pymodule_export]
+    use crate::grasps::{_restore_grasps, Grasps, find_grasps};
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]

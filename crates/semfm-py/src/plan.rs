@@ -157,7 +157,7 @@ impl GraspPlan {
 
     /// Writes what ``semfm-cli plan`` writes: `plan.json` and, of a motion, `trajectory.json`, a ROS 2 bag, a scene for
     /// Foxglove, an animated model and a picture, else a picture of the nearest miss. An object that came from no file is
-    /// written beside them (`object.ply`).
+    /// written beside them (`planned_object.ply`).
     ///
     /// Parameters
     /// ----------

@@ -25,7 +25,7 @@ fn the_folder_of_a_plan_is_whole_and_read_back_as_it_was() {
     let names: Vec<&str> = written.iter().filter_map(|path| path.file_name()?.to_str()).collect();
     // The two that tell of grasps are not of a motion alone, and the object has a file.
     let mut expected = PLAN_FILES.to_vec();
-    expected.retain(|name| !["plan.json", "miss.png", "object.ply"].contains(name));
+    expected.retain(|name| !["plan.json", "miss.png", "planned_object.ply"].contains(name));
     if !cfg!(feature = "mcap") {
         expected.retain(|name| !name.ends_with(".mcap") && !name.ends_with(".yaml"));
     }
@@ -58,7 +58,7 @@ fn an_object_without_a_file_is_written_beside_the_motion() {
     let read = read_motion(&plan.join("trajectory.json")).unwrap();
     let [a, b] = [&motion, &read].map(|m| m.scene.object.as_ref().unwrap());
     assert_eq!(a.mesh.vertices(), b.mesh.vertices());
-    assert_eq!(b.file.as_ref().unwrap().file_name().unwrap(), "object.ply");
+    assert_eq!(b.file.as_ref().unwrap().file_name().unwrap(), "planned_object.ply");
     assert_eq!(read.notes, motion.notes);
     let groups = groups_of_paths(&[plan], &Task::default()).unwrap();
     assert_eq!(groups[0].notes, motion.notes);

@@ -27,7 +27,7 @@ use crate::options::Common;
     semfm-cli frames bop/000001 -o frames.mcap")]
 pub struct FramesCommand {
     /// A bag (.mcap, or a folder of them) or the folder of a BOP scene
-    #[arg(required_unless_present_any = ["color", "depth"], conflicts_with_all = ["color", "depth"])]
+    #[arg(conflicts_with_all = ["color", "depth"])]
     source: Option<PathBuf>,
     /// Where to write: a folder (BOP scene), or a bag (`NAME.mcap`)
     #[arg(short, long, value_name = "FOLDER|FILE.mcap")]
@@ -83,6 +83,11 @@ impl FramesCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         if self.source.as_deref().is_some_and(|source| is_same_file(source, &self.output)) {
             bail!("{}: expected another place than the source", self.output.display());
+        }
+        if self.source.is_none() && self.color.is_none() && self.depth.is_none() {
+            bail!(
+                "expected a bag or a BOP scene, or --color or --depth with --intrinsics; found neither"
+            );
         }
         let observations = match &self.source {
             Some(source) => {

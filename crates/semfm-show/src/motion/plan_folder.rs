@@ -34,7 +34,7 @@ const LAST: usize = 3;
 /// Writes a motion into `folder`, which is made if it is not there: `trajectory.json`; a ROS 2 bag (feature `mcap`:
 /// `trajectory.mcap` with `metadata.yaml`, so that `ros2 bag play FOLDER` plays it) and a scene for Foxglove
 /// (`scene.mcap`); an animated model (`motion.glb`) and a picture (`motion.png`); where the object's mesh came from no
-/// file, that too (`object.ply`). The folder has all of them or, where something fails, what it had before. Returns the
+/// file, that too (`planned_object.ply`). The folder has all of them or, where something fails, what it had before. Returns the
 /// paths.
 ///
 /// # Errors

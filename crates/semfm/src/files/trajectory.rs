@@ -25,7 +25,7 @@ use crate::{
 pub const FORMAT: &str = "semfm.trajectory/1";
 
 /// The file of an object's mesh that came from none, in the folder of the trajectory.
-pub const OBJECT_FILE: &str = "object.ply";
+pub const OBJECT_FILE: &str = "planned_object.ply";
 
 /// A motion as its file has it. Poses are 4 × 4 matrices, rows first, in the frame of the arm's base link; lengths are
 /// metres, angles radians, times seconds. The robot's description and the object's mesh are named with their hashes,
