@@ -150,7 +150,7 @@ def test_an_alignment_is_taken_whole(mug, scale, tmp_path):
     [
         ({"scale": -1.0}, "scale"),
         ({"friction": 0.0}, "friction"),
-        ({"camera_from_object": np.diag([2.0, 2, 2, 1])}, "rigid"),
+        ({"camera_from_object": np.diag([2.0, 2, 2, 1])}, "scale of 2"),
         ({"camera_from_object": np.eye(3)}, r"\(4, 4\)"),
         ({"approach": [0, 0, 0]}, "axis"),
         ({"scene_points": [[0, 0]]}, "scene_points"),

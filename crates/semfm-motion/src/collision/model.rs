@@ -44,7 +44,7 @@ pub struct CollisionModel {
 
 impl CollisionModel {
     /// Reads the shapes of all links, and sorts out which pairs are checked: those that the SRDF leaves, or, without
-    /// one, those that neither are adjacent nor always or never touch.
+    /// one or with one that disables none, those that neither are adjacent nor always or never touch.
     ///
     /// A link without collision geometry, or whose collision meshes cannot be read, is taken by its visuals; a note says
     /// so. Links that no joint of the arm moves are not checked against the scene: no motion can change it.
@@ -76,7 +76,14 @@ impl CollisionModel {
                 bodies.push(MovingBody::new(&arm, link.name.clone(), index, Pose::IDENTITY, body));
             }
         }
-        let Pairs { checked, skipped } = match srdf {
+        // Neighbours overlap where they are joined: a file that allows no contact at all has no list of pairs.
+        let listed = srdf.filter(|srdf| !srdf.disabled.is_empty());
+        if srdf.is_some() && listed.is_none() {
+            notes.push(
+                "the SRDF disables no pair of links: by random states of the arm instead".into(),
+            );
+        }
+        let Pairs { checked, skipped } = match listed {
             Some(srdf) => Pairs::by_srdf(&bodies, srdf),
             None => {
                 let CollisionSettings { contact, n_samples, seed } = *settings;
