@@ -154,7 +154,7 @@ def bench(name: str, setup: Setup, shared: Path, program: Path, folder: Path, n_
         "--top", N_GRASPS, "--samples", N_SAMPLES, "--seed", seed, "-o", grasps,
     )  # fmt: skip
     row = {"grasps": len(json.loads(grasps.read_text())["grasps"]), "places": n_places, "solved": 0, "gates": Counter()}
-    row |= {"states": 0, "faults": [], "durations": [], "first_touch": [], "plan": []}
+    row |= {"states": 0, "faults": [], "durations": [], "gaps": [], "plan": []}
     scene = folder / "scene.json"
     scene.write_text(json.dumps({"format": "semfm.scene/1", "boxes": BOXES}))
     for i, place in enumerate(places(name, vertices, n_places, seed)):
@@ -174,7 +174,7 @@ def bench(name: str, setup: Setup, shared: Path, program: Path, folder: Path, n_
         row["durations"].append(sum(segment["seconds"] for segment in plan["segments"]))
         found = replay(setup.arm, out / "trajectory.json", mesh)
         row["states"] += found.n_states
-        row["first_touch"].append(found.first_touch)
+        row["gaps"].append(1e3 * found.gap)
         if found.faults:
             row["faults"].append(f"{out}: {'; '.join(found.faults)}")
             print(row["faults"][-1], file=sys.stderr)
@@ -200,9 +200,9 @@ def main() -> None:
     rows = {}
     print(
         "| arm | object | region from | grasps | solved | seconds: region | grasps | plan, median | motion s, median "
-        "| states replayed | motions with a fault |"
+        "| fingers stop short by mm, largest | states replayed | motions with a fault |"
     )
-    print("| --- " * 11 + "|")
+    print("| --- " * 12 + "|")
     for arm in arguments.arms:
         setup = setups(shared / "data")[arm]
         for name in arguments.objects:
@@ -210,10 +210,11 @@ def main() -> None:
             rows[arm, name] = row
             source = OBJECTS[name].source
             duration = f"{median(row['durations']):.1f}" if row["durations"] else "–"
+            gap = f"{max(row['gaps']):.2f}" if row["gaps"] else "–"
             print(
                 f"| {arm} | {name} | {'itself' if source == name else source} | {row['grasps']} "
                 f"| {row['solved']} of {row['places']} | {row['region']:.2f} | {row['grasp']:.2f} | {row['plan']:.2f} "
-                f"| {duration} | {row['states']} | {len(row['faults'])} |",
+                f"| {duration} | {gap} | {row['states']} | {len(row['faults'])} |",
                 flush=True,
             )
     print()

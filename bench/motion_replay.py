@@ -51,7 +51,8 @@ class HandShape:
 
     #: Its number in pinocchio's list.
     index: int
-    is_finger: bool
+    #: `palm`, `left` or `right`.
+    role: str
     #: For each opening of the trajectory.
     tip_from_part: list[pin.SE3]
     part_from_shape: pin.SE3
@@ -66,6 +67,8 @@ class Replay:
     faults: list[str] = field(default_factory=list)
     #: First time at which a finger touches the object, relative to the beginning of `close`, seconds.
     first_touch: float | None = None
+    #: Distance from the object at the end of `close` of the finger that is farther from it, metres; 0 where both touch.
+    gap: float = float("nan")
 
 
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +177,7 @@ class World:
             # A link with several shapes may be several parts: they move alike.
             for link_from_shape, shape in shapes.pop(part["link"], []):
                 index = self.add(f"hand:{part['link']}_{len(added)}", joint, pin.SE3.Identity(), shape)
-                added.append(HandShape(index, part["role"] != "palm", poses, link_from_shape))
+                added.append(HandShape(index, part["role"], poses, link_from_shape))
         return added
 
     def add_obstacles(self) -> list[int]:
@@ -196,10 +199,15 @@ class World:
         geometry, hand = self.geometry, [part.index for part in self.hand]
         joint_of = [shape.parentJoint for shape in geometry.geometryObjects]
         columns = {column for column, _ in self.fingers}
-        self.finger_shapes = {part.index for part in self.hand if part.is_finger}
-        self.finger_shapes |= {
-            link for link in self.links if joint_of[link] and self.model.joints[joint_of[link]].idx_q in columns
-        }
+        # Shapes of each finger: of each side of a hand, of each finger's joint of a robot that has them.
+        self.sides: dict[str | int, list[int]] = {}
+        for part in self.hand:
+            if part.role != "palm":
+                self.sides.setdefault(part.role, []).append(part.index)
+        for link in self.links:
+            if joint_of[link] and self.model.joints[joint_of[link]].idx_q in columns:
+                self.sides.setdefault(joint_of[link], []).append(link)
+        self.finger_shapes = {shape for side in self.sides.values() for shape in side}
         geometry.addAllCollisionPairs()
         if self.arm.srdf:
             pin.removeCollisionPairs(self.model, geometry, str(self.arm.srdf), False)
@@ -284,6 +292,16 @@ class World:
                     found.append((pair.first, pair.second))
         return found
 
+    def gap(self, q: np.ndarray) -> float:
+        """Distance from the object of the finger that is farther from it; where shapes overlap, 0."""
+        pin.updateGeometryPlacements(self.model, self.data, self.geometry, self.geometry_data, q)
+        distances = {}
+        for k in self.pairs["object"]:
+            pair = self.geometry.collisionPairs[k]
+            distance = pin.computeDistance(self.geometry, self.geometry_data, k).min_distance
+            distances[pair.first] = distances[pair.second] = max(distance, 0.0)
+        return max(min(distances[shape] for shape in side) for side in self.sides.values())
+
     def name(self, shape: int) -> str:
         return self.geometry.geometryObjects[shape].name
 
@@ -347,6 +365,8 @@ def replay(arm: Arm, trajectory: Path, object_file: Path) -> Replay:
                         continue
                 faults.setdefault(" touches ".join(map(world.name, pair)), f"at {time:.3f} s")
             found.n_states += 1
+        if kind == "close":
+            found.gap = world.gap(full)
         found.faults += [" ".join(filter(None, (f"{kind}:", *fault))) for fault in faults.items()]
     return found
 
