@@ -154,7 +154,7 @@ def bench(name: str, setup: Setup, shared: Path, program: Path, folder: Path, n_
         "--top", N_GRASPS, "--samples", N_SAMPLES, "--seed", seed, "-o", grasps,
     )  # fmt: skip
     row = {"grasps": len(json.loads(grasps.read_text())["grasps"]), "places": n_places, "solved": 0, "gates": Counter()}
-    row |= {"states": 0, "faults": [], "durations": [], "gaps": [], "plan": []}
+    row |= {"states": 0, "faults": [], "durations": [], "gaps": [], "touched": 0, "plan": []}
     scene = folder / "scene.json"
     scene.write_text(json.dumps({"format": "semfm.scene/1", "boxes": BOXES}))
     for i, place in enumerate(places(name, vertices, n_places, seed)):
@@ -175,6 +175,7 @@ def bench(name: str, setup: Setup, shared: Path, program: Path, folder: Path, n_
         found = replay(setup.arm, out / "trajectory.json", mesh)
         row["states"] += found.n_states
         row["gaps"].append(1e3 * found.gap)
+        row["touched"] += found.first_touch is not None
         if found.faults:
             row["faults"].append(f"{out}: {'; '.join(found.faults)}")
             print(row["faults"][-1], file=sys.stderr)
@@ -223,8 +224,11 @@ def main() -> None:
     print("| --- " * (2 + len(gates)) + "|")
     for (arm, name), row in rows.items():
         print(f"| {arm} | {name} | {' | '.join(str(row['gates'][gate]) for gate in gates)} |")
-    solved, places_, faults = (sum(row[key] for row in rows.values()) for key in ("solved", "places", "n_faults"))
+    solved, places_, faults, touched = (
+        sum(row[key] for row in rows.values()) for key in ("solved", "places", "n_faults", "touched")
+    )
     print(f"\n{solved} of {places_} solved; {faults} motions with a fault; goal 0: {'met' if not faults else 'missed'}")
+    print(f"motions in which a finger overlaps the object (allowed from the beginning of close): {touched}")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-#: Half-size of the box that stands for what is below the table, metres.
+#: Half-size of the box that stands for what is below the table where a shape has no corners, metres.
 GROUND = 2.0
 #: By which share rounding may pass a limit, and by how much a position (radians).
 ROUNDING, POSITION_ROUNDING = 1e-6, 1e-9
@@ -94,6 +94,16 @@ def bvh(vertices: np.ndarray, faces: np.ndarray) -> coal.BVHModelOBBRSS:
     model.addSubModel(points, triangles)
     model.endModel()
     return model
+
+
+def corners(shape) -> np.ndarray | None:
+    """Corners of a mesh or a box; none of a shape that is round."""
+    if isinstance(shape, coal.BVHModelBase):
+        return np.array(shape.vertices())
+    if isinstance(shape, coal.Box):
+        signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
+        return signs * np.asarray(shape.halfSide).ravel()
+    return None
 
 
 def se3(matrix) -> pin.SE3:
@@ -182,12 +192,15 @@ class World:
 
     def add_obstacles(self) -> list[int]:
         added = []
+        #: Of each half-space its place.
+        self.half_spaces: dict[int, pin.SE3] = {}
         for obstacle in self.motion["obstacles"]:
             at = self.world_from_base * se3(obstacle["base_from_obstacle"])
             shape = obstacle["shape"]
             if shape["type"] == "half_space":
-                at = at * pin.SE3(np.eye(3), np.array([0, 0, -GROUND]))
-                added.append(self.add(obstacle["name"], 0, at, coal.Box(2 * GROUND, 2 * GROUND, 2 * GROUND)))
+                below = at * pin.SE3(np.eye(3), np.array([0, 0, -GROUND]))
+                added.append(self.add(obstacle["name"], 0, below, coal.Box(2 * GROUND, 2 * GROUND, 2 * GROUND)))
+                self.half_spaces[added[-1]] = at
             elif shape["type"] == "box":
                 added.append(self.add(obstacle["name"], 0, at, coal.Box(*shape["size"])))
             else:
@@ -233,6 +246,7 @@ class World:
                 # Pinocchio wants the smaller number first.
                 geometry.addCollisionPair(pin.CollisionPair(min(a, b), max(a, b)))
         self.geometry_data = pin.GeometryData(geometry)
+        self.corners = {shape: corners(geometry.geometryObjects[shape].geometry) for shape in [*moving, self.object]}
 
     def are_adjacent(self, a: int, b: int) -> bool:
         """Whether no joint or one is between two links."""
@@ -287,10 +301,19 @@ class World:
         found = []
         for kind in kinds:
             for k in self.pairs[kind]:
-                if pin.computeCollision(self.geometry, self.geometry_data, k):
-                    pair = self.geometry.collisionPairs[k]
+                pair = self.geometry.collisionPairs[k]
+                if self.overlap(k, pair.first, pair.second):
                     found.append((pair.first, pair.second))
         return found
+
+    def overlap(self, k: int, a: int, b: int) -> bool:
+        """Whether the `k`-th pair overlaps. What has corners is in a half-space where a corner is: no need for coal."""
+        space, shape = (a, b) if a in self.half_spaces else (b, a)
+        points = self.corners.get(shape)
+        if space not in self.half_spaces or points is None:
+            return pin.computeCollision(self.geometry, self.geometry_data, k)
+        space_from_shape = self.half_spaces[space].inverse() * self.geometry_data.oMg[shape]
+        return (points @ space_from_shape.rotation[2]).min() + space_from_shape.translation[2] < 0
 
     def gap(self, q: np.ndarray) -> float:
         """Distance from the object of the finger that is farther from it; where shapes overlap, 0."""
