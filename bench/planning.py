@@ -16,6 +16,9 @@ which unpacks the problems (``bench/planning_problems.py``), and does for both a
 curves with toppra (the same velocity and acceleration limits, constraints at both ends of each interval, 1 000 intervals,
 seidel). ``replay`` evaluates the cubics between samples at every millisecond by itself: limits, and contacts by coal on the
 robot's meshes as they are. All of it runs on one thread. Other planners: ``bench/planning_peers.py``.
+
+Some kernels count a thread's processor time in ticks of 4 ms, as long as many plans take. ``--repeats 12`` plans every
+problem so often, with the same seed and so the same work, and takes the mean of its milliseconds.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -223,15 +227,37 @@ def replay(folder: Path, path: Path, every: int) -> None:
     )
 
 
-def run(data: Path, cache: Path, binaries: Path, every: int, seed: int) -> None:
+def plan(binaries: Path, folder: Path, out: Path, every: int, seed: int, repeats: int) -> None:
+    """Writes our answers, each with the mean milliseconds of `repeats` runs of the same work."""
+    command = [binaries / "examples" / "plan_problems", folder, out, "--every", str(every), "--seed", str(seed)]
+    subprocess.run(command, check=True)
+    if repeats == 1:
+        return
+    head, answers = read(out)
+    with tempfile.TemporaryDirectory() as scratch:
+        command[2] = Path(scratch) / out.name
+        for _ in range(repeats - 1):
+            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+            for answer, again in zip(answers, read(command[2])[1], strict=True):
+                if answer["outcome"] != again["outcome"]:
+                    name, (first, then) = answer["problem"], (answer["outcome"], again["outcome"])
+                    raise SystemExit(f"{name}: first {first}, then {then}, with the same seed")
+                for stage, ms in again.get("ms", {}).items():
+                    answer["ms"][stage] += ms
+    for answer in answers:
+        if "ms" in answer:
+            answer["ms"] = {stage: ms / repeats for stage, ms in answer["ms"].items()}
+    out.write_text("".join(json.dumps(line) + "\n" for line in [head, *answers]))
+
+
+def run(data: Path, cache: Path, binaries: Path, every: int, seed: int, repeats: int) -> None:
     """All of it for both arms."""
     folders = [cache / robot for robot in TIPS]
     if not all((folder / "problems.json").is_file() for folder in folders):
         unpack(data, cache)
     plans = [folder / "plans.jsonl" for folder in folders]
     for folder, out in zip(folders, plans):
-        program = binaries / "examples" / "plan_problems"
-        subprocess.run([program, folder, out, "--every", str(every), "--seed", str(seed)], check=True)
+        plan(binaries, folder, out, every, seed, repeats)
     summary(plans)
     toppra(plans, 1)
     for folder, out in zip(folders, plans):
@@ -256,6 +282,7 @@ def main() -> None:
     command.add_argument("--bin", type=Path, default=Path("target/release"), help="folder of the built programs")
     command.add_argument("--every", type=int, default=1, help="only each N-th problem")
     command.add_argument("--seed", type=int, default=0)
+    command.add_argument("--repeats", type=int, default=1, help="runs of the same work, whose mean time is taken")
     arguments = parser.parse_args()
     if arguments.command == "summary":
         summary(arguments.plans)
@@ -264,7 +291,7 @@ def main() -> None:
     elif arguments.command == "replay":
         replay(arguments.folder, arguments.plans, arguments.every)
     else:
-        run(arguments.data, arguments.cache, arguments.bin, arguments.every, arguments.seed)
+        run(arguments.data, arguments.cache, arguments.bin, arguments.every, arguments.seed, arguments.repeats)
 
 
 if __name__ == "__main__":

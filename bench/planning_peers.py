@@ -31,7 +31,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from planning import goals
+from planning import goals, plan, read
 from planning_problems import IndependentChecker
 
 #: Greatest step of the peers' motion checks, radians.
@@ -51,14 +51,12 @@ def path_length(path) -> float:
     return float(np.linalg.norm(np.diff(np.asarray(path), axis=0), axis=1).sum())
 
 
-def ours(folder: Path, binaries: Path, every: int, seed: int) -> list[dict]:
+def ours(folder: Path, binaries: Path, every: int, seed: int, repeats: int) -> list[dict]:
     """A row for each problem that is valid."""
     with tempfile.TemporaryDirectory() as scratch:
         out = Path(scratch) / "plans.jsonl"
-        program = binaries / "examples" / "plan_problems"
-        command = [program, folder, out, "--every", str(every), "--seed", str(seed)]
-        subprocess.run(command, check=True, capture_output=True)
-        answers = [json.loads(line) for line in out.read_text().splitlines()[1:]]
+        plan(binaries, folder, out, every, seed, repeats)
+        _, answers = read(out)
     rows = []
     for answer in answers:
         if answer["outcome"] in ("not free", "out of limits"):
@@ -189,9 +187,9 @@ def ask(peer: str, folder: Path, names: list[str], seed: int) -> list[dict]:
     return [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
 
 
-def compare(folder: Path, binaries: Path, every: int, seeds: int, peers: list[str]) -> None:
+def compare(folder: Path, binaries: Path, every: int, seeds: int, repeats: int, peers: list[str]) -> None:
     """Prints a row for each program, and what became of our goals on these problems."""
-    found = {"ours": [row for seed in range(seeds) for row in ours(folder, binaries, every, seed)]}
+    found = {"ours": [row for seed in range(seeds) for row in ours(folder, binaries, every, seed, repeats)]}
     names = list(dict.fromkeys(row["problem"] for row in found["ours"]))
     for peer in peers:
         found[peer] = [row for seed in range(seeds) for row in ask(peer, folder, names, seed)]
@@ -221,6 +219,7 @@ def main() -> None:
     parser.add_argument("--bin", type=Path, default=Path("target/release"), help="folder of the built programs")
     parser.add_argument("--every", type=int, default=35, help="only each N-th problem")
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=1, help="runs of ours of the same work, whose mean time is taken")
     parser.add_argument("--peers", nargs="*", choices=PEERS, default=list(PEERS))
     parser.add_argument("--as", dest="peer", choices=PEERS, help=argparse.SUPPRESS)
     parser.add_argument("--seed", type=int, default=0, help=argparse.SUPPRESS)
@@ -231,7 +230,7 @@ def main() -> None:
     print("| arm | program | solved | plan + shorten ms: median | p95 | max | length rad: mean | median | checks, median |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for folder in arguments.folders:
-        compare(folder, arguments.bin, arguments.every, arguments.seeds, arguments.peers)
+        compare(folder, arguments.bin, arguments.every, arguments.seeds, arguments.repeats, arguments.peers)
 
 
 if __name__ == "__main__":
