@@ -703,7 +703,9 @@ class Grasp:
         ...
     @property
     def command_width(self) -> float:
-        """float: what to tell a hand that stops at a force, metres: below contact, so that the pads press."""
+        """float: what to tell a hand that stops at a force, metres: below contact, so that the pads press, and no
+        less than the gripper can close to.
+        """
         ...
     @property
     def contact_width(self) -> float:
