@@ -220,9 +220,10 @@ def main() -> None:
             )
     print()
     gates = list(dict.fromkeys(gate for row in rows.values() for gate in row["gates"]))
-    print(f"| arm | object | {' | '.join(gates)} |")
-    print("| --- " * (2 + len(gates)) + "|")
-    for (arm, name), row in rows.items():
+    if gates:
+        print(f"| arm | object | {' | '.join(gates)} |")
+        print("| --- " * (2 + len(gates)) + "|")
+    for (arm, name), row in rows.items() if gates else ():
         print(f"| {arm} | {name} | {' | '.join(str(row['gates'][gate]) for gate in gates)} |")
     solved, places_, faults, touched = (
         sum(row[key] for row in rows.values()) for key in ("solved", "places", "n_faults", "touched")
