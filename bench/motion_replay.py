@@ -21,6 +21,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from cubics import Cubics
+
 #: Half-size of the box that stands for what is below the table where a shape has no corners, metres.
 GROUND = 2.0
 #: By which share rounding may pass a limit, and by how much a position (radians).
@@ -113,25 +115,17 @@ def se3(matrix) -> pin.SE3:
     return pin.SE3(u @ vt, matrix[:3, 3])
 
 
-class Cubics:
+class Segment(Cubics):
     """Positions, velocities, accelerations and opening of a segment at any time."""
 
     def __init__(self, points: list[dict]):
-        self.times, self.q, self.v, self.opening = (
+        times, positions, velocities, self.opening = (
             np.array([point[key] for point in points]) for key in ("time", "positions", "velocities", "opening")
         )
+        super().__init__(times, positions, velocities)
 
-    def at(self, times: np.ndarray):
-        part = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
-        h = (self.times[part + 1] - self.times[part])[:, None]
-        s = (times - self.times[part])[:, None]
-        mean = (self.q[part + 1] - self.q[part]) / h
-        v0, v1 = self.v[part], self.v[part + 1]
-        a = (3 * mean - 2 * v0 - v1) / h
-        b = (v0 + v1 - 2 * mean) / h**2
-        share = (s / h)[:, 0]
-        opening = self.opening[part] * (1 - share) + self.opening[part + 1] * share
-        return self.q[part] + s * (v0 + s * (a + s * b)), v0 + s * (2 * a + 3 * s * b), 2 * a + 6 * s * b, opening
+    def opening_at(self, times: np.ndarray) -> np.ndarray:
+        return np.interp(times, self.times, self.opening)
 
 
 class World:
@@ -355,14 +349,14 @@ def replay(arm: Arm, trajectory: Path, object_file: Path) -> Replay:
     motion = json.loads(trajectory.read_text())
     world = World(arm, motion, object_file)
     found = Replay()
-    segments = {segment["kind"]: Cubics(segment["points"]) for segment in motion["segments"]}
+    segments = {segment["kind"]: Segment(segment["points"]) for segment in motion["segments"]}
     ends = [(cubics.times[0], cubics.times[-1]) for cubics in segments.values()]
     if any(before[1] != after[0] for before, after in zip(ends, ends[1:])):
         found.faults.append("a segment does not begin where the one before ends")
     tip_from_object = None
     for kind, cubics in segments.items():
         times = np.append(np.arange(cubics.times[0], cubics.times[-1], 1e-3), cubics.times[-1])
-        q, v, a, openings = cubics.at(times)
+        (q, v, a), openings = cubics.at(times), cubics.opening_at(times)
         faults = dict.fromkeys(out_of_limits(world, cubics, q, v, a))
         for time, positions, opening in zip(times, q, openings):
             full = world.configuration(positions, opening)

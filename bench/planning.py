@@ -36,6 +36,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from cubics import Cubics
 from planning_problems import TIPS, IndependentChecker, unpack
 
 #: Lengths of VAMP's paths, radians (Thomason, Kingston & Kavraki, Motions in Microseconds via Vectorized Sampling-Based
@@ -175,25 +176,6 @@ def toppra(paths: list[Path], every: int) -> None:
             print(f"toppra found no motion for {failed} more")
 
 
-class Cubics:
-    """Positions, velocities and accelerations of a trajectory at any time."""
-
-    def __init__(self, points: list):
-        self.times = np.array([point[0] for point in points])
-        self.q = np.array([point[1] for point in points])
-        self.v = np.array([point[2] for point in points])
-
-    def at(self, times: np.ndarray):
-        part = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
-        h = (self.times[part + 1] - self.times[part])[:, None]
-        s = (times - self.times[part])[:, None]
-        mean = (self.q[part + 1] - self.q[part]) / h
-        v0, v1 = self.v[part], self.v[part + 1]
-        a = (3 * mean - 2 * v0 - v1) / h
-        b = (v0 + v1 - 2 * mean) / h**2
-        return self.q[part] + s * (v0 + s * (a + s * b)), v0 + s * (2 * a + 3 * s * b), 2 * a + 6 * s * b
-
-
 def replay(folder: Path, path: Path, every: int) -> None:
     """Evaluates motions at every millisecond and prints what passes a limit or touches."""
     content = json.loads((folder / "problems.json").read_text())
@@ -204,7 +186,8 @@ def replay(folder: Path, path: Path, every: int) -> None:
     n_states, beyond, touching, n_motions, moving, standing = 0, 0, 0, 0, 0, 0
     greatest = np.zeros(2)
     for answer in solved(answers)[::every]:
-        cubics = Cubics(answer["trajectory"]["points"])
+        points = answer["trajectory"]["points"]
+        cubics = Cubics(*(np.array([point[i] for point in points]) for i in range(3)))
         n_motions += 1
         standing += bool((np.diff(cubics.times) <= 0).any())
         moving += bool(cubics.v[0].any() or cubics.v[-1].any())
