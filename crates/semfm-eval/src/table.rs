@@ -316,6 +316,15 @@ impl Markdown<'_> {
     }
 }
 
+/// A section that lists what failed, one line each; nothing where nothing did.
+pub(crate) fn failures(lines: impl IntoIterator<Item = String>) -> String {
+    let lines: Vec<String> = lines.into_iter().map(|line| format!("- {line}\n")).collect();
+    match lines.len() {
+        0 => String::new(),
+        n => format!("\n## Failures ({n})\n\n{}", lines.concat()),
+    }
+}
+
 pub(crate) fn header(names: impl IntoIterator<Item = String>) -> String {
     let names: Vec<String> = names.into_iter().collect();
     let rule = vec!["---".to_owned(); names.len()];

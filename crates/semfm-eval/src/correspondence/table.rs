@@ -2,7 +2,7 @@
 
 use super::map_method::MapMethod;
 use super::results::{MapResults, MapSummary};
-use crate::table::{dash, header, line};
+use crate::table::{dash, failures, header, line};
 
 /// A mean error × 100 measured with pyFM 1.3.1 on the same pairs (all samples, geodesics of
 /// potpourri3d).
@@ -71,19 +71,10 @@ impl MapResults {
     }
 
     fn failures(&self) -> String {
-        let failed: Vec<_> =
-            self.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?))).collect();
-        if failed.is_empty() {
-            return String::new();
-        }
-        let mut text = format!("\n## Failures ({})\n\n", failed.len());
-        for (row, reason) in failed {
-            text += &format!(
-                "- {}: {} → {}, {}: {reason}\n",
-                row.set, row.source, row.target, row.method
-            );
-        }
-        text
+        failures(self.rows.iter().filter_map(|row| {
+            let reason = row.failure.as_ref()?;
+            Some(format!("{}: {} → {}, {}: {reason}", row.set, row.source, row.target, row.method))
+        }))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `memory.md`: several demonstrations beside one.
 
 use super::results::{MemoryResults, MemorySummary};
-use crate::table::{dash, header, line, number, percent};
+use crate::table::{dash, failures, header, line, number, percent};
 
 impl MemoryResults {
     /// The results as Markdown.
@@ -42,19 +42,13 @@ impl MemoryResults {
     }
 
     fn failures(&self) -> String {
-        let failed: Vec<_> =
-            self.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?))).collect();
-        if failed.is_empty() {
-            return String::new();
-        }
-        let mut text = format!("\n## Failures ({})\n\n", failed.len());
-        for (row, failure) in failed {
-            text += &format!(
-                "- {} {}, {} demonstrations: {}\n",
+        failures(self.rows.iter().filter_map(|row| {
+            let failure = row.failure.as_ref()?;
+            Some(format!(
+                "{} {}, {} demonstrations: {}",
                 row.group, row.target, row.n, failure.text
-            );
-        }
-        text
+            ))
+        }))
     }
 }
 
