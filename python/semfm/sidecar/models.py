@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..errors import SemfmError
@@ -77,7 +77,8 @@ def open_encoder(model: str, device: str = "auto", threads: int | None = None) -
     if model in PACKAGED:
         return _named(PACKAGED[model])(device, threads)
     if is_class_name(model):
-        return _open_class(model, device, threads)
+        texts, methods = ("name", "revision", "preprocessing"), ("grid", "encode")
+        return open_class(model, texts, methods, device=device, threads=threads)
     if model.endswith(".json"):
         return _named(ONNX)(model, device, threads)
     return _open_checkpoint(model, device, threads)
@@ -116,19 +117,32 @@ def _open_checkpoint(model: str, device: str, threads: int) -> Encoder:
     return _named(family)(checkpoint)
 
 
-def _open_class(model: str, device: str, threads: int) -> Encoder:
-    """Import a class by name, from the working folder too, and check what it made."""
+def open_class(name: str, texts: Sequence[str], methods: Sequence[str], **arguments: Any) -> Any:
+    """Make an object of a class named as ``package.module:Class``, from the working folder too.
+
+    Parameters
+    ----------
+    name
+        The class; it is called with ``arguments``.
+    texts, methods
+        Attributes that what it makes must have: text, and what can be called.
+
+    Raises
+    ------
+    SidecarError
+        If it cannot be imported or made, or lacks one of them.
+    """
     try:
         with working_folder_on_path():
-            made = _named(model)(device=device, threads=threads)
+            made = _named(name)(**arguments)
     except SemfmError:
         raise
     except Exception as error:  # code of others raises what it likes
-        raise SidecarError(f"{model}: {type(error).__name__}: {error}") from error
-    for name in ("name", "revision", "preprocessing"):
-        if not isinstance(getattr(made, name, None), str):
-            raise expected(model, name, "text", repr(getattr(made, name, None)))
-    for name in ("grid", "encode"):
-        if not callable(getattr(made, name, None)):
-            raise expected(model, name, "a method", repr(getattr(made, name, None)))
+        raise SidecarError(f"{name}: {type(error).__name__}: {error}") from error
+    for text in texts:
+        if not isinstance(getattr(made, text, None), str):
+            raise expected(name, text, "text", repr(getattr(made, text, None)))
+    for method in methods:
+        if not callable(getattr(made, method, None)):
+            raise expected(name, method, "a method", repr(getattr(made, method, None)))
     return made

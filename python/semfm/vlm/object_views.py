@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import Pinhole, Mesh, View, ViewsFile
+from .._identity import mesh_identity
 from ..sidecar.errors import expected
 
 #: Pixels whose triangle does not lie behind them, at most this share of the object's: rounding of
@@ -88,11 +89,7 @@ class ObjectViews:
     @property
     def identity(self) -> dict[str, Any]:
         """The mesh as regions name it."""
-        return {
-            "n_vertices": self.mesh.n_vertices,
-            "n_triangles": self.mesh.n_faces,
-            "hash": self.mesh.hash,
-        }
+        return mesh_identity(self.mesh)
 
 
 def read_object(path: str | os.PathLike[str]) -> ObjectViews:

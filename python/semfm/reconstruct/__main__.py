@@ -1,0 +1,7 @@
+"""``python -m semfm.reconstruct`` is ``semfm-reconstruct``."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())
