@@ -94,7 +94,7 @@ impl StagedFolder {
         fs::create_dir_all(&self.folder).map_err(Error::io(&self.folder))?;
         // A temporary folder is nobody else's, and its lock is held by this process already.
         let _alone = (!is_stage(&self.folder)).then(|| Alone::in_folder(&self.folder));
-        for name in last.iter().chain(gone) {
+        for name in in_order_of_removal(last, gone) {
             let path = self.folder.join(name);
             // Only regular files: what a link points at, or a device, is written into below.
             if fs::symlink_metadata(&path).is_ok_and(|about| about.is_file()) {
@@ -125,6 +125,12 @@ impl Drop for StagedFolder {
         let mut stages = STAGES.lock().unwrap_or_else(PoisonError::into_inner);
         stages.retain(|stage| stage.path != self.stage.path);
     }
+}
+
+/// What is put last goes first: after each removal, what is left of `last` has all that was put before
+/// it.
+fn in_order_of_removal<'a>(last: &[&'a str], gone: &[&'a str]) -> Vec<&'a str> {
+    last.iter().rev().chain(gone).copied().collect()
 }
 
 /// Whether the folder is there; an error where something else is.
@@ -245,6 +251,12 @@ mod tests {
         assert_eq!(listed(&folder), ["a.json", "own.txt", "region.json"]);
         assert_eq!(fs::read_to_string(folder.join("a.json")).unwrap(), "[2]\n");
         assert_eq!(listed(parent.path()), ["out"]);
+    }
+
+    #[test]
+    fn no_answer_outlives_what_was_put_before_it() {
+        let order = in_order_of_removal(&["report.json", "region.json"], &["grasps.json"]);
+        assert_eq!(order, ["region.json", "report.json", "grasps.json"]);
     }
 
     #[test]
