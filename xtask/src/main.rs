@@ -19,6 +19,7 @@ mod wheel;
 mod workspace;
 
 use std::process::ExitCode;
+use std::time::Instant;
 
 use anyhow::{Result, bail};
 
@@ -110,10 +111,12 @@ fn ci(workspace: &Workspace) -> bool {
     let jobs = BEFORE_TESTS.iter().filter_map(|name| JOBS.iter().find(|(job, _)| job == name));
     for (name, work) in jobs {
         println!("== {name}");
+        let start = Instant::now();
         if let Err(error) = work(workspace) {
             eprintln!("error: {name}: {error:#}");
             failed.push(*name);
         }
+        println!("-- {name}: {} s", start.elapsed().as_secs());
     }
     println!("== test --full");
     let tally = test::run(workspace, true);

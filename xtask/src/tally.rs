@@ -16,12 +16,19 @@ pub struct Tally {
     pub skipped: usize,
     /// Why, one line each.
     pub reasons: Vec<String>,
+    /// What failed, by the names that the runners print.
+    pub failures: Vec<String>,
 }
 
 impl Tally {
     /// Counts one thing that either worked or did not.
-    pub fn count(&mut self, worked: bool) {
-        if worked { self.passed += 1 } else { self.failed += 1 }
+    pub fn count(&mut self, name: &str, worked: bool) {
+        if worked {
+            self.passed += 1;
+        } else {
+            self.failed += 1;
+            self.failures.push(name.to_owned());
+        }
     }
 
     /// Adds another sum to this one.
@@ -30,6 +37,7 @@ impl Tally {
         self.failed += other.failed;
         self.skipped += other.skipped;
         self.reasons.extend(other.reasons);
+        self.failures.extend(other.failures);
     }
 
     /// A runner that failed without a failed test (it did not build, say) is one failure.
@@ -82,6 +90,8 @@ impl CargoTest {
                 self.counted = true;
                 self.returned_early += 1;
             }
+        } else if let Some(name) = line.strip_suffix(" ... FAILED") {
+            self.tally.failures.push(name.trim_start_matches("test ").to_owned());
         } else if let Some(result) = line.strip_prefix("test result: ") {
             let early = std::mem::take(&mut self.returned_early);
             self.counted = false;
@@ -114,6 +124,10 @@ impl Pytest {
     pub fn read(&mut self, line: &str) {
         if line.starts_with("SKIPPED [") {
             self.0.reasons.push(line.to_owned());
+            return;
+        }
+        if let Some(name) = line.strip_prefix("FAILED ").or_else(|| line.strip_prefix("ERROR ")) {
+            self.0.failures.push(name.to_owned());
             return;
         }
         // "==== 3 passed, 1 skipped in 0.12s ===="
@@ -190,6 +204,19 @@ mod tests {
     }
 
     #[test]
+    fn what_failed_is_named() {
+        let mut reader = CargoTest::default();
+        let doc_test = "test crates/a/src/lib.rs - a (line 3)";
+        for line in ["test it ... ok", "test io::b ... FAILED", &format!("{doc_test} ... FAILED")] {
+            reader.read(line);
+        }
+        assert_eq!(reader.end(false).failures, ["io::b", "crates/a/src/lib.rs - a (line 3)"]);
+        let mut reader = Pytest::default();
+        reader.read("FAILED tests/a.py::test_b - assert 1 == 2");
+        assert_eq!(reader.end(false).failures, ["tests/a.py::test_b - assert 1 == 2"]);
+    }
+
+    #[test]
     fn missing_shared_data_can_be_made_a_failure() {
         let reasons = [
             "SKIPPED: no shared data",
@@ -198,7 +225,7 @@ mod tests {
             "SKIPPED [3] b.py: libusb-1.0.so.0: cannot open shared object file",
         ];
         let reasons = reasons.map(String::from).to_vec();
-        let mut tally = Tally { passed: 1, failed: 0, skipped: 7, reasons };
+        let mut tally = Tally { passed: 1, skipped: 7, reasons, ..Tally::default() };
         tally.demand_shared_data();
         assert_eq!(tally.to_string(), "1 passed, 3 failed, 4 skipped");
     }

@@ -1,6 +1,7 @@
 //! `cargo xtask test`: every test there is, from a bare checkout.
 
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 
@@ -17,10 +18,14 @@ pub fn run(workspace: &Workspace, full: bool) -> Tally {
     let mut tally = Tally::default();
     let mut step = |name: &str, work: &dyn Fn() -> Result<Tally>| {
         println!("== {name}");
+        let start = Instant::now();
         tally.add(work().unwrap_or_else(|error| {
             eprintln!("error: {name}: {error:#}");
-            Tally::default().closed(false)
+            let mut tally = Tally::default();
+            tally.count(&format!("{name}: {error:#}"), false);
+            tally
         }));
+        println!("-- {name}: {} s", start.elapsed().as_secs());
     };
     let needs = if full { ALL_TESTS } else { TESTS };
     step("python environment", &|| environment(workspace, needs).map(|_| Tally::default()));
@@ -34,6 +39,9 @@ pub fn run(workspace: &Workspace, full: bool) -> Tally {
     }
     for reason in &tally.reasons {
         println!("{reason}");
+    }
+    for name in &tally.failures {
+        println!("FAILED: {name}");
     }
     tally
 }
@@ -66,7 +74,7 @@ impl Steps<'_> {
             if let Err(error) = &worked {
                 eprintln!("error: {error:#}");
             }
-            tally.count(worked.is_ok());
+            tally.count(&name, worked.is_ok());
         }
         Ok(tally)
     }
