@@ -8,8 +8,8 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use semfm_align::{AlignModel, AlignSettings, ObservedCloud, Sim3, align_model};
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
@@ -57,23 +57,11 @@ fn one(mesh: &Mesh, cloud: &[DVec3], init: &str) -> Result<serde_json::Value> {
     }))
 }
 
-/// The answer and the CPU milliseconds of all threads (wall milliseconds where there is no count).
+/// The answer and the CPU milliseconds of all threads.
 fn timed<T>(work: impl FnOnce() -> semfm_align::Result<T>) -> Result<(T, f64)> {
-    let (wall, cpu) = (Instant::now(), cpu_seconds());
+    let start = ProcessTime::now();
     let answer = work()?;
-    let spent = cpu_seconds() - cpu;
-    let seconds = if spent > 0.0 { spent } else { wall.elapsed().as_secs_f64() };
-    Ok((answer, seconds * 1e3))
-}
-
-/// CPU time of all threads of this process, from Linux's scheduler statistics; 0 elsewhere.
-fn cpu_seconds() -> f64 {
-    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
-    let nanos = |thread: std::fs::DirEntry| -> Option<f64> {
-        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse().ok()
-    };
-    threads.flatten().filter_map(nanos).sum::<f64>() / 1e9
+    Ok((answer, start.elapsed().as_secs_f64() * 1e3))
 }
 
 fn points(path: &Path) -> Result<Vec<DVec3>> {

@@ -12,6 +12,7 @@ mod objects;
 
 use std::f64::consts::TAU;
 
+use cpu_time::ProcessTime;
 use objects::{Labelled, Mug, bottle, cuboid, label_error, lumpy, mug, render, view};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -75,9 +76,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             if only.is_some_and(|only| only != seed) {
                 continue;
             }
-            let cpu = cpu_ms();
+            let cpu = ProcessTime::now();
             let found = align_model(&model, &observed, &settings, &Task::default())?;
-            let ms = cpu_ms() - cpu;
+            let ms = cpu.elapsed().as_secs_f64() * 1e3;
             if init.is_none() {
                 spent.push(ms);
             }
@@ -118,16 +119,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let at = |share: f64| spent[((spent.len() - 1) as f64 * share) as usize];
     println!("without a guess: median {:.0} ms, 95 % {:.0} ms", at(0.5), at(0.95));
     Ok(())
-}
-
-/// CPU time of all threads of this process, from Linux's scheduler statistics; 0 elsewhere.
-fn cpu_ms() -> f64 {
-    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
-    let nanos = |thread: std::fs::DirEntry| -> Option<f64> {
-        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse().ok()
-    };
-    threads.flatten().filter_map(nanos).sum::<f64>() / 1e6
 }
 
 fn print_counts(name: &str, counts: &[Counts; 3]) {

@@ -13,6 +13,7 @@ use std::io::{BufReader, BufWriter};
 use std::path::Path;
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use faer::Mat;
 use npyz::{NpyFile, WriterBuilder};
 use semfm_fmap::FunctionalMap;
@@ -43,7 +44,7 @@ fn main() -> Outcome<()> {
     let mut seconds = Vec::new();
     let mut answer = Mat::zeros(0, 0);
     for _ in 0..repeats.parse::<usize>()?.max(1) {
-        let (wall, cpu) = (Instant::now(), cpu_seconds());
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
         answer = match words[0] {
             "zoomout" | "sampled" => {
                 let map = square(&start, number(1)?)?;
@@ -73,7 +74,7 @@ fn main() -> Outcome<()> {
             }
             other => return Err(format!("no task `{other}`").into()),
         };
-        seconds.push((cpu_seconds() - cpu, wall.elapsed().as_secs_f64()));
+        seconds.push((cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64()));
     }
     seconds.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (cpu, wall) = seconds[seconds.len() / 2];
@@ -140,16 +141,6 @@ fn write(path: &Path, matrix: &Mat<f64>) -> Outcome<()> {
         (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])),
     )?;
     Ok(writer.finish()?)
-}
-
-/// CPU time of all threads of this process: schedstat counts it in nanoseconds.
-fn cpu_seconds() -> f64 {
-    let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    let nanos = threads.filter_map(|thread| {
-        let text = fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split(' ').next()?.parse::<f64>().ok()
-    });
-    nanos.sum::<f64>() * 1e-9
 }
 
 fn peak_megabytes() -> f64 {

@@ -9,6 +9,7 @@ use std::error::Error;
 use std::fs;
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use semfm_geom::eigensolver::{EigenSettings, eigenbasis};
 use semfm_geom::{Laplacian, Task};
@@ -25,9 +26,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut last = None;
     for _ in 0..repeats.parse::<usize>()?.max(1) {
         drop(last.take());
-        let (start, cpu) = (Instant::now(), cpu_seconds());
+        let (start, cpu) = (Instant::now(), ProcessTime::now());
         last = Some(eigenbasis(&laplacian, k, &EigenSettings::default(), &Task::default())?);
-        seconds.push((cpu_seconds() - cpu, start.elapsed().as_secs_f64()));
+        seconds.push((cpu.elapsed().as_secs_f64(), start.elapsed().as_secs_f64()));
     }
     seconds.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (cpu, wall) = seconds[seconds.len() / 2];
@@ -54,12 +55,6 @@ fn read_laplacian(path: &str) -> Result<Laplacian, Box<dyn Error>> {
     let mass: Vec<f64> = words.take(n).map(f64::from_le_bytes).collect();
     let symbolic = SymbolicSparseColMat::new_checked(n, n, pointers, None, rows);
     Ok(Laplacian { stiffness: SparseColMat::new(symbolic, values), mass })
-}
-
-/// CPU time of this process: /proc counts it in ticks of 10 ms, schedstat in nanoseconds.
-fn cpu_seconds() -> f64 {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }
 
 fn peak_megabytes() -> f64 {

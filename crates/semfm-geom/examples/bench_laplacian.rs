@@ -8,6 +8,7 @@
 use std::error::Error;
 use std::path::Path;
 
+use cpu_time::ProcessTime;
 use semfm_geom::geodesic::HeatGeodesics;
 use semfm_geom::laplacian::{
     CloudSettings, LaplacianKind, bridge, laplacian, point_cloud_laplacian,
@@ -66,22 +67,15 @@ fn report(
 ) -> Result<(), Box<dyn Error>> {
     let mut seconds = Vec::with_capacity(repeats);
     for _ in 0..repeats {
-        let (start, mut calls, mut spent) = (cpu_seconds()?, 0, 0.0);
+        let (start, mut calls, mut spent) = (ProcessTime::now(), 0, 0.0);
         while spent < LONG_ENOUGH {
             work()?;
             calls += 1;
-            spent = cpu_seconds()? - start;
+            spent = start.elapsed().as_secs_f64();
         }
         seconds.push(spent / f64::from(calls));
     }
     seconds.sort_by(f64::total_cmp);
     println!("{name} {:.6} {remark}", seconds[repeats / 2]);
     Ok(())
-}
-
-/// CPU time of this thread, as Linux counts it.
-fn cpu_seconds() -> Result<f64, Box<dyn Error>> {
-    let counters = std::fs::read_to_string("/proc/thread-self/schedstat")?;
-    let nanos = counters.split_whitespace().next().ok_or("an empty schedstat")?;
-    Ok(nanos.parse::<f64>()? * 1e-9)
 }

@@ -12,9 +12,9 @@
 use std::collections::HashMap;
 use std::error::Error;
 use std::f64::consts::TAU;
-use std::fs;
 use std::path::Path;
 
+use cpu_time::ProcessTime;
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
 use semfm_geom::{
@@ -68,24 +68,18 @@ struct Measured {
 
 fn measure(mesh: &Mesh) -> semfm_geom::Result<Measured> {
     let task = Task::default();
-    let start = cpu_seconds();
+    let start = ProcessTime::now();
     let cleaned = clean(mesh, &CleanSettings::default())?.mesh;
-    let cleaning = cpu_seconds() - start;
-    let start = cpu_seconds();
+    let cleaning = start.elapsed().as_secs_f64();
+    let start = ProcessTime::now();
     let simple = simplify(&cleaned, &SimplifySettings::default(), &task)?;
-    let simplification = cpu_seconds() - start;
-    let start = cpu_seconds();
+    let simplification = start.elapsed().as_secs_f64();
+    let start = ProcessTime::now();
     Shape::new(mesh.clone(), &ShapeSettings::default(), &task)?;
-    let seconds = [cleaning, simplification, cpu_seconds() - start];
+    let seconds = [cleaning, simplification, start.elapsed().as_secs_f64()];
     let (distance, attempts) =
         simple.map_or((0.0, 0), |simple| (simple.report.distance, simple.report.attempts));
     Ok(Measured { seconds, distance, attempts })
-}
-
-/// CPU time of this thread.
-fn cpu_seconds() -> f64 {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
 }
 
 /// Each triangle in four, new vertices off the old edges by a little noise.

@@ -8,6 +8,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use semfm_geom::Task;
 use semfm_geom::io::read_mesh;
 use semfm_geom::math::DVec3;
@@ -59,7 +60,7 @@ fn bench(
         regions.push(("small", far_patch(mesh.vertices(), object.centre_of_mass(), radius)));
     }
     for (name, region) in regions {
-        let start = (Instant::now(), cpu_seconds());
+        let start = (Instant::now(), ProcessTime::now());
         let found = find_grasps_with(
             &object,
             &region,
@@ -70,7 +71,7 @@ fn bench(
         )?;
         // On one thread its own CPU time counts: a busy machine changes nothing then.
         let seconds = match threads {
-            1 => cpu_seconds() - start.1,
+            1 => start.1.elapsed().as_secs_f64(),
             _ => start.0.elapsed().as_secs_f64(),
         };
         let rate = |n: usize| n as f64 / seconds / threads as f64;
@@ -88,13 +89,6 @@ fn bench(
         );
     }
     Ok(())
-}
-
-/// CPU time of the calling thread; 0 where the system does not tell.
-fn cpu_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let nanos = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
-    nanos.unwrap_or(0.0) * 1e-9
 }
 
 /// Weight 1 within `radius` of the vertex farthest from the centre of mass, 0 elsewhere.

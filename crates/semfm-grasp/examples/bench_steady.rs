@@ -9,6 +9,7 @@ use std::collections::HashMap;
 use std::error::Error;
 use std::path::PathBuf;
 
+use cpu_time::ProcessTime;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use semfm_geom::io::read_mesh;
@@ -55,9 +56,9 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
 
 #[allow(clippy::print_stdout)] // The numbers are what this program is for.
 fn bench(mesh: &Mesh, variation: &Variation) -> Result<(), Box<dyn Error + Send + Sync>> {
-    let start = cpu_seconds();
+    let start = ProcessTime::now();
     let object = GraspObject::from_mesh(mesh, 1.0)?;
-    let prepared = cpu_seconds() - start;
+    let prepared = start.elapsed().as_secs_f64();
     let surface = object.surface_report();
     println!(
         "{} triangles, contacts on {}, noise {:.2} mm, {prepared:.2} s to prepare",
@@ -70,10 +71,10 @@ fn bench(mesh: &Mesh, variation: &Variation) -> Result<(), Box<dyn Error + Send 
     let mut middles = Vec::new();
     for seed in 0..variation.n_seeds {
         let settings = GraspSettings { seed, ..variation.settings.clone() };
-        let start = cpu_seconds();
+        let start = ProcessTime::now();
         let (scene, task) = (Scene::new(), Task::default());
         let found = find_grasps_with(&object, &region, &gripper, &scene, &settings, &task)?;
-        let seconds = cpu_seconds() - start;
+        let seconds = start.elapsed().as_secs_f64();
         let (n, survivors) = (found.n_candidates, found.n_survivors);
         println!("  seed {seed}: {survivors} survivors of {n} candidates, {seconds:.2} s");
         middles.extend(found.grasps.first().map(|g| g.contacts[0].midpoint(g.contacts[1])));
@@ -81,13 +82,6 @@ fn bench(mesh: &Mesh, variation: &Variation) -> Result<(), Box<dyn Error + Send 
     let pairs = middles.iter().flat_map(|a| middles.iter().map(move |b| a.distance(*b)));
     println!("  the best moves by up to {:.1} mm", 1e3 * pairs.fold(0.0, f64::max));
     Ok(())
-}
-
-/// CPU time of the calling thread; 0 where the system does not tell.
-fn cpu_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let nanos = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
-    nanos.unwrap_or(0.0) * 1e-9
 }
 
 /// Each vertex moved by normal noise (twelve uniform numbers less six have a deviation of 1).

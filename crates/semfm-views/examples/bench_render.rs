@@ -13,6 +13,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use semfm_geom::{Mesh, Pinhole, Task};
 use semfm_views::{
     EmbeddedView, LiftSettings, PatchEmbeddings, PatchGrid, RenderSettings, RigSettings,
@@ -169,9 +170,9 @@ impl Bench<'_> {
     ) -> Result<[f64; 2], Failure> {
         let mut times = Vec::new();
         for _ in 0..self.order.repeats {
-            let (wall, cpu) = (Instant::now(), cpu_seconds());
+            let (wall, cpu) = (Instant::now(), ProcessTime::now());
             work()?;
-            times.push([wall.elapsed().as_secs_f64(), cpu_seconds() - cpu]);
+            times.push([wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64()]);
         }
         let median = |which: usize| {
             let mut values: Vec<f64> = times.iter().map(|time| time[which]).collect();
@@ -226,16 +227,6 @@ fn bench_lift(bench: &Bench<'_>) -> Result<(), Failure> {
         println!("    {seen} of {} samples seen", settings.n_samples);
     }
     Ok(())
-}
-
-/// CPU time of all threads of this process, from Linux's scheduler statistics; 0 elsewhere.
-fn cpu_seconds() -> f64 {
-    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
-    let nanos = |thread: std::fs::DirEntry| -> Option<f64> {
-        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse().ok()
-    };
-    threads.flatten().filter_map(nanos).sum::<f64>() / 1e9
 }
 
 /// Tokens of the right shape without an encoder: patches of 16 pixels.

@@ -7,9 +7,8 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use semfm_geom::math::{DAffine3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole};
 use semfm_views::mcap::{Dtype, EmbeddingsFile, EmbeddingsMetadata, ViewsMetadata, read_messages};
@@ -59,20 +58,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn best<T, E>(mut run: impl FnMut() -> Result<T, E>) -> Result<f64, E> {
     let mut seconds = f64::INFINITY;
     for _ in 0..5 {
-        let start = seconds_so_far();
+        let start = ProcessTime::now();
         run()?;
-        seconds = seconds.min(seconds_so_far() - start);
+        seconds = seconds.min(start.elapsed().as_secs_f64());
     }
     Ok(seconds)
-}
-
-/// Processor time of this thread, which a busy machine does not stretch as it does a clock's.
-fn seconds_so_far() -> f64 {
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    let nanos = std::fs::read_to_string("/proc/thread-self/schedstat")
-        .ok()
-        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-    nanos.map_or_else(|| START.elapsed().as_secs_f64(), |nanos| nanos / 1e9)
 }
 
 /// The same messages in chunks of lz4.

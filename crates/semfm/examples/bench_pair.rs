@@ -13,10 +13,10 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use semfm::encoder::builtin_encoder;
 use semfm::files::{read_region, stages_ms};
 use semfm::geom::ShapeCache;
@@ -106,18 +106,18 @@ fn goals(pair: &Pair, repeats: usize) -> Outcome<Vec<Measured>> {
         let (settings, task) = (PipelineSettings::of(method), Task::default());
         let mut times = [const { Vec::new() }; 3];
         for _ in 0..repeats {
-            let cold = CpuClock::start();
+            let cold = ProcessTime::now();
             let [source, target] = pair.prepared(&settings)?;
             transfer(&source.object, &target.object, &pair.region, &settings.transfer, &task)?;
-            times[0].push(cold.ms());
-            let warm = CpuClock::start();
+            times[0].push(cold.elapsed().as_secs_f64() * 1e3);
+            let warm = ProcessTime::now();
             let matching =
                 Matching::new(&source.object, &target.object, &settings.transfer, &task)?;
             matching.transfer(&pair.region)?;
-            times[1].push(warm.ms());
-            let further = CpuClock::start();
+            times[1].push(warm.elapsed().as_secs_f64() * 1e3);
+            let further = ProcessTime::now();
             matching.transfer(&pair.region)?;
-            times[2].push(further.ms());
+            times[2].push(further.elapsed().as_secs_f64() * 1e3);
         }
         for ((name, times), goal) in names.into_iter().zip(times).zip(goals) {
             measured.push(Measured { name, ms: median(times), goal });
@@ -154,26 +154,4 @@ fn stages(pair: &Pair, repeats: usize) -> Outcome<BTreeMap<String, f64>> {
 fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
-}
-
-/// CPU time of all threads of this process: /proc counts it in ticks of 10 ms, schedstat in nanoseconds.
-struct CpuClock(f64);
-
-impl CpuClock {
-    fn start() -> Self {
-        Self(Self::now())
-    }
-
-    fn ms(&self) -> f64 {
-        Self::now() - self.0
-    }
-
-    fn now() -> f64 {
-        let threads = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-        let nanos = threads.filter_map(|thread| {
-            let text = fs::read_to_string(thread.path().join("schedstat")).ok()?;
-            text.split(' ').next()?.parse::<f64>().ok()
-        });
-        nanos.sum::<f64>() * 1e-6
-    }
 }

@@ -4,8 +4,8 @@
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
+use cpu_time::ThreadTime;
 use semfm::motion::{
     BlendSettings, CheckSettings, CollisionChecker, CollisionModel, CollisionSettings, Curve,
     JointMotionLimit, JointRange, JointSpace, MotionLimits, PlanSettings, Planned, PlannedPath,
@@ -126,18 +126,10 @@ impl Pipeline {
     }
 }
 
+/// Times `work` by the CPU time of this thread.
 fn timed<T>(ms: &mut Milliseconds, stage: &'static str, work: impl FnOnce() -> T) -> T {
-    let begun = Instant::now();
-    let on_cpu = cpu_ms();
+    let start = ThreadTime::now();
     let answer = work();
-    let used = on_cpu.zip(cpu_ms()).map(|(begun, ended)| ended - begun);
-    ms.push((stage, used.unwrap_or_else(|| 1e3 * begun.elapsed().as_secs_f64())));
+    ms.push((stage, 1e3 * start.elapsed().as_secs_f64()));
     answer
-}
-
-/// Milliseconds that this thread has had a processor, where the system (Linux) tells it: on a machine that others use, time
-/// on the wall says little.
-fn cpu_ms() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(1e-6 * text.split(' ').next()?.parse::<f64>().ok()?)
 }
