@@ -1,6 +1,7 @@
 //! What a tile of queries looks at: the inner loops of the search, in wide registers.
 //!
-//! They are values and not closures, so that they are inlined where the wide registers are switched on.
+//! They are values and plain loops: a closure that the compiler does not inline is compiled without the
+//! wide registers, and calls a function for each of their instructions.
 
 use pulp::Simd;
 
@@ -98,7 +99,9 @@ impl ScanTile<'_> {
         }
         match self.start {
             Start::Panels(panels) => {
-                panels.iter().for_each(|&panel| self.look_into::<S, N>(simd, panel as usize));
+                for &panel in panels {
+                    self.look_into::<S, N>(simd, panel as usize);
+                }
             }
             Start::Nearest => {
                 for panel in self.nearest_centres() {
