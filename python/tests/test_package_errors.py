@@ -16,7 +16,7 @@ from semfm.batch import region_of
 from semfm.batch.manifest import rows_of
 from semfm.sidecar import SidecarError
 from semfm.vlm.answer import UnusableAnswer
-from semfm.vlm.endpoint import EndpointError
+from semfm.vlm.client import EndpointError
 from semfm.vlm.key import ApiKey
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -16,7 +16,7 @@ from fake_endpoint import answer, hang, raw, reset, status
 from PIL import Image
 from semfm.sidecar.errors import SidecarError
 from semfm.vlm import CachedEndpoint, ChatEndpoint, from_environment
-from semfm.vlm.endpoint import EndpointError
+from semfm.vlm.client import EndpointError
 from semfm.vlm.key import ApiKey
 from semfm.vlm.question import Question
 from semfm.vlm.waiting import retry_after_s

@@ -22,8 +22,8 @@ How a pair is done, and where to read about it:
    views spread well apart;
 2. :mod:`.marking` draws the pictures (:mod:`.segments` cuts the target into patches), and
    :mod:`.question` puts them between the words in ``prompts/``;
-3. :mod:`.endpoint` asks, :mod:`.cache` keeps replies, :mod:`.true_masks` answers with the truth to
-   measure the ceiling of everything but the model;
+3. :mod:`.endpoint` asks through :mod:`.client`, :mod:`.cache` keeps replies, and
+   :mod:`.true_masks` answers with the truth to measure the ceiling of everything but the model;
 4. :mod:`.answer` reads the reply strictly, and :mod:`.lifting` lifts its masks onto vertices by
    visibility and vote;
 5. :mod:`.baseline` does one pair, :mod:`.run` many, :mod:`.rows` is their file.

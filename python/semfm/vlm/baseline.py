@@ -12,7 +12,8 @@ import numpy as np
 from ..sidecar.errors import expected
 from .answer import UnusableAnswer, read_answer
 from .choose_views import choose_views
-from .endpoint import SIMULATED, Endpoint, EndpointError, Reply
+from .client import EndpointError
+from .endpoint import SIMULATED, Endpoint, Reply
 from .lifting import Lifted, counted, lift, region_mask
 from .object_views import ObjectView, ObjectViews
 from .question import MODES, Drawing, Question, ask_for_region, prompts_hash

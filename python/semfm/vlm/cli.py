@@ -16,6 +16,7 @@ from ..sidecar.progress import MODES as PROGRESS_MODES
 from ..sidecar.progress import open_progress
 from .baseline import BaselineSettings, outcome_row, total_tokens, transfer
 from .cache import CachedEndpoint
+from .client_options import add_client_options, patience
 from .endpoint import RESPONSE_FORMATS, ChatEndpoint, Endpoint, EndpointSettings, from_environment
 from .object_views import ObjectViews, read_object
 from .pairs import Pair, read_pairs
@@ -122,30 +123,7 @@ def _add_question(p: argparse.ArgumentParser) -> None:
 def _add_endpoint(p: argparse.ArgumentParser) -> None:
     default = EndpointSettings("")
     end = p.add_argument_group("endpoint")
-    end.add_argument("--model", metavar="NAME", help="at the endpoint")
-    end.add_argument("--base-url", metavar="URL", help=f"of the interface ({default.base_url})")
-    end.add_argument("--cache", metavar="DIR", help="keep replies, ask nothing twice")
-    end.add_argument(
-        "--timeout",
-        type=float,
-        default=default.timeout_s,
-        metavar="S",
-        help="of a request (%(default)s)",
-    )
-    end.add_argument(
-        "--retries",
-        type=int,
-        default=default.max_attempts - 1,
-        metavar="N",
-        help="more (%(default)s)",
-    )
-    end.add_argument(
-        "--max-wait",
-        type=float,
-        default=default.max_wait_s,
-        metavar="S",
-        help="between two (%(default)s)",
-    )
+    add_client_options(end, default, "replies")
     end.add_argument(
         "--temperature", default=f"{default.temperature:g}", metavar="T|none", help="(%(default)s)"
     )
@@ -203,9 +181,7 @@ def _chat(args: argparse.Namespace, stop: threading.Event) -> Endpoint:
     settings = from_environment(
         args.model,
         args.base_url,
-        timeout_s=args.timeout,
-        max_attempts=args.retries + 1,
-        max_wait_s=args.max_wait,
+        **patience(args),
         temperature=temperature,
         max_tokens=args.max_tokens,
         response_format=args.response_format,
