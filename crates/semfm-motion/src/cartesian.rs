@@ -28,6 +28,14 @@ impl Default for LineSettings {
     }
 }
 
+impl LineSettings {
+    /// Whether a frame is as close to where it should be as the tolerances ask.
+    fn are_kept(&self, wanted: &Pose, found: &Pose) -> bool {
+        wanted.translation.distance(found.translation) <= self.tolerance
+            && wanted.rotation.angle_between(found.rotation) <= self.rotation_tolerance
+    }
+}
+
 /// A straight line of a frame from one pose to another, turning evenly on the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StraightLine {
@@ -50,38 +58,15 @@ impl StraightLine {
     }
 }
 
-/// What is left between two poses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Residual {
-    /// Metres.
-    pub position: f64,
-    /// Radians.
-    pub rotation: f64,
-}
-
-impl Residual {
-    /// Between where a frame should be and where it is.
-    pub fn between(wanted: &Pose, found: &Pose) -> Self {
-        Self {
-            position: wanted.translation.distance(found.translation),
-            rotation: wanted.rotation.angle_between(found.rotation),
-        }
-    }
-
-    fn is_within(self, settings: &LineSettings) -> bool {
-        self.position <= settings.tolerance && self.rotation <= settings.rotation_tolerance
-    }
-}
-
 /// Where a line could not be followed any further.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LineFault {
     /// Metres along the line that could be followed.
     pub at: f64,
-    /// What is left to the line where the next, shortest step fails.
-    pub residual: Residual,
     /// Joint values up to there.
     pub q: Vec<f64>,
+    /// Joint values of the best try for what comes next.
+    pub beyond: Vec<f64>,
 }
 
 /// An arm as far as lines need it.
@@ -89,8 +74,8 @@ pub(crate) trait LineArm {
     /// Where the tip is.
     fn tip(&self, q: &[f64]) -> Pose;
 
-    /// Joint values near `near` that put the tip at a pose, or what is left at the best try.
-    fn reach(&self, base_from_tip: &Pose, near: &[f64]) -> Result<Vec<f64>, Residual>;
+    /// Joint values near `near` that put the tip at a pose, or those of the best try.
+    fn reach(&self, base_from_tip: &Pose, near: &[f64]) -> Result<Vec<f64>, Vec<f64>>;
 }
 
 /// Joint values along a line from `start`, which reaches its beginning: the first is `start`, the last reaches the end.
@@ -114,8 +99,8 @@ pub(crate) fn follow_line(
                 (q, share) = (next, next_share);
                 step = (2.0 * step).min(longest);
             }
-            Err(residual) if step <= shortest => {
-                return Err(LineFault { at: share * length, residual, q });
+            Err(beyond) if step <= shortest => {
+                return Err(LineFault { at: share * length, q, beyond });
             }
             Err(_) => step = (step / 2.0).max(shortest),
         }
@@ -123,20 +108,19 @@ pub(crate) fn follow_line(
     Ok(waypoints)
 }
 
-/// Joint values at the end of a step that keeps to the line, or by how much none does.
+/// Joint values at the end of a step that keeps to the line, or those of the best try.
 fn step_along(
     arm: &impl LineArm,
     line: &StraightLine,
     [from, to]: [f64; 2],
     q: &[f64],
     settings: &LineSettings,
-) -> Result<Vec<f64>, Residual> {
+) -> Result<Vec<f64>, Vec<f64>> {
     let next = arm.reach(&line.at(to), q)?;
     for share in [0.5, 0.25, 0.75] {
         let on_the_way = arm.tip(&between(q, &next, share));
-        let residual = Residual::between(&line.at(from + share * (to - from)), &on_the_way);
-        if !residual.is_within(settings) {
-            return Err(residual);
+        if !settings.are_kept(&line.at(from + share * (to - from)), &on_the_way) {
+            return Err(next);
         }
     }
     Ok(next)
@@ -159,11 +143,11 @@ mod tests {
             Pose::from_parts(DVec3::new(a.cos() + b.cos(), a.sin() + b.sin(), 0.0), DQuat::IDENTITY)
         }
 
-        fn reach(&self, pose: &Pose, near: &[f64]) -> Result<Vec<f64>, Residual> {
+        fn reach(&self, pose: &Pose, near: &[f64]) -> Result<Vec<f64>, Vec<f64>> {
             let DVec3 { x, y, .. } = pose.translation;
             let cosine = (x * x + y * y - 2.0) / 2.0;
             if cosine.abs() > 1.0 {
-                return Err(Residual { position: x.hypot(y) - 2.0, rotation: 0.0 });
+                return Err(near.to_vec());
             }
             let side = if self.flips && x > 1.0 { -near[1].signum() } else { near[1].signum() };
             let elbow = side * cosine.acos();

@@ -110,10 +110,8 @@ pub enum Obstruction {
         at: f64,
         /// Length of the line, metres.
         length: f64,
-        /// What is left to the line there, metres.
-        position: f64,
-        /// The same, radians.
-        rotation: f64,
+        /// The joints that stand at a limit there, by name; none where the arm is stretched as far as it goes.
+        at_limits: Vec<String>,
     },
     /// Something touches on the straight line.
     ContactOnLine {
@@ -190,18 +188,18 @@ impl fmt::Display for Obstruction {
                 write!(f, "the best try misses the pose by {mm:.1} mm and {degrees:.1}°")?;
                 match at_limits.as_slice() {
                     [] => Ok(()),
-                    names => write!(f, ", with {} at the limit", names.join(", ")),
+                    names => write_at_limits(f, names),
                 }
             }
             Self::Contact { a, b, depth } => write_contact(f, a, b, *depth),
-            Self::Line { at, length, position, rotation } => write!(
-                f,
-                "the line of {:.0} mm ends after {:.1} mm: what comes next is missed by {:.1} mm and {:.1}°",
-                1e3 * length,
-                1e3 * at,
-                1e3 * position,
-                rotation.to_degrees()
-            ),
+            Self::Line { at, length, at_limits } => {
+                let (length, at) = (1e3 * length, 1e3 * at);
+                write!(f, "the arm follows the line of {length:.0} mm for {at:.1} mm")?;
+                match at_limits.as_slice() {
+                    [] => f.write_str(" and is stretched as far as it goes in that posture"),
+                    names => write_at_limits(f, names),
+                }
+            }
             Self::ContactOnLine { at, length, a, b, depth } => {
                 write_contact(f, a, b, *depth)?;
                 write!(f, " after {:.1} of {:.0} mm", 1e3 * at, 1e3 * length)
@@ -222,6 +220,10 @@ impl fmt::Display for Obstruction {
             Self::Other { what } => f.write_str(what),
         }
     }
+}
+
+fn write_at_limits(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
+    write!(f, ", with {} at the limit", names.join(", "))
 }
 
 fn write_contact(f: &mut fmt::Formatter<'_>, a: &str, b: &str, depth: f64) -> fmt::Result {
@@ -322,6 +324,8 @@ mod tests {
         };
         let text = far.to_string();
         assert!(text.contains("312.5 mm") && text.contains("elbow"), "{text}");
+        let stretched = Obstruction::Line { at: 0.0434, length: 0.1, at_limits: Vec::new() };
+        assert!(stretched.to_string().contains("of 100 mm for 43.4 mm and is stretched"));
         let line = Obstruction::ContactOnLine {
             at: 0.02,
             length: 0.1,

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use semfm_geom::Task;
 use semfm_robot::{Arm, IkSettings, InverseKinematics, Preference};
 
-use crate::cartesian::{LineArm, LineFault, Residual, StraightLine, follow_line};
+use crate::cartesian::{LineArm, LineFault, StraightLine, follow_line};
 use crate::motion_request::{GraspMotion, NearestMiss, StartContact};
 use crate::planning::joint_space::between;
-use crate::reach::{BestTry, Candidate, Reached, reach};
+use crate::reach::{BestTry, Candidate, Reached, joints_at_limits, reach};
 use crate::step_checks::{HandBodies, StepChecks};
 use crate::timed_motion::{MotionCurves, TimedMotion, timed_motion};
 use crate::{
@@ -279,9 +279,9 @@ impl<'a> Search<'a> {
         let length = line.length();
         let arm = Nearby(&self.nearby);
         let followed = follow_line(&arm, line, start, &self.request.settings.line);
-        let waypoints = followed.map_err(|LineFault { at, residual, q }| {
-            let Residual { position, rotation } = residual;
-            (Obstruction::Line { at, length, position, rotation }, q)
+        let waypoints = followed.map_err(|LineFault { at, q, beyond }| {
+            let at_limits = joints_at_limits(self.nearby.arm(), &beyond);
+            (Obstruction::Line { at, length, at_limits }, q)
         })?;
         for pair in waypoints.windows(2) {
             if checker.motion_is_free(&pair[0], &pair[1]) {
@@ -395,15 +395,11 @@ impl LineArm for Nearby<'_> {
         self.0.arm().base_from_tip(q)
     }
 
-    fn reach(&self, base_from_tip: &Pose, near: &[f64]) -> std::result::Result<Vec<f64>, Residual> {
-        let far = Residual { position: f64::INFINITY, rotation: f64::INFINITY };
-        let answer = self.0.solve(base_from_tip, near).map_err(|_| far)?;
+    fn reach(&self, base_from_tip: &Pose, near: &[f64]) -> std::result::Result<Vec<f64>, Vec<f64>> {
+        let answer = self.0.solve(base_from_tip, near).map_err(|_| near.to_vec())?;
         match answer.solutions.into_iter().next() {
             Some(solution) => Ok(solution.positions),
-            None => Err(answer.closest.map_or(far, |closest| Residual {
-                position: closest.position_error,
-                rotation: closest.rotation_error,
-            })),
+            None => Err(answer.closest.map_or_else(|| near.to_vec(), |closest| closest.positions)),
         }
     }
 }

@@ -122,7 +122,7 @@ fn rank(arm: &Arm, reached: &mut [Reached]) {
 }
 
 /// Names of the joints that stand at a limit.
-fn joints_at_limits(arm: &Arm, q: &[f64]) -> Vec<String> {
+pub(crate) fn joints_at_limits(arm: &Arm, q: &[f64]) -> Vec<String> {
     arm.joints()
         .iter()
         .zip(q)

@@ -17,11 +17,19 @@ pub(super) struct Tree {
     /// Flat, `n_joints` a node.
     values: Vec<f64>,
     parents: Vec<u32>,
+    /// How far from each node samples may lie.
+    domains: Vec<f64>,
 }
 
 impl Tree {
     pub fn new(n_joints: usize) -> Self {
-        Self { n_joints, blocks: Vec::new(), values: Vec::new(), parents: Vec::new() }
+        Self {
+            n_joints,
+            blocks: Vec::new(),
+            values: Vec::new(),
+            parents: Vec::new(),
+            domains: Vec::new(),
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -46,6 +54,7 @@ impl Tree {
         }
         self.values.extend_from_slice(q);
         self.parents.push(parent as u32);
+        self.domains.push(f64::INFINITY);
         index
     }
 
@@ -53,8 +62,17 @@ impl Tree {
         &self.values[index * self.n_joints..(index + 1) * self.n_joints]
     }
 
-    /// Index of the node nearest to `q`; the earliest of equals.
-    pub fn nearest(&self, space: &JointSpace, q: &[f64]) -> usize {
+    /// How far from a node samples may lie toward which it is extended; at first without bound.
+    pub fn domain(&self, index: usize) -> f64 {
+        self.domains[index]
+    }
+
+    pub fn set_domain(&mut self, index: usize, radius: f64) {
+        self.domains[index] = radius;
+    }
+
+    /// Index of the node nearest to `q` and its distance; the earliest of equals.
+    pub fn nearest(&self, space: &JointSpace, q: &[f64]) -> (usize, f64) {
         let mut nearest = 0;
         let mut least = f64::INFINITY;
         for (number, block) in self.blocks.chunks_exact(self.n_joints * LANES).enumerate() {
@@ -79,7 +97,7 @@ impl Tree {
                 }
             }
         }
-        nearest
+        (nearest, least.sqrt())
     }
 
     /// Joint values from `index` up to its root, in that order.
@@ -119,8 +137,9 @@ mod tests {
             let q = draw();
             let all = (0..n).map(|i| space.distance(tree.node(i), &q));
             let least = all.fold(f64::INFINITY, f64::min);
-            let nearest = tree.nearest(&space, &q);
+            let (nearest, distance) = tree.nearest(&space, &q);
             assert!((space.distance(tree.node(nearest), &q) - least).abs() < 1e-12);
+            assert!((distance - least).abs() < 1e-12);
             let added = tree.add(&q, nearest);
             assert_eq!(tree.root(added), root);
             assert_eq!(tree.to_root(added).last().map(Vec::as_slice), Some(tree.node(root)));
