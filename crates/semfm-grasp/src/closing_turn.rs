@@ -5,7 +5,7 @@ use semfm_geom::math::{DQuat, DVec3};
 
 use crate::grasp_distance::angle;
 use crate::pad_view::PadView;
-use crate::pressure::Pressure;
+use crate::pressure::{PressedSurface, Pressure};
 
 /// Shares of the grip force at which the balance is asked for, in turn: pads first touch lightly, when only
 /// what stands out is pressed, and what turned then has turned.
@@ -34,11 +34,12 @@ pub(crate) struct TurnedObject {
 /// and weight are left out. `None` where a pad has nothing before it.
 pub(crate) fn turn_until_held(view: &PadView, friction: f64, force: f64) -> Option<TurnedObject> {
     let mut rotation = Rotation::IDENTITY;
-    let mut pressures = pressed(view, rotation, LOADS[0] * force)?;
+    let mut surfaces = before_pads(view, rotation);
+    let mut pressures = pressed(&surfaces, LOADS[0] * force)?;
     for load in LOADS {
         let mut last = DVec3::ZERO;
         // What has turned away from under a pad is held as well as it was.
-        while let Some(now) = pressed(view, rotation, load * force) {
+        while let Some(now) = pressed(&surfaces, load * force) {
             pressures = now;
             let apart = pressures[0].centre - pressures[1].centre;
             let across = DVec3::new(apart.x, 0.0, apart.z);
@@ -52,20 +53,31 @@ pub(crate) fn turn_until_held(view: &PadView, friction: f64, force: f64) -> Opti
             }
             last = axis;
             rotation = DQuat::from_axis_angle(axis, STEP) * rotation;
+            surfaces = before_pads(view, rotation);
         }
     }
-    Some(TurnedObject { turn: angle(rotation), pressures })
+    Some(TurnedObject {
+        turn: angle(rotation),
+        pressures,
+    })
 }
 
-/// The pressures on the object turned about the TCP.
-fn pressed(view: &PadView, rotation: Rotation, force: f64) -> Option<[Pressure; 2]> {
-    let [left, right] = [-1.0, 1.0].map(|side| {
+/// What lies before each pad of the object turned about the TCP.
+fn before_pads(view: &PadView, rotation: Rotation) -> [PressedSurface; 2] {
+    [-1.0, 1.0].map(|side| {
         let points = &view.points[usize::from(side > 0.0)];
         let turned = points.iter().map(|&p| rotation * p);
-        let before: Vec<DVec3> = turned.filter(|&p| view.before_pad(p)).collect();
-        Pressure::new(&before, side, force, view.cell_area)
-    });
-    Some([left?, right?])
+        PressedSurface::new(
+            turned.filter(|&p| view.before_pad(p)).collect(),
+            side,
+            view.cell_area,
+        )
+    })
+}
+
+fn pressed(surfaces: &[PressedSurface; 2], force: f64) -> Option<[Pressure; 2]> {
+    let [left, right] = surfaces;
+    Some([left.pressure(force)?, right.pressure(force)?])
 }
 
 #[cfg(test)]
@@ -81,7 +93,11 @@ mod tests {
             places.map(|(x, z)| DVec3::new(x, y(x), z)).collect()
         };
         let points = [grid(&left), grid(&right)];
-        PadView { points, cell_area: cell * cell, half_pad: [9e-3; 2] }
+        PadView {
+            points,
+            cell_area: cell * cell,
+            half_pad: [9e-3; 2],
+        }
     }
 
     #[test]
@@ -92,7 +108,10 @@ mod tests {
         let slope = 8f64.to_radians().tan();
         let askew = view(|x| -0.01 + slope * x, |x| 0.01 + slope * x);
         let turned = turn_until_held(&askew, 0.5, 30.0).unwrap();
-        assert!((4f64.to_radians()..=8.5f64.to_radians()).contains(&turned.turn), "{turned:?}");
+        assert!(
+            (4f64.to_radians()..=8.5f64.to_radians()).contains(&turned.turn),
+            "{turned:?}"
+        );
         // More friction holds it earlier.
         assert!(turn_until_held(&askew, 2.0, 30.0).unwrap().turn < turned.turn);
     }
@@ -101,8 +120,10 @@ mod tests {
     fn a_thin_plate_comes_to_rest() {
         // Of 2 mm, a little askew and with a ridge: no force may lie 1 mm beside the other.
         let slope = 3f64.to_radians().tan();
-        let plate =
-            view(|x| -1e-3 + slope * x, |x| 1e-3 + slope * x + if x > 6e-3 { 2e-4 } else { 0.0 });
+        let plate = view(
+            |x| -1e-3 + slope * x,
+            |x| 1e-3 + slope * x + if x > 6e-3 { 2e-4 } else { 0.0 },
+        );
         let turned = turn_until_held(&plate, 0.5, 30.0).unwrap();
         assert!(turned.turn < 5f64.to_radians(), "{turned:?}");
     }
@@ -113,7 +134,10 @@ mod tests {
         let turned = turn_until_held(&view(|x| -y(x), y), 0.3, 30.0).unwrap();
         assert_eq!(turned.turn, 0.0);
         assert!(turned.pressures[0].area < 0.5 * 0.018 * 0.018);
-        let nothing = PadView { points: [Vec::new(), Vec::new()], ..view(|_| 0.0, |_| 0.0) };
+        let nothing = PadView {
+            points: [Vec::new(), Vec::new()],
+            ..view(|_| 0.0, |_| 0.0)
+        };
         assert!(turn_until_held(&nothing, 0.3, 30.0).is_none());
     }
 }

@@ -39,9 +39,16 @@ impl PadView {
             // A cell below the spacing of the points would be empty.
             Surface::Cloud { spacing, .. } => (2.0 * half_pad[0] / CELLS).max(*spacing),
         };
-        let mut grid = Grid::new(half_pad.map(|half| half + BESIDE * cell), cell, closing.width);
+        let mut grid = Grid::new(
+            half_pad.map(|half| half + BESIDE * cell),
+            cell,
+            closing.width,
+        );
         let half = DVec3::new(grid.half[0], closing.width / 2.0 + 1e-6, grid.half[1]);
-        let Pose { rotation, translation } = closing.tcp;
+        let Pose {
+            rotation,
+            translation,
+        } = closing.tcp;
         let solid = Solid::oriented_box(Pose::from_parts(translation, rotation), half);
         let tree = &object.touched().tree;
         for item in tree.near(&solid, 0.0) {
@@ -51,7 +58,11 @@ impl PadView {
                 Surface::Cloud { .. } => grid.add_point(corners[0]),
             }
         }
-        Self { points: grid.points(), cell_area: cell * cell, half_pad }
+        Self {
+            points: grid.points(),
+            cell_area: cell * cell,
+            half_pad,
+        }
     }
 
     /// Whether a point (TCP frame) lies in front of the pads.
@@ -75,7 +86,13 @@ impl Grid {
     fn new(half: [f64; 2], cell: f64, width: f64) -> Self {
         let n = half.map(|half| ((2.0 * half / cell).round() as usize).max(1));
         let nothing = vec![f64::NAN; n[0] * n[1]];
-        Self { half, cell, n, width, first: [nothing.clone(), nothing] }
+        Self {
+            half,
+            cell,
+            n,
+            width,
+            first: [nothing.clone(), nothing],
+        }
     }
 
     /// Middle of a cell along one axis.
@@ -86,9 +103,17 @@ impl Grid {
     /// Cells whose middles lie within [low, high] along one axis.
     fn cells(&self, axis: usize, low: f64, high: f64) -> std::ops::Range<usize> {
         let n = self.n[axis];
-        let at = |x: f64| (x / self.cell + n as f64 / 2.0 - 0.5).clamp(-1.0, n as f64);
-        let (from, to) = (at(low).ceil().max(0.0) as usize, at(high).floor() + 1.0);
-        from..(to.max(0.0) as usize).min(n)
+        let at = |x: f64| x / self.cell + n as f64 / 2.0 - 0.5;
+        // Rounded up, and rounded down plus one; a negative number becomes 0.
+        let (low, beyond) = (at(low).max(0.0), at(high) + 1.0);
+        let from = low as usize;
+        from + usize::from((from as f64) < low)..(beyond as usize).min(n)
+    }
+
+    /// Whether all of [low, high] along the closing axis is farther than [`DEPTH`] behind either pad, or before it.
+    fn is_out_of_sight(&self, low: f64, high: f64) -> bool {
+        let behind = self.width / 2.0 - DEPTH;
+        (low > -behind && high < behind) || low.max(-high) > self.width / 2.0 + 1e-6
     }
 
     fn add(&mut self, i: usize, k: usize, y: f64) {
@@ -114,18 +139,25 @@ impl Grid {
 
     /// The cells whose middles a triangle covers, by barycentric coordinates in the plane of the pad.
     fn add_triangle(&mut self, [a, b, c]: [DVec3; 3]) {
-        let det = (b.x - a.x) * (c.z - a.z) - (b.z - a.z) * (c.x - a.x);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let (columns, rows) = (self.cells(0, low.x, high.x), self.cells(1, low.z, high.z));
+        if columns.is_empty() || rows.is_empty() || self.is_out_of_sight(low.y, high.y) {
+            return;
+        }
+        let (ab, ac) = (b - a, c - a);
+        let det = ab.x * ac.z - ab.z * ac.x;
         if det.abs() < 1e-16 {
             return; // seen from its edge
         }
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        for i in self.cells(0, low.x, high.x) {
-            for k in self.cells(1, low.z, high.z) {
-                let (x, z) = (self.middle(0, i) - a.x, self.middle(1, k) - a.z);
-                let u = (x * (c.z - a.z) - z * (c.x - a.x)) / det;
-                let v = ((b.x - a.x) * z - (b.z - a.z) * x) / det;
+        let inverse = 1.0 / det;
+        for i in columns {
+            let x = self.middle(0, i) - a.x;
+            for k in rows.clone() {
+                let z = self.middle(1, k) - a.z;
+                let u = (x * ac.z - z * ac.x) * inverse;
+                let v = (ab.x * z - ab.z * x) * inverse;
                 if u >= -1e-9 && v >= -1e-9 && u + v <= 1.0 + 1e-9 {
-                    self.add(i, k, a.y + u * (b.y - a.y) + v * (c.y - a.y));
+                    self.add(i, k, a.y + u * ab.y + v * ac.y);
                 }
             }
         }
@@ -158,8 +190,15 @@ mod tests {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.1, 512), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
-        let closing =
-            close(&object, &region, &gripper, &Pose::IDENTITY, [-0.02, 0.02], 1.5e-3).unwrap();
+        let closing = close(
+            &object,
+            &region,
+            &gripper,
+            &Pose::IDENTITY,
+            [-0.02, 0.02],
+            1.5e-3,
+        )
+        .unwrap();
         let view = PadView::new(&object, &gripper, &closing);
         for (points, side) in view.points.iter().zip([-1.0, 1.0]) {
             let n_before = points.iter().filter(|p| view.before_pad(**p)).count();

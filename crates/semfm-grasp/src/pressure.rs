@@ -25,34 +25,68 @@ pub(crate) struct Pressure {
 }
 
 impl Pressure {
-    /// The pressure of a pad that is pushed along +y (`side` -1) or -y (`side` +1) with `force` newtons against
-    /// `points` (each stands for `cell_area` m²). `None` where there are none.
-    pub(crate) fn new(points: &[DVec3], side: f64, force: f64, cell_area: f64) -> Option<Self> {
-        // Heights above the first point: the pad moves against rising -side · y.
-        let height = |p: &DVec3| -side * p.y;
-        let mut heights: Vec<f64> = points.iter().map(height).collect();
-        heights.sort_by(f64::total_cmp);
-        let first = *heights.first()?;
-        let stop = stop(&heights, force / (FOUNDATION * cell_area));
-        let pressed = || points.iter().map(|p| (p, stop - height(p))).filter(|(_, d)| *d > 0.0);
-        let total: f64 = pressed().map(|(_, depth)| depth).sum();
-        let squares: f64 = pressed().map(|(_, depth)| depth * depth).sum();
-        let centre = pressed().map(|(p, depth)| depth * *p).sum::<DVec3>() / total;
-        let distance = |p: &DVec3| (p.x - centre.x).hypot(p.z - centre.z);
-        let radius = pressed().map(|(p, depth)| depth * distance(p)).sum::<f64>() / total;
-        let radius = radius.max(MEAN_DISTANCE * cell_area.sqrt());
-        Some(Self {
-            depth: stop - first,
-            centre,
-            radius,
-            area: total * total / squares * cell_area,
-        })
-    }
-
     /// The pressure on a point, spread over a cell.
     pub(crate) fn of_point(centre: DVec3, cell_area: f64) -> Self {
         let radius = MEAN_DISTANCE * cell_area.sqrt();
-        Self { depth: 0.0, centre, radius, area: cell_area }
+        Self {
+            depth: 0.0,
+            centre,
+            radius,
+            area: cell_area,
+        }
+    }
+}
+
+/// What lies before a pad, to be pressed with several forces.
+pub(crate) struct PressedSurface {
+    points: Vec<DVec3>,
+    /// Heights of the points above the pad at rest, -side · y: the pad moves against them. Ascending.
+    heights: Vec<f64>,
+    side: f64,
+    cell_area: f64,
+}
+
+impl PressedSurface {
+    /// Points before the pad that is pushed along +y (`side` -1) or -y (`side` +1); each stands for `cell_area` m².
+    pub(crate) fn new(points: Vec<DVec3>, side: f64, cell_area: f64) -> Self {
+        let mut heights: Vec<f64> = points.iter().map(|p| -side * p.y).collect();
+        heights.sort_unstable_by(f64::total_cmp);
+        Self {
+            points,
+            heights,
+            side,
+            cell_area,
+        }
+    }
+
+    /// The pressure of a force, newtons. `None` where there are no points.
+    pub(crate) fn pressure(&self, force: f64) -> Option<Pressure> {
+        let first = *self.heights.first()?;
+        let stop = stop(&self.heights, force / (FOUNDATION * self.cell_area));
+        let depth = |p: &DVec3| stop + self.side * p.y;
+        let pressed = || {
+            self.points
+                .iter()
+                .map(|p| (p, depth(p)))
+                .filter(|(_, d)| *d > 0.0)
+        };
+        let (mut total, mut squares, mut moment) = (0.0, 0.0, DVec3::ZERO);
+        for (p, depth) in pressed() {
+            total += depth;
+            squares += depth * depth;
+            moment += depth * *p;
+        }
+        let centre = moment / total;
+        let distance = |p: &DVec3| (p.x - centre.x).hypot(p.z - centre.z);
+        let radius = pressed().map(|(p, depth)| depth * distance(p)).sum::<f64>() / total;
+        let radius = radius.max(MEAN_DISTANCE * self.cell_area.sqrt());
+        let area = total * total / squares * self.cell_area;
+        Some(Pressure {
+            depth: stop - first,
+            centre,
+            radius,
+            area,
+        })
     }
 }
 
@@ -82,9 +116,13 @@ mod tests {
         places.map(|(x, z)| DVec3::new(x, y(x, z), z)).collect()
     }
 
+    fn pressed(points: Vec<DVec3>, side: f64) -> Option<Pressure> {
+        PressedSurface::new(points, side, CELL * CELL).pressure(30.0)
+    }
+
     #[test]
     fn a_flat_face_is_pressed_evenly() {
-        let pressure = Pressure::new(&surface(|_, _| -0.01), -1.0, 30.0, CELL * CELL).unwrap();
+        let pressure = pressed(surface(|_, _| -0.01), -1.0).unwrap();
         let area = 0.018f64 * 0.018;
         assert!((pressure.depth - 30.0 / (FOUNDATION * area)).abs() < 1e-9);
         assert!((pressure.area - area).abs() < 1e-9);
@@ -97,12 +135,15 @@ mod tests {
     fn a_slope_is_pressed_on_its_higher_side_on_both_pads() {
         for side in [-1.0, 1.0] {
             let slope = surface(|x, _| side * (0.01 + 0.2 * x));
-            let pressure = Pressure::new(&slope, side, 30.0, CELL * CELL).unwrap();
+            let pressure = pressed(slope, side).unwrap();
             assert!(pressure.centre.x > 3e-3, "{pressure:?}");
             // ∫ k (depth − .2 t) dt over the pressed width, times the pad's length, is the force.
             let expected = (2.0 * 0.2 * 30.0 / (FOUNDATION * 0.018)).sqrt();
-            assert!((pressure.depth - expected).abs() < 0.15 * expected, "{pressure:?}");
+            assert!(
+                (pressure.depth - expected).abs() < 0.15 * expected,
+                "{pressure:?}"
+            );
         }
-        assert!(Pressure::new(&[], 1.0, 30.0, CELL * CELL).is_none());
+        assert!(pressed(Vec::new(), 1.0).is_none());
     }
 }

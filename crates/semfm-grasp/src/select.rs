@@ -35,7 +35,9 @@ pub(crate) fn diverse(
     diversity: f64,
     radius: f64,
 ) -> Vec<Grasp> {
-    let Some(last) = top.checked_sub(1).and_then(|last| grasps.get(last)) else { return grasps };
+    let Some(last) = top.checked_sub(1).and_then(|last| grasps.get(last)) else {
+        return grasps;
+    };
     let least = (1.0 - diversity) * last.score;
     grasps.truncate(grasps.partition_point(|grasp| grasp.score >= least));
     let mut distance = vec![f64::INFINITY; grasps.len()];
@@ -44,7 +46,9 @@ pub(crate) fn diverse(
         let left = (0..grasps.len()).filter(|&i| !chosen[i]);
         // Of equally far ones the better.
         let farthest = |&a: &usize, &b: &usize| distance[a].total_cmp(&distance[b]).then(b.cmp(&a));
-        let Some(next) = left.max_by(farthest) else { break };
+        let Some(next) = left.max_by(farthest) else {
+            break;
+        };
         chosen[next] = true;
         for (d, grasp) in distance.iter_mut().zip(&grasps) {
             let apart =
@@ -52,7 +56,12 @@ pub(crate) fn diverse(
             *d = d.min(apart.relative(radius));
         }
     }
-    grasps.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(grasp, _)| grasp).collect()
+    grasps
+        .into_iter()
+        .zip(chosen)
+        .filter(|(_, chosen)| *chosen)
+        .map(|(grasp, _)| grasp)
+        .collect()
 }
 
 /// `top` of the grasps, each as likely as any other; best first.
@@ -92,13 +101,24 @@ mod tests {
             grasp(0.05, 0.0, 0.2),
             grasp(0.0, 1.0, 0.3),
         ];
-        let kept = suppress(all, Separation { translation: 0.01, rotation: 0.26 });
-        assert_eq!(kept.iter().map(|g| g.score).collect::<Vec<_>>(), [0.9, 0.3, 0.2]);
+        let kept = suppress(
+            all,
+            Separation {
+                translation: 0.01,
+                rotation: 0.26,
+            },
+        );
+        assert_eq!(
+            kept.iter().map(|g| g.score).collect::<Vec<_>>(),
+            [0.9, 0.3, 0.2]
+        );
     }
 
     #[test]
     fn random_grasps_are_no_better_than_the_others() {
-        let all: Vec<Grasp> = (0..1000).map(|i| grasp(0.0, 0.0, f64::from(i) / 1000.0)).collect();
+        let all: Vec<Grasp> = (0..1000)
+            .map(|i| grasp(0.0, 0.0, f64::from(i) / 1000.0))
+            .collect();
         let some = drawn(all.clone(), 200, 5);
         let mean = some.iter().map(|grasp| grasp.score).sum::<f64>() / 200.0;
         assert!((mean - 0.5).abs() < 0.06, "{mean}"); // three standard deviations of such a mean
@@ -115,7 +135,10 @@ mod tests {
             grasp(0.1, 1.5, 0.3),
         ];
         let scores = |diversity: f64| -> Vec<f64> {
-            diverse(all.clone(), 2, diversity, 0.1).iter().map(|g| g.score).collect()
+            diverse(all.clone(), 2, diversity, 0.1)
+                .iter()
+                .map(|g| g.score)
+                .collect()
         };
         assert_eq!(scores(0.0), [0.9, 0.8], "the plain ranking");
         assert_eq!(scores(0.1), [0.9, 0.75], "at most a tenth below the second");

@@ -14,14 +14,51 @@ const JOGGLE: f64 = 1e-5;
 /// hulls of two contacts take below 400.
 const MOST_FACETS: usize = 4000;
 
+/// A plane between two others is taken from them unless it is shorter than this, that is unless they are nearly opposite.
+const LEAST_BETWEEN: f64 = 1e-3;
+
+/// Across a ridge of a facet whose neighbour had no plane.
+const NO_FACET: u32 = u32::MAX;
+
+/// Bits of a point's number within a packed list of them; four fit into 64.
+const POINT_BITS: u32 = 16;
+
 /// A facet of the hull: six corners, `normal · x ≤ offset` inside.
+#[derive(Clone, Copy)]
 struct Facet {
-    corners: [usize; 6],
+    corners: [u16; 6],
+    /// Across the ridge opposite each corner.
+    neighbours: [u32; 6],
+    plane: Plane,
+    /// Whether the plane is that of the corners themselves; else it was taken from its neighbours' and may be off by some
+    /// roundings.
+    is_exact: bool,
+}
+
+/// All x with `normal · x = offset`.
+#[derive(Clone, Copy)]
+struct Plane {
     normal: Wrench,
     offset: f64,
 }
 
-/// Radius of the largest ball around the origin that the convex hull of `points` holds; 0 where the
+/// The hull of some of the points, as it grows.
+struct Hull<'a> {
+    points: &'a [Wrench],
+    /// A point inside.
+    centre: Wrench,
+    /// Facets of the hull, and former ones, whose plane is [`Plane::NONE`].
+    facets: Vec<Facet>,
+    /// Places of former facets.
+    free: Vec<u32>,
+    /// What the last point sees: ids, and for each facet whether it is one of them.
+    seen: Vec<u32>,
+    is_seen: Vec<bool>,
+    /// Ridges of the latest facets that end in the apex: four corners, the facet, and which corner lies opposite.
+    ridges: Vec<(u64, u32, u8)>,
+}
+
+/// Radius of the largest ball around the origin that the convex hull of `points` (fewer than 65,536) holds; 0 where the
 /// origin lies outside or the hull is flat.
 ///
 /// The facet nearest to the origin is expanded by the point farthest along its normal until none
@@ -33,62 +70,194 @@ pub(crate) fn inner_radius(points: &[Wrench]) -> f64 {
     if scale <= 0.0 || !scale.is_finite() {
         return 0.0;
     }
-    let points: Vec<Wrench> =
-        points.iter().enumerate().map(|(i, p)| joggled(p, i, scale)).collect();
-    let Some(simplex) = first_simplex(&points, scale) else { return 0.0 };
-    let centre: Wrench =
-        std::array::from_fn(|d| simplex.iter().map(|&i| points[i][d]).sum::<f64>() / 7.0);
-    let facet = |corners: [usize; 6]| Facet::new(corners, &points, &centre);
-    let mut facets: Vec<Facet> = (0..7)
-        .filter_map(|left_out| {
-            let mut corners = simplex.iter().enumerate().filter(|(k, _)| *k != left_out);
-            facet(std::array::from_fn(|_| corners.next().map_or(0, |(_, &i)| i)))
-        })
+    let points: Vec<Wrench> = points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| joggled(p, i, scale))
         .collect();
+    let Some(simplex) = first_simplex(&points, scale) else {
+        return 0.0;
+    };
+    let mut hull = Hull::of_simplex(&points, &simplex);
     loop {
-        let Some(nearest) = facets.iter().min_by(|a, b| a.offset.total_cmp(&b.offset)) else {
+        let Some(nearest) = hull.nearest() else {
             return 0.0;
         };
-        let along = |p: &Wrench| dot(&nearest.normal, p);
+        let Plane { normal, offset } = nearest;
         let Some((apex, reach)) = points
             .iter()
-            .map(along)
+            .map(|p| dot(&normal, p))
             .enumerate()
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
         else {
             return 0.0;
         };
-        if reach <= nearest.offset + TOLERANCE * scale || facets.len() > MOST_FACETS {
-            return nearest.offset.max(0.0);
+        if reach <= offset + TOLERANCE * scale || hull.facets.len() > MOST_FACETS {
+            return offset.max(0.0);
         }
-        let (seen, kept): (Vec<Facet>, Vec<Facet>) = facets
-            .into_iter()
-            .partition(|f| dot(&f.normal, &points[apex]) > f.offset + 1e-13 * scale);
-        facets = kept;
-        facets.extend(horizon(&seen).into_iter().filter_map(|ridge| {
-            let mut corners = [apex; 6];
-            corners[..5].copy_from_slice(&ridge);
-            facet(corners)
-        }));
+        if !hull.expand(apex as u16, 1e-13 * scale) {
+            return offset.max(0.0);
+        }
     }
 }
 
-/// Ridges (five points each) between what the apex sees and what it does not: those that belong to
-/// one seen facet only.
-fn horizon(seen: &[Facet]) -> Vec<[usize; 5]> {
-    let mut ridges: Vec<[usize; 5]> = seen
-        .iter()
-        .flat_map(|facet| {
-            (0..6).map(|left_out| {
-                let mut rest = (0..6).filter(|&k| k != left_out).map(|k| facet.corners[k]);
-                let mut ridge = std::array::from_fn(|_| rest.next().unwrap_or(0));
-                ridge.sort_unstable();
-                ridge
-            })
-        })
-        .collect();
-    ridges.sort_unstable();
-    ridges.chunk_by(|a, b| a == b).filter(|group| group.len() == 1).map(|group| group[0]).collect()
+impl<'a> Hull<'a> {
+    /// Of seven points.
+    fn of_simplex(points: &'a [Wrench], simplex: &[usize]) -> Self {
+        let centre =
+            std::array::from_fn(|d| simplex.iter().map(|&i| points[i][d]).sum::<f64>() / 7.0);
+        let facets = Vec::with_capacity(512);
+        let (free, seen, is_seen, ridges) = Default::default();
+        let mut hull = Self {
+            points,
+            centre,
+            facets,
+            free,
+            seen,
+            is_seen,
+            ridges,
+        };
+        for left_out in 0..7 {
+            let others = |k: usize| if k < left_out { k } else { k + 1 };
+            let corners = std::array::from_fn(|k| simplex[others(k)] as u16);
+            let neighbours = std::array::from_fn(|k| others(k) as u32);
+            let plane = hull.plane_of(&corners).unwrap_or(Plane::NONE);
+            hull.facets.push(Facet {
+                corners,
+                neighbours,
+                plane,
+                is_exact: true,
+            });
+        }
+        hull
+    }
+
+    /// The plane through six points with the inside below it; `None` where they span less.
+    fn plane_of(&self, corners: &[u16; 6]) -> Option<Plane> {
+        Plane::through(corners.map(|i| self.points[usize::from(i)]), &self.centre)
+    }
+
+    /// The plane of the facet nearest to the origin; `None` where there is no facet.
+    fn nearest(&mut self) -> Option<Plane> {
+        loop {
+            let offset = |facet: &Facet| facet.plane.offset;
+            let by_offset = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
+            let (at, least) = self
+                .facets
+                .iter()
+                .map(offset)
+                .enumerate()
+                .min_by(by_offset)?;
+            if self.facets[at].is_exact {
+                return (least < f64::INFINITY).then_some(self.facets[at].plane);
+            }
+            let plane = self.plane_of(&self.facets[at].corners);
+            self.facets[at].is_exact = true;
+            self.facets[at].plane = plane.unwrap_or(Plane::NONE);
+        }
+    }
+
+    /// Replaces all facets that the point `apex` sees by those between it and the rim of what it sees. `false` where it
+    /// sees none.
+    fn expand(&mut self, apex: u16, least: f64) -> bool {
+        let p = self.points[usize::from(apex)];
+        self.seen.clear();
+        self.is_seen.clear();
+        for (id, facet) in (0u32..).zip(&self.facets) {
+            let sees = facet.plane.height(&p) > least;
+            self.is_seen.push(sees);
+            if sees {
+                self.seen.push(id);
+            }
+        }
+        self.ridges.clear();
+        for at in 0..self.seen.len() {
+            let seen = self.seen[at];
+            for k in 0..6 {
+                let beyond = self.facets[seen as usize].neighbours[k];
+                if beyond == NO_FACET || !self.is_seen[beyond as usize] {
+                    self.add_between(seen, k, apex);
+                }
+            }
+        }
+        for &seen in &self.seen {
+            self.facets[seen as usize].plane = Plane::NONE;
+        }
+        self.free.extend(&self.seen);
+        self.join();
+        !self.seen.is_empty()
+    }
+
+    /// Adds the facet between `apex` and the ridge of a seen facet opposite its corner `k`.
+    fn add_between(&mut self, seen: u32, k: usize, apex: u16) {
+        let old = self.facets[seen as usize];
+        let beyond = old.neighbours[k];
+        let p = &self.points[usize::from(apex)];
+        let mut facet = Facet {
+            is_exact: false,
+            ..old
+        };
+        facet.corners[k] = apex;
+        facet.neighbours = [NO_FACET; 6];
+        facet.neighbours[k] = beyond;
+        let between = (beyond != NO_FACET)
+            .then(|| Plane::between(&old.plane, &self.facets[beyond as usize].plane, p))
+            .flatten();
+        facet.plane = match between {
+            Some(plane) => plane,
+            None => {
+                facet.is_exact = true;
+                let Some(plane) = self.plane_of(&facet.corners) else {
+                    self.replace(beyond, seen, NO_FACET);
+                    return;
+                };
+                plane
+            }
+        };
+        // What this apex sees is still read: places become free after it.
+        let id = self.free.pop().unwrap_or(self.facets.len() as u32);
+        if id as usize == self.facets.len() {
+            self.facets.push(facet);
+        } else {
+            self.facets[id as usize] = facet;
+        }
+        self.replace(beyond, seen, id);
+        for other in (0..6).filter(|&other| other != k) {
+            self.ridges
+                .push((ridge(&facet.corners, k, other), id, other as u8));
+        }
+    }
+
+    /// Makes `id` the neighbour of `facet` where it was `old`.
+    fn replace(&mut self, facet: u32, old: u32, id: u32) {
+        if facet != NO_FACET {
+            let neighbours = &mut self.facets[facet as usize].neighbours;
+            neighbours
+                .iter_mut()
+                .filter(|neighbour| **neighbour == old)
+                .for_each(|n| *n = id);
+        }
+    }
+
+    /// Makes neighbours of the new facets that share a ridge.
+    fn join(&mut self) {
+        self.ridges.sort_unstable();
+        for pair in self.ridges.chunk_by(|a, b| a.0 == b.0) {
+            if let &[(_, one, k), (_, other, l)] = pair {
+                self.facets[one as usize].neighbours[usize::from(k)] = other;
+                self.facets[other as usize].neighbours[usize::from(l)] = one;
+            }
+        }
+    }
+}
+
+/// The four corners but the `k`-th and the `other`-th, ascending, in one number.
+fn ridge(corners: &[u16; 6], k: usize, other: usize) -> u64 {
+    let mut rest = (0..6).filter(|&i| i != k && i != other).map(|i| corners[i]);
+    let mut four: [u16; 4] = std::array::from_fn(|_| rest.next().unwrap_or(0));
+    four.sort_unstable();
+    four.into_iter()
+        .fold(0, |packed, corner| packed << POINT_BITS | u64::from(corner))
 }
 
 /// Seven points that span six dimensions, each the farthest from the span of those before it.
@@ -104,11 +273,11 @@ fn first_simplex(points: &[Wrench], scale: f64) -> Option<Vec<usize>> {
             }
             rest
         };
-        let (i, rest) = points
-            .iter()
-            .map(beyond)
-            .enumerate()
-            .max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)).then(b.0.cmp(&a.0)))?;
+        let (i, rest) = points.iter().map(beyond).enumerate().max_by(|a, b| {
+            dot(&a.1, &a.1)
+                .total_cmp(&dot(&b.1, &b.1))
+                .then(b.0.cmp(&a.0))
+        })?;
         let length = dot(&rest, &rest).sqrt();
         // Flat but for the joggle is flat.
         if length <= 10.0 * JOGGLE * scale {
@@ -120,16 +289,50 @@ fn first_simplex(points: &[Wrench], scale: f64) -> Option<Vec<usize>> {
     Some(chosen)
 }
 
-impl Facet {
+impl Plane {
+    /// Seen by no point, and farther from the origin than all others.
+    const NONE: Self = Self {
+        normal: [0.0; 6],
+        offset: f64::INFINITY,
+    };
+
     /// The plane through six points with `inside` below it; `None` where they span less.
-    fn new(corners: [usize; 6], points: &[Wrench], inside: &Wrench) -> Option<Self> {
-        let base = points[corners[0]];
+    fn through(corners: [Wrench; 6], inside: &Wrench) -> Option<Self> {
+        let base = corners[0];
         let mut rows: [Wrench; 5] =
-            std::array::from_fn(|r| std::array::from_fn(|d| points[corners[r + 1]][d] - base[d]));
+            std::array::from_fn(|r| std::array::from_fn(|d| corners[r + 1][d] - base[d]));
         let normal = null_vector(&mut rows)?;
         let offset = dot(&normal, &base);
-        let flip = if dot(&normal, inside) > offset { -1.0 } else { 1.0 };
-        Some(Self { corners, normal: normal.map(|x| flip * x), offset: flip * offset })
+        let flip = if dot(&normal, inside) > offset {
+            -1.0
+        } else {
+            1.0
+        };
+        Some(Self {
+            normal: normal.map(|x| flip * x),
+            offset: flip * offset,
+        })
+    }
+
+    /// The plane through `p` and what two planes share, of which the first is seen from `p` and the second is not:
+    ///
+    /// > h₁ (n₂, d₂) − h₂ (n₁, d₁), with hᵢ = nᵢ · p − dᵢ.
+    ///
+    /// `None` where the two are nearly opposite.
+    fn between(seen: &Self, other: &Self, p: &Wrench) -> Option<Self> {
+        let (seen_by, below) = (seen.height(p), -other.height(p));
+        let mix = |one: f64, two: f64| below * one + seen_by * two;
+        let normal: Wrench = std::array::from_fn(|d| mix(seen.normal[d], other.normal[d]));
+        let length = dot(&normal, &normal).sqrt();
+        (length > LEAST_BETWEEN * (seen_by + below.abs())).then(|| Self {
+            normal: normal.map(|x| x / length),
+            offset: mix(seen.offset, other.offset) / length,
+        })
+    }
+
+    /// How far a point lies beyond the plane.
+    fn height(&self, p: &Wrench) -> f64 {
+        dot(&self.normal, p) - self.offset
     }
 }
 
@@ -139,9 +342,9 @@ fn null_vector(rows: &mut [Wrench; 5]) -> Option<Wrench> {
     for k in 0..5 {
         let (mut best, mut place) = (0.0, (k, k));
         for (r, row) in rows.iter().enumerate().skip(k) {
-            for (c, &column) in columns.iter().enumerate().skip(k) {
-                if row[column].abs() > best {
-                    (best, place) = (row[column].abs(), (r, c));
+            for (c, x) in row.iter().enumerate().skip(k) {
+                if x.abs() > best {
+                    (best, place) = (x.abs(), (r, c));
                 }
             }
         }
@@ -149,21 +352,31 @@ fn null_vector(rows: &mut [Wrench; 5]) -> Option<Wrench> {
             return None;
         }
         rows.swap(k, place.0);
-        columns.swap(k, place.1);
+        if place.1 != k {
+            columns.swap(k, place.1);
+            rows.iter_mut().for_each(|row| row.swap(k, place.1));
+        }
         let pivot = rows[k];
         for row in rows.iter_mut().skip(k + 1) {
-            let factor = row[columns[k]] / pivot[columns[k]];
-            row.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= factor * p);
+            let factor = row[k] / pivot[k];
+            row.iter_mut()
+                .zip(&pivot)
+                .for_each(|(x, p)| *x -= factor * p);
         }
     }
-    let mut x = [0.0; 6];
-    x[columns[5]] = 1.0;
+    // Entries in the order of the swapped columns, the last one free.
+    let mut swapped = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     for k in (0..5).rev() {
-        let sum: f64 = (k + 1..6).map(|c| rows[k][columns[c]] * x[columns[c]]).sum();
-        x[columns[k]] = -sum / rows[k][columns[k]];
+        let sum: f64 = (k + 1..6).map(|c| rows[k][c] * swapped[c]).sum();
+        swapped[k] = -sum / rows[k][k];
     }
-    let length = dot(&x, &x).sqrt();
-    length.is_finite().then(|| x.map(|x| x / length))
+    let length = dot(&swapped, &swapped).sqrt();
+    let mut x = [0.0; 6];
+    columns
+        .into_iter()
+        .zip(swapped)
+        .for_each(|(column, value)| x[column] = value / length);
+    length.is_finite().then_some(x)
 }
 
 /// Adds to each coordinate a number of at most `JOGGLE · scale` that depends on its place alone
@@ -201,7 +414,10 @@ mod tests {
             .collect();
         let found = inner_radius(&cube);
         assert!((found - 1.0).abs() < 1e-4, "{found}");
-        assert!(inner_radius(&cross[..11]) < 1e-4, "the origin is on the boundary");
+        assert!(
+            inner_radius(&cross[..11]) < 1e-4,
+            "the origin is on the boundary"
+        );
         assert_eq!(inner_radius(&cross[..4]), 0.0, "flat");
         assert_eq!(inner_radius(&[]), 0.0);
     }
@@ -210,27 +426,34 @@ mod tests {
     fn the_radius_is_the_least_support_over_all_facets() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         for _ in 0..5 {
-            let points: Vec<Wrench> =
-                (0..12).map(|_| std::array::from_fn(|_| rng.random::<f64>() - 0.45)).collect();
+            let points: Vec<Wrench> = (0..12)
+                .map(|_| std::array::from_fn(|_| rng.random::<f64>() - 0.45))
+                .collect();
             let found = inner_radius(&points);
             let support = |normal: &Wrench| {
-                points.iter().map(|p| dot(normal, p)).fold(f64::NEG_INFINITY, f64::max)
+                points
+                    .iter()
+                    .map(|p| dot(normal, p))
+                    .fold(f64::NEG_INFINITY, f64::max)
             };
             // Every six points whose plane has all others on one side make a facet.
             let mut least = f64::INFINITY;
             for mask in 0u32..1 << 12 {
                 if mask.count_ones() == 6 {
                     let mut members = (0..12).filter(|i| mask >> i & 1 == 1);
-                    let corners = std::array::from_fn(|_| members.next().unwrap());
+                    let corners = std::array::from_fn(|_| points[members.next().unwrap()]);
                     let inside: Wrench =
                         std::array::from_fn(|d| points.iter().map(|p| p[d]).sum::<f64>() / 12.0);
-                    let facet = Facet::new(corners, &points, &inside).unwrap();
-                    if support(&facet.normal) <= facet.offset + 1e-9 {
-                        least = least.min(facet.offset);
+                    let plane = Plane::through(corners, &inside).unwrap();
+                    if support(&plane.normal) <= plane.offset + 1e-9 {
+                        least = least.min(plane.offset);
                     }
                 }
             }
-            assert!((found - least.max(0.0)).abs() < 1e-4, "{found} instead of {least}");
+            assert!(
+                (found - least.max(0.0)).abs() < 1e-4,
+                "{found} instead of {least}"
+            );
         }
     }
 }
