@@ -79,7 +79,7 @@ OBJECTS = {
     "cdb_scissors": ("objects/6_scissor_tools/cdb_scissors.obj", 1, 0.08),
 }
 #: Categories of ``semfm-cli demo``, and the kilograms of the target that it makes.
-DEMO = {"hammer": 0.4, "shoe": 0.3, "knife": 0.12, "mug": 0.3, "controller": 0.2, "scissors": 0.1}
+DEMO = {"tools": 0.4, "shoes": 0.3, "cutting": 0.12, "containers": 0.3, "controllers": 0.2, "scissors": 0.1}
 HANDS = ("franka", "robotiq-2f85", "robotiq-2f140")
 #: Friction and force of the trials that judge; the mass is the object's own.
 USUAL = (0.5, 30.0)
@@ -93,20 +93,17 @@ def cases(arguments) -> list[tuple[str, Path, float, float, str]]:
     out = []
     things = {name: (arguments.shared / "data" / mesh, s, m) for name, (mesh, s, m) in OBJECTS.items()}
     for name, mass in DEMO.items():
-        folder = arguments.folder / "demo" / name
-        if not any(folder.glob("*.obj")) and not any(folder.glob("*.ply")):
-            run(arguments, "demo", name, "-o", folder)
-        things[f"demo_{name}"] = (demo_mesh(folder), 1.0, mass)
+        mesh = arguments.folder / "demo" / name / f"{name}_1_s0.obj"
+        if not mesh.exists():
+            run(arguments, "demo", "--category", name, "--level", "easy", "-q", "-o", mesh.parent)
+        scale = json.loads((mesh.parent / "transfer" / "grasps.json").read_text())["object_scale"]
+        things[f"demo_{name}"] = (mesh, scale, mass)
     for i, (name, (mesh, scale, mass)) in enumerate(sorted(things.items())):
         if not mesh.exists():
             raise SystemExit(f"no shared data: expected {mesh} (--shared names the folder)")
         for hand in (HANDS[0], HANDS[1 + i % 2]):
             out.append((name, mesh, scale, mass, hand))
     return out
-
-
-def demo_mesh(folder: Path) -> Path:
-    return next(path for ending in ("obj", "ply") for path in sorted(folder.glob(f"*target*.{ending}")))
 
 
 def run(arguments, *words) -> int:
@@ -135,7 +132,7 @@ def grasps_of(arguments, case, *options, tag: str) -> dict | None:
         region = everywhere(mesh, arguments.folder)
         words = ["--region", region, "--gripper", hand, "--scale", scale, "--mass", mass]
         words += ["--samples", 70, *options, "-q", "-o", path]
-        run(arguments, "grasp", mesh, *words, "--force")
+        run(arguments, "grasp", mesh, *words)
     answer = json.loads(path.read_text())
     return answer if answer["grasps"] else None
 

@@ -64,6 +64,8 @@ COLUMNS, BESIDE = 5, 0.008
 WINDOW = 0.006
 #: Least thickness of a column, metres: a sheet without inside has none of its own.
 THINNEST = 1e-3
+#: A column of less than this is none, m³: a splinter that MuJoCo would not take.
+LEAST_VOLUME = 1e-13
 #: Kilograms and inertia factor of a finger.
 FINGER_MASS = 0.2
 STEP, STEPS_A_CONTROL = 0.0025, 4
@@ -198,7 +200,7 @@ def columns_of(body: Body, object_from_tcp: np.ndarray, held: np.ndarray, pad: n
 
 
 def hull(points: np.ndarray) -> np.ndarray | None:
-    """Corners of the convex hull, made at least ``THINNEST`` thick along y; None for less than an area."""
+    """Corners of the convex hull, made at least ``THINNEST`` thick along y; None for less than a body."""
     if len(points) < 3:
         return None
     if np.ptp(points[:, 1]) < THINNEST:
@@ -207,9 +209,10 @@ def hull(points: np.ndarray) -> np.ndarray | None:
     if np.ptp(points[:, 0]) < 1e-4 or np.ptp(points[:, 2]) < 1e-4:
         return None
     try:
-        return points[ConvexHull(points).vertices]
+        convex = ConvexHull(points)
     except QhullError:
         return None
+    return points[convex.vertices] if convex.volume > LEAST_VOLUME else None
 
 
 def column_error(triangles, pieces, where, pad, half, pitch, window) -> dict[str, float]:
