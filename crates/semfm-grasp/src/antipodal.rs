@@ -58,23 +58,12 @@ pub(crate) fn antipodal(
         pair(gripper, seed.point, seed.normal, 0.0, rng, out);
     }
     for ray in 0..RAYS {
-        let tilted = if ray == 0 {
-            -seed.normal
-        } else {
-            in_cone(-seed.normal, friction, rng)
-        };
+        let tilted = if ray == 0 { -seed.normal } else { in_cone(-seed.normal, friction, rng) };
         // Known inside: into it. Otherwise the face may be wound either way.
-        let direction = if object.is_signed() || rng.random::<bool>() {
-            tilted
-        } else {
-            -tilted
-        };
+        let direction = if object.is_signed() || rng.random::<bool>() { tilted } else { -tilted };
         // Beyond the opening too: that the object is there, but too thick, is an answer.
         let hits =
-            object
-                .touched()
-                .tree
-                .crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
+            object.touched().tree.crossings(seed.point, direction, SAME_SURFACE, 4.0 * widest);
         let opposite = hits
             .iter()
             .filter(|(_, face)| *face != seed.item)
@@ -92,11 +81,7 @@ pub(crate) fn antipodal(
 /// Whether a surface can take the push along `direction` from its other side.
 fn opposes(normal: DVec3, direction: DVec3, object: &GraspObject, least_cosine: f64) -> bool {
     let cosine = normal.dot(direction);
-    if object.is_signed() {
-        cosine >= least_cosine
-    } else {
-        cosine.abs() >= least_cosine
-    }
+    if object.is_signed() { cosine >= least_cosine } else { cosine.abs() >= least_cosine }
 }
 
 /// One candidate for each approach about the line from `point` to `point + t · closing`.
@@ -123,10 +108,7 @@ fn pair(
         };
         let place = middle + approach * (off * gripper.pad()[1]);
         let tcp = Pose::from_parts(place, rotation(closing, approach));
-        out.push(Candidate {
-            tcp,
-            seed: [-t / 2.0, t / 2.0],
-        });
+        out.push(Candidate { tcp, seed: [-t / 2.0, t / 2.0] });
     }
 }
 

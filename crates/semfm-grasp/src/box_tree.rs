@@ -18,26 +18,16 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    const EMPTY: Self = Self {
-        low: Vec3A::splat(f32::INFINITY),
-        high: Vec3A::splat(f32::NEG_INFINITY),
-    };
+    const EMPTY: Self =
+        Self { low: Vec3A::splat(f32::INFINITY), high: Vec3A::splat(f32::NEG_INFINITY) };
 
     /// The least single-precision box around one in double precision.
     fn around(low: DVec3, high: DVec3) -> Self {
         let down = |x: f64| {
-            if f64::from(x as f32) > x {
-                (x as f32).next_down()
-            } else {
-                x as f32
-            }
+            if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 }
         };
         let up = |x: f64| {
-            if f64::from(x as f32) < x {
-                (x as f32).next_up()
-            } else {
-                x as f32
-            }
+            if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 }
         };
         Self {
             low: Vec3A::new(down(low.x), down(low.y), down(low.z)),
@@ -46,10 +36,7 @@ impl Bounds {
     }
 
     fn joined(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 }
 
@@ -71,9 +58,7 @@ pub(crate) struct BoxTree {
 impl BoxTree {
     /// Of the low and high corners of each item's box.
     pub(crate) fn new(boxes: impl Iterator<Item = (DVec3, DVec3)>) -> Self {
-        let items = (0u32..)
-            .zip(boxes)
-            .map(|(id, (low, high))| (Bounds::around(low, high), id));
+        let items = (0u32..).zip(boxes).map(|(id, (low, high))| (Bounds::around(low, high), id));
         let mut items: Vec<(Bounds, u32)> = items.collect();
         let mut nodes = Vec::with_capacity(items.len());
         let n = items.len();
@@ -93,13 +78,7 @@ impl BoxTree {
         let mut stack = [0; DEEPEST];
         stack[0] = 0;
         let depth = usize::from(!self.nodes.is_empty());
-        Passing {
-            tree: self,
-            test,
-            stack,
-            depth,
-            leaf: 0..0,
-        }
+        Passing { tree: self, test, stack, depth, leaf: 0..0 }
     }
 }
 
@@ -146,25 +125,16 @@ impl<F: Fn(&Bounds) -> bool> Iterator for Passing<'_, F> {
 /// Adds the node of items[from..to] and those below it: halves by number along the longest side of the middles' box.
 fn split(items: &mut [(Bounds, u32)], from: usize, to: usize, nodes: &mut Vec<Node>) {
     let own = &mut items[from..to];
-    let bounds = own
-        .iter()
-        .fold(Bounds::EMPTY, |sum, item| sum.joined(item.0));
+    let bounds = own.iter().fold(Bounds::EMPTY, |sum, item| sum.joined(item.0));
     let at = nodes.len();
-    nodes.push(Node {
-        bounds,
-        next: from as u32,
-        n: own.len() as u32,
-    });
+    nodes.push(Node { bounds, next: from as u32, n: own.len() as u32 });
     if own.len() <= LEAF {
         return;
     }
     let middle = |item: &(Bounds, u32)| item.0.low + item.0.high;
     let around = own.iter().fold(Bounds::EMPTY, |sum, item| {
         let middle = middle(item);
-        sum.joined(Bounds {
-            low: middle,
-            high: middle,
-        })
+        sum.joined(Bounds { low: middle, high: middle })
     });
     let sides = around.high - around.low;
     let axis = if sides.x >= sides.y && sides.x >= sides.z {
@@ -176,9 +146,7 @@ fn split(items: &mut [(Bounds, u32)], from: usize, to: usize, nodes: &mut Vec<No
     };
     let half = own.len() / 2;
     own.select_nth_unstable_by(half, |a, b| {
-        middle(a)[axis]
-            .total_cmp(&middle(b)[axis])
-            .then(a.1.cmp(&b.1))
+        middle(a)[axis].total_cmp(&middle(b)[axis]).then(a.1.cmp(&b.1))
     });
     split(items, from, from + half, nodes);
     let next = nodes.len() as u32;
@@ -201,9 +169,7 @@ mod tests {
             let mut all: Vec<u32> = tree.passing(|_| true).collect();
             all.sort_unstable();
             assert_eq!(all, (0..n).collect::<Vec<_>>());
-            let mut near: Vec<u32> = tree
-                .passing(|b| b.low.x <= 0.2 && b.high.x >= 0.1)
-                .collect();
+            let mut near: Vec<u32> = tree.passing(|b| b.low.x <= 0.2 && b.high.x >= 0.1).collect();
             near.sort_unstable();
             let expected = (0..n).filter(|&i| at(i).x <= 0.2 && at(i).x + 0.01 >= 0.1);
             assert_eq!(near, expected.collect::<Vec<_>>());

@@ -14,9 +14,5 @@ pub(crate) struct Candidate {
 
 /// The rotation whose y and z axes are `closing` and `approach` (unit, orthogonal).
 pub(crate) fn rotation(closing: DVec3, approach: DVec3) -> Rotation {
-    Rotation::from_mat3(&DMat3::from_cols(
-        closing.cross(approach),
-        closing,
-        approach,
-    ))
+    Rotation::from_mat3(&DMat3::from_cols(closing.cross(approach), closing, approach))
 }

@@ -84,19 +84,12 @@ mod tests {
     use super::*;
 
     fn area(polygon: &Polygon) -> f64 {
-        polygon
-            .fan()
-            .map(|[a, b, c]| (b.0 - a.0).cross(c.0 - a.0).length() / 2.0)
-            .sum()
+        polygon.fan().map(|[a, b, c]| (b.0 - a.0).cross(c.0 - a.0).length() / 2.0).sum()
     }
 
     #[test]
     fn cuts_add_up_and_weights_stay_linear() {
-        let points = [
-            DVec3::ZERO,
-            DVec3::new(2.0, 0.0, 1.0),
-            DVec3::new(0.0, 2.0, 3.0),
-        ];
+        let points = [DVec3::ZERO, DVec3::new(2.0, 0.0, 1.0), DVec3::new(0.0, 2.0, 3.0)];
         let weights = points.map(|p| 0.3 * p.x - 0.2 * p.y + 0.1);
         let whole = Polygon::triangle(points, weights);
         let mut sum = 0.0;

@@ -56,10 +56,7 @@ pub(crate) fn turn_until_held(view: &PadView, friction: f64, force: f64) -> Opti
             surfaces = before_pads(view, rotation);
         }
     }
-    Some(TurnedObject {
-        turn: angle(rotation),
-        pressures,
-    })
+    Some(TurnedObject { turn: angle(rotation), pressures })
 }
 
 /// What lies before each pad of the object turned about the TCP.
@@ -67,11 +64,7 @@ fn before_pads(view: &PadView, rotation: Rotation) -> [PressedSurface; 2] {
     [-1.0, 1.0].map(|side| {
         let points = &view.points[usize::from(side > 0.0)];
         let turned = points.iter().map(|&p| rotation * p);
-        PressedSurface::new(
-            turned.filter(|&p| view.before_pad(p)).collect(),
-            side,
-            view.cell_area,
-        )
+        PressedSurface::new(turned.filter(|&p| view.before_pad(p)).collect(), side, view.cell_area)
     })
 }
 
@@ -93,11 +86,7 @@ mod tests {
             places.map(|(x, z)| DVec3::new(x, y(x), z)).collect()
         };
         let points = [grid(&left), grid(&right)];
-        PadView {
-            points,
-            cell_area: cell * cell,
-            half_pad: [9e-3; 2],
-        }
+        PadView { points, cell_area: cell * cell, half_pad: [9e-3; 2] }
     }
 
     #[test]
@@ -108,10 +97,7 @@ mod tests {
         let slope = 8f64.to_radians().tan();
         let askew = view(|x| -0.01 + slope * x, |x| 0.01 + slope * x);
         let turned = turn_until_held(&askew, 0.5, 30.0).unwrap();
-        assert!(
-            (4f64.to_radians()..=8.5f64.to_radians()).contains(&turned.turn),
-            "{turned:?}"
-        );
+        assert!((4f64.to_radians()..=8.5f64.to_radians()).contains(&turned.turn), "{turned:?}");
         // More friction holds it earlier.
         assert!(turn_until_held(&askew, 2.0, 30.0).unwrap().turn < turned.turn);
     }
@@ -120,10 +106,8 @@ mod tests {
     fn a_thin_plate_comes_to_rest() {
         // Of 2 mm, a little askew and with a ridge: no force may lie 1 mm beside the other.
         let slope = 3f64.to_radians().tan();
-        let plate = view(
-            |x| -1e-3 + slope * x,
-            |x| 1e-3 + slope * x + if x > 6e-3 { 2e-4 } else { 0.0 },
-        );
+        let plate =
+            view(|x| -1e-3 + slope * x, |x| 1e-3 + slope * x + if x > 6e-3 { 2e-4 } else { 0.0 });
         let turned = turn_until_held(&plate, 0.5, 30.0).unwrap();
         assert!(turned.turn < 5f64.to_radians(), "{turned:?}");
     }
@@ -134,10 +118,7 @@ mod tests {
         let turned = turn_until_held(&view(|x| -y(x), y), 0.3, 30.0).unwrap();
         assert_eq!(turned.turn, 0.0);
         assert!(turned.pressures[0].area < 0.5 * 0.018 * 0.018);
-        let nothing = PadView {
-            points: [Vec::new(), Vec::new()],
-            ..view(|_| 0.0, |_| 0.0)
-        };
+        let nothing = PadView { points: [Vec::new(), Vec::new()], ..view(|_| 0.0, |_| 0.0) };
         assert!(turn_until_held(&nothing, 0.3, 30.0).is_none());
     }
 }

@@ -58,12 +58,7 @@ impl<'a> Collision<'a> {
         gripper: &'a GripperGeometry,
         settings: &'a GraspSettings,
     ) -> Self {
-        Self {
-            object,
-            scene,
-            gripper,
-            settings,
-        }
+        Self { object, scene, gripper, settings }
     }
 
     /// The cheap half: whether the gripper, for one of its openings, stays clear of the table.
@@ -112,11 +107,7 @@ impl<'a> Collision<'a> {
         }
         let clearance = self.clearance(open, tcp);
         Refusal::where_positive(Reason::Clearance, self.least_clearance() - clearance)?;
-        Ok(Fit {
-            width,
-            opening,
-            clearance,
-        })
+        Ok(Fit { width, opening, clearance })
     }
 
     /// The open gripper from `retreat` behind the grasp up to it.
@@ -127,19 +118,11 @@ impl<'a> Collision<'a> {
             let path = shape.swept(&(behind * *pose), &at);
             if self.object.obstacle().meets(&path, MARGIN) {
                 let there = self.object.obstacle().meets(&shape.at(&at), MARGIN);
-                return Err(if there {
-                    Reason::Collision
-                } else {
-                    Reason::ApproachPath
-                });
+                return Err(if there { Reason::Collision } else { Reason::ApproachPath });
             }
             if self.meets_scene(&path) {
                 let there = self.meets_scene(&shape.at(&at));
-                return Err(if there {
-                    Reason::Scene
-                } else {
-                    Reason::ApproachPath
-                });
+                return Err(if there { Reason::Scene } else { Reason::ApproachPath });
             }
         }
         Ok(())
@@ -150,9 +133,7 @@ impl<'a> Collision<'a> {
         let noise = self.object.surface_report().noise;
         let of_noise = NOISE_WIDER.map(|wider| wider * noise);
         let of_pads = WIDER.map(|wider| wider * self.settings.compliance);
-        let extras = of_pads
-            .into_iter()
-            .chain(of_noise.into_iter().filter(|_| noise > 0.0));
+        let extras = of_pads.into_iter().chain(of_noise.into_iter().filter(|_| noise > 0.0));
         for extra in extras {
             let width = closing.width + 2.0 * (TOUCH_GAP + extra);
             if width <= opening && self.closes_freely(&closing.tcp, opening, width) {
@@ -194,11 +175,7 @@ impl<'a> Collision<'a> {
         open.pieces().any(|(_, shape, pose)| {
             let centre = shape.at(&(*tcp * *pose)).centre();
             self.object.obstacle().encloses(centre)
-                || self
-                    .scene
-                    .obstacles()
-                    .iter()
-                    .any(|obstacle| obstacle.encloses(centre))
+                || self.scene.obstacles().iter().any(|obstacle| obstacle.encloses(centre))
         })
     }
 
@@ -224,10 +201,7 @@ impl<'a> Collision<'a> {
 
     /// What is asked, and what an uncertain pose asks.
     fn least_clearance(&self) -> f64 {
-        self.settings
-            .limits
-            .clearance
-            .max(self.settings.pose_margin)
+        self.settings.limits.clearance.max(self.settings.pose_margin)
     }
 
     /// How far back along the approach the open gripper is free, metres: how much a colliding grasp is
@@ -255,9 +229,7 @@ impl<'a> Collision<'a> {
     fn openings(&self, width: f64) -> impl Iterator<Item = f64> {
         let widest = *self.gripper.opening().end();
         let fitted = width + 2.0 * (TOUCH_GAP + SLACK.max(1.2 * self.settings.pose_margin));
-        [Some(widest), (fitted < widest - SLACK).then_some(fitted)]
-            .into_iter()
-            .flatten()
+        [Some(widest), (fitted < widest - SLACK).then_some(fitted)].into_iter().flatten()
     }
 
     fn open(&self, opening: f64, closed: &PosedGripper<'a>) -> PosedGripper<'a> {
@@ -275,19 +247,11 @@ impl<'a> Collision<'a> {
             .fold(f64::INFINITY, f64::min);
         let back = -self.settings.retreat * (tcp.rotation * DVec3::Z).dot(table.normal);
         let height = lowest + back.min(0.0) - table.point.dot(table.normal);
-        self.settings
-            .limits
-            .table_clearance
-            .max(self.settings.pose_margin)
-            .max(MARGIN)
-            - height
+        self.settings.limits.table_clearance.max(self.settings.pose_margin).max(MARGIN) - height
     }
 
     fn meets_scene(&self, solid: &Solid) -> bool {
-        self.scene
-            .obstacles()
-            .iter()
-            .any(|obstacle| obstacle.meets(solid, MARGIN))
+        self.scene.obstacles().iter().any(|obstacle| obstacle.meets(solid, MARGIN))
     }
 }
 
@@ -298,17 +262,10 @@ fn moves_straight(
     closed: &PosedGripper<'_>,
 ) -> bool {
     let ends = open.pieces().zip(closed.pieces());
-    middle
-        .pieces()
-        .zip(ends)
-        .all(|((_, _, m), ((_, _, a), (_, _, b)))| {
-            let halfway = a
-                .translation
-                .midpoint(b.translation)
-                .distance(m.translation)
-                < 1e-9;
-            halfway && a.inv_mul(b).rotation.is_near_identity()
-        })
+    middle.pieces().zip(ends).all(|((_, _, m), ((_, _, a), (_, _, b)))| {
+        let halfway = a.translation.midpoint(b.translation).distance(m.translation) < 1e-9;
+        halfway && a.inv_mul(b).rotation.is_near_identity()
+    })
 }
 
 #[cfg(test)]
@@ -328,9 +285,7 @@ mod tests {
             crate::contact::close(&object, &region, &gripper, tcp, [-0.015, 0.015], 1.5e-3)
                 .unwrap();
         let collision = Collision::new(&object, scene, &gripper, &settings);
-        collision
-            .above_table(&closing)
-            .map_err(|refusal| refusal.reason)?;
+        collision.above_table(&closing).map_err(|refusal| refusal.reason)?;
         collision.fit(&closing).map_err(|refusal| refusal.reason)
     }
 
@@ -371,35 +326,20 @@ mod tests {
         // Nearer still, and no opening helps.
         let close_by = joined(&bar, &box_at(knob, DVec3::new(0.0, 0.033, 0.02)));
         let refused = fit(&close_by, &Scene::new(), &from_above).unwrap_err();
-        assert!(
-            matches!(refused, Reason::Collision | Reason::Closing),
-            "{refused:?}"
-        );
+        assert!(matches!(refused, Reason::Collision | Reason::Closing), "{refused:?}");
         // Above the palm: on the way in.
         let above = joined(&bar, &box_at(knob, DVec3::new(0.0, 0.0, 0.15)));
-        assert_eq!(
-            fit(&above, &Scene::new(), &from_above).unwrap_err(),
-            Reason::ApproachPath
-        );
+        assert_eq!(fit(&above, &Scene::new(), &from_above).unwrap_err(), Reason::ApproachPath);
         // A small thing wholly inside of the palm.
         let swallowed = joined(&bar, &box_at(knob / 4.0, DVec3::new(0.0, 0.0, 0.08)));
-        assert_eq!(
-            fit(&swallowed, &Scene::new(), &from_above).unwrap_err(),
-            Reason::Collision
-        );
+        assert_eq!(fit(&swallowed, &Scene::new(), &from_above).unwrap_err(), Reason::Collision);
         // The same knobs in the scene.
         let scene = Scene::new().with_mesh(&box_at(knob, DVec3::new(0.0, 0.0, 0.08)));
         assert_eq!(fit(&bar, &scene, &from_above).unwrap_err(), Reason::Scene);
         let cloud = [DVec3::new(0.0, 0.0, 0.05)];
-        let fitted = fit(
-            &bar,
-            &Scene::new().with_cloud(&[DVec3::Z * 0.03], 0.002).unwrap(),
-            &from_above,
-        );
-        assert!(
-            fitted.is_ok(),
-            "between bar and palm there is room for a point"
-        );
+        let fitted =
+            fit(&bar, &Scene::new().with_cloud(&[DVec3::Z * 0.03], 0.002).unwrap(), &from_above);
+        assert!(fitted.is_ok(), "between bar and palm there is room for a point");
         let scene = Scene::new().with_cloud(&cloud, 0.02).unwrap();
         assert_eq!(fit(&bar, &scene, &from_above).unwrap_err(), Reason::Scene);
         let hall = Scene::new().with_mesh(&cuboid(DVec3::splat(2.0)));
@@ -411,14 +351,8 @@ mod tests {
         let (bar, from_above) = bar();
         // Fingertips are 9 mm below the middle of the bar.
         assert!(fit(&bar, &table(-0.015), &from_above).is_ok());
-        assert_eq!(
-            fit(&bar, &table(-0.0085), &from_above).unwrap_err(),
-            Reason::Table
-        );
+        assert_eq!(fit(&bar, &table(-0.0085), &from_above).unwrap_err(), Reason::Table);
         let from_below = Pose::IDENTITY;
-        assert_eq!(
-            fit(&bar, &table(-0.015), &from_below).unwrap_err(),
-            Reason::Table
-        );
+        assert_eq!(fit(&bar, &table(-0.015), &from_below).unwrap_err(), Reason::Table);
     }
 }

@@ -74,14 +74,7 @@ pub(crate) fn close(
     seed: [f64; 2],
     compliance: f64,
 ) -> Option<Closing> {
-    close_on(
-        object.touched(),
-        region.touched(),
-        gripper,
-        tcp,
-        seed,
-        compliance,
-    )
+    close_on(object.touched(), region.touched(), gripper, tcp, seed, compliance)
 }
 
 /// Closes the pads on what lies between them.
@@ -98,10 +91,8 @@ pub(crate) fn close_on(
     compliance: f64,
 ) -> Option<Closing> {
     let widest = *gripper.opening().end();
-    let seeded = Pose::from_parts(
-        *tcp * DVec3::new(0.0, (seed[0] + seed[1]) / 2.0, 0.0),
-        tcp.rotation,
-    );
+    let seeded =
+        Pose::from_parts(*tcp * DVec3::new(0.0, (seed[0] + seed[1]) / 2.0, 0.0), tcp.rotation);
     let half = (seed[1] - seed[0]).abs() / 2.0;
     let gap = gripper.reach().finger_thickness + 2.0 * TOUCH_GAP;
     let [x, z] = gripper.pad().map(|extent| extent / 2.0);
@@ -116,10 +107,7 @@ pub(crate) fn close_on(
         }
         reach = far;
     };
-    let centred = Pose::from_parts(
-        seeded * DVec3::new(0.0, (low + high) / 2.0, 0.0),
-        tcp.rotation,
-    );
+    let centred = Pose::from_parts(seeded * DVec3::new(0.0, (low + high) / 2.0, 0.0), tcp.rotation);
     let shift = (low + high) / 2.0;
     let depth = match body.surface {
         Surface::Mesh { .. } => compliance,
@@ -129,11 +117,7 @@ pub(crate) fn close_on(
     let right = prism.gather(&pieces, [1.0, high], depth, body, weights)?;
     let aim = (left.centre + right.centre) / 2.0;
     let patches = [left, right].map(|patch| patch.into_patch(aim, shift, &centred, body.is_rough));
-    Some(Closing {
-        tcp: centred,
-        width: high - low,
-        patches,
-    })
+    Some(Closing { tcp: centred, width: high - low, patches })
 }
 
 /// The pads closed on `working`, moved apart to where the first points of another surface of the same object
@@ -153,11 +137,7 @@ pub(crate) fn widened(
         side * half + side * outermost.unwrap_or(0.0)
     });
     let shift = Pose::from_translation(DVec3::Y * (ends[0] + ends[1]) / 2.0);
-    Closing {
-        tcp: closing.tcp * shift,
-        width: ends[1] - ends[0],
-        ..closing
-    }
+    Closing { tcp: closing.tcp * shift, width: ends[1] - ends[0], ..closing }
 }
 
 /// The space that the pads sweep, around the seed.
@@ -171,11 +151,7 @@ struct Prism {
 impl Prism {
     fn new(frame: &Pose, half: DVec3) -> Self {
         let turn = DMat3::from_quat(frame.rotation).transpose();
-        Self {
-            solid: Solid::oriented_box(*frame, half),
-            half,
-            turn,
-        }
+        Self { solid: Solid::oriented_box(*frame, half), half, turn }
     }
 
     fn pieces(&self, body: &Body) -> Vec<Piece> {
@@ -188,14 +164,7 @@ impl Prism {
             }
             let cut = (high.cmpgt(self.half) | low.cmplt(-self.half)).any();
             let (low, high) = (low.y.max(-self.half.y), high.y.min(self.half.y));
-            pieces.push(Piece {
-                corners,
-                item,
-                cut,
-                is_exact: !cut,
-                low,
-                high,
-            });
+            pieces.push(Piece { corners, item, cut, is_exact: !cut, low, high });
         }
         pieces
     }
@@ -225,9 +194,7 @@ impl Prism {
 
     /// Extent along y of the triangle's part inside; empty (low above high) where there is none.
     fn extent(&self, corners: [DVec3; 3], whole: [f64; 2]) -> [f64; 2] {
-        let is_beside = corners
-            .iter()
-            .any(|p| p.x.abs() > self.half.x || p.z.abs() > self.half.z);
+        let is_beside = corners.iter().any(|p| p.x.abs() > self.half.x || p.z.abs() > self.half.z);
         if !is_beside {
             return whole;
         }
@@ -235,9 +202,7 @@ impl Prism {
         inside
             .corners()
             .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], c| {
-                [l.min(c.0.y), h.max(c.0.y)]
-            })
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], c| [l.min(c.0.y), h.max(c.0.y)])
     }
 
     fn inside(&self, corners: [DVec3; 3], weights: [f64; 3]) -> Polygon {
@@ -306,11 +271,7 @@ impl Prism {
     ) -> Option<Gathered> {
         let mut sum = Gathered::new(side);
         for piece in pieces {
-            let nearest = if side < 0.0 {
-                piece.low - end
-            } else {
-                end - piece.high
-            };
+            let nearest = if side < 0.0 { piece.low - end } else { end - piece.high };
             if nearest > compliance || nearest < -1e-9 {
                 continue;
             }
@@ -431,11 +392,8 @@ impl Gathered {
             }
         }
         let (_, _, point, facet_normal) = best;
-        let local_normal = if is_rough {
-            self.normal_around(point, facet_normal)
-        } else {
-            facet_normal
-        };
+        let local_normal =
+            if is_rough { self.normal_around(point, facet_normal) } else { facet_normal };
         Patch {
             contact: *tcp * (point - DVec3::Y * shift),
             normal: tcp.rotation * self.normal.normalize_or(self.side * DVec3::Y),
@@ -477,10 +435,7 @@ mod tests {
         let tcp = Pose::from_translation(DVec3::new(0.01, 0.007, 0.0));
         let closing = closing(&object, &tcp, 0.03).unwrap();
         assert!((closing.width - 0.04).abs() < 1e-12);
-        assert!(
-            closing.tcp.translation.distance(DVec3::new(0.01, 0.0, 0.0)) < 1e-12,
-            "recentred"
-        );
+        assert!(closing.tcp.translation.distance(DVec3::new(0.01, 0.0, 0.0)) < 1e-12, "recentred");
         for (patch, side) in closing.patches.iter().zip([-1.0, 1.0]) {
             assert!((patch.area - 0.018 * 0.018).abs() < 1e-12);
             assert!(patch.normal.distance(side * DVec3::Y) < 1e-12);
@@ -498,11 +453,7 @@ mod tests {
         for patch in closing.patches {
             // The cylinder's axis is z: the strip runs along z and is a chord across x.
             let strip = 0.018 * (2.0 * half_chord).min(0.018);
-            assert!(
-                (patch.area - strip).abs() < 0.02 * strip,
-                "{} for {strip}",
-                patch.area
-            );
+            assert!((patch.area - strip).abs() < 0.02 * strip, "{} for {strip}", patch.area);
         }
     }
 

@@ -34,11 +34,7 @@ impl Error {
         found: impl Display,
     ) -> Result<T> {
         let (expected, found) = (expected.to_string(), found.to_string());
-        Err(Self::OutOfRange {
-            what,
-            expected,
-            found,
-        })
+        Err(Self::OutOfRange { what, expected, found })
     }
 
     /// A stable name for the kind of failure, for scripts.

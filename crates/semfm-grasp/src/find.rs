@@ -58,14 +58,7 @@ pub fn find_grasps(
     settings: &GraspSettings,
     task: &Task,
 ) -> Result<Grasps> {
-    find_grasps_with(
-        object,
-        region,
-        &GripperGeometry::new(gripper)?,
-        scene,
-        settings,
-        task,
-    )
+    find_grasps_with(object, region, &GripperGeometry::new(gripper)?, scene, settings, task)
 }
 
 /// [`find_grasps`] with a gripper that was prepared before.
@@ -108,11 +101,7 @@ pub fn find_grasps_with(
         Selection::Random => sampled.into_found(),
     };
     let all = settings.selection == Selection::Random;
-    let Found {
-        kept,
-        n_survivors,
-        mut sampled,
-    } = search.on_exact_surface(found, all, task)?;
+    let Found { kept, n_survivors, mut sampled } = search.on_exact_surface(found, all, task)?;
     let spread = start.elapsed();
     let grasps = match settings.selection {
         Selection::Best => diverse(kept, settings.top, settings.diversity, object.radius()),
@@ -164,13 +153,8 @@ pub fn examine_poses(
     let search = Search::new(object, &region, gripper, scene, settings);
     let examined = poses.par_iter().map(|pose| {
         let seed = [-pose.width / 2.0, pose.width / 2.0];
-        let candidate = Candidate {
-            tcp: pose.object_from_tcp,
-            seed,
-        };
-        search
-            .examine_pose(&candidate)
-            .map_err(|near| Box::new(search.miss(*near)))
+        let candidate = Candidate { tcp: pose.object_from_tcp, seed };
+        search.examine_pose(&candidate).map_err(|near| Box::new(search.miss(*near)))
     });
     Ok(examined.collect())
 }

@@ -21,25 +21,13 @@ fn gripper() -> GripperGeometry {
 }
 
 fn few(n_samples: usize) -> GraspSettings {
-    GraspSettings {
-        n_samples,
-        neighbour_rounds: 0,
-        ..GraspSettings::default()
-    }
+    GraspSettings { n_samples, neighbour_rounds: 0, ..GraspSettings::default() }
 }
 
 fn search(mesh: &Mesh, scene: &Scene, settings: &GraspSettings) -> Grasps {
     let object = GraspObject::from_mesh(mesh, 1.0).unwrap();
     let region = vec![1.0; object.n_weights()];
-    find_grasps_with(
-        &object,
-        &region,
-        &gripper(),
-        scene,
-        settings,
-        &Task::default(),
-    )
-    .unwrap()
+    find_grasps_with(&object, &region, &gripper(), scene, settings, &Task::default()).unwrap()
 }
 
 fn bar() -> Mesh {
@@ -51,37 +39,22 @@ fn grasps_of_a_bar_close_across_it() {
     let found = search(&bar(), &Scene::new(), &few(200));
     assert_eq!(found.grasps.len(), GraspSettings::default().top);
     assert!(found.grasps.is_sorted_by(|a, b| a.score >= b.score));
-    assert_eq!(
-        found.rejected.total() + found.n_survivors,
-        found.n_candidates
-    );
+    assert_eq!(found.rejected.total() + found.n_survivors, found.n_candidates);
     for grasp in &found.grasps {
         let (y, z) = (grasp.closing().y.abs(), grasp.closing().z.abs());
         let width = if y > z { 0.03 } else { 0.05 };
         assert!(y.max(z) > 0.88, "closing along {}", grasp.closing());
         // A tilted gripper is wider by the pad's share of the tilt.
-        assert!(
-            grasp.width >= width && grasp.width < width + 0.012,
-            "{}",
-            grasp.width
-        );
+        assert!(grasp.width >= width && grasp.width < width + 0.012, "{}", grasp.width);
         assert!((0.0..=1.0).contains(&grasp.score) && grasp.epsilon > 0.0);
-        assert!(
-            grasp
-                .terms
-                .iter()
-                .all(|(_, value)| (0.0..=1.0).contains(value))
-        );
+        assert!(grasp.terms.iter().all(|(_, value)| (0.0..=1.0).contains(value)));
         for (contact, normal) in grasp.contacts.iter().zip(&grasp.normals) {
             let inside = contact.abs().cmple(DVec3::new(0.1, 0.015, 0.025) + 1e-9);
             assert!(inside.all() && normal.is_normalized(), "{contact}");
         }
     }
     let best = &found.grasps[0];
-    assert!(
-        best.contacts[0].midpoint(best.contacts[1]).length() < 0.03,
-        "near the middle"
-    );
+    assert!(best.contacts[0].midpoint(best.contacts[1]).length() < 0.03, "near the middle");
 }
 
 #[test]
@@ -92,11 +65,7 @@ fn grasps_of_a_ball_and_a_can_go_through_their_middles() {
         let off = (-grasp.contacts[0]).reject_from_normalized(line).length();
         assert!(off < 0.025 * 0.5f64.atan().sin(), "{off} beside the middle");
         // Where a finger meets the ball beside its pad, the hand stays wider by up to half of what pads give way.
-        assert!(
-            (0.044..0.0503 + 1.5e-3).contains(&grasp.width),
-            "{}",
-            grasp.width
-        );
+        assert!((0.044..0.0503 + 1.5e-3).contains(&grasp.width), "{}", grasp.width);
     }
     let can = search(&cylinder(0.033, 0.1, 96), &Scene::new(), &few(200));
     assert!(!can.grasps.is_empty());
@@ -119,9 +88,7 @@ fn a_block_too_large_is_refused_for_its_width() {
 fn a_table_removes_what_comes_from_below() {
     let free = search(&bar(), &Scene::new(), &few(200));
     assert!(free.grasps.iter().any(|g| g.approach().z > 0.5));
-    let table = Scene::new()
-        .with_table(DVec3::Z * -0.025, DVec3::Z)
-        .unwrap();
+    let table = Scene::new().with_table(DVec3::Z * -0.025, DVec3::Z).unwrap();
     let found = search(&bar(), &table, &few(200));
     assert!(!found.grasps.is_empty() && found.rejected.count(Reason::Table) > 50);
     for grasp in &found.grasps {
@@ -133,10 +100,7 @@ fn a_table_removes_what_comes_from_below() {
 fn limits_hold_for_every_grasp() {
     let mut settings = few(300);
     let axis = DVec3::new(0.0, 0.2, -1.0);
-    settings.limits.approach = Some(ApproachCone {
-        axis,
-        half_angle: 0.5,
-    });
+    settings.limits.approach = Some(ApproachCone { axis, half_angle: 0.5 });
     settings.limits.width = Some(0.02..=0.04);
     settings.limits.clearance = 0.004;
     let found = search(&bar(), &Scene::new(), &settings);
@@ -157,55 +121,28 @@ fn limits_hold_for_every_grasp() {
 fn pads_stay_in_the_region_and_stop_at_its_border() {
     // A bar of many triangles, so that a region has a border.
     let long = cylinder(0.02, 0.2, 48);
-    let points: Vec<DVec3> = sample_uniform(&long, 4000, 1)
-        .unwrap()
-        .iter()
-        .map(|s| s.point)
-        .collect();
+    let points: Vec<DVec3> =
+        sample_uniform(&long, 4000, 1).unwrap().iter().map(|s| s.point).collect();
     let object = GraspObject::from_cloud(&points, None, None).unwrap();
-    let region: Vec<f64> = points
-        .iter()
-        .map(|p| f64::from(u8::from(p.z > 0.05)))
-        .collect();
+    let region: Vec<f64> = points.iter().map(|p| f64::from(u8::from(p.z > 0.05))).collect();
     let mut settings = few(60);
     settings.limits.pad_in_region = 0.9;
     let task = Task::default();
-    let found = find_grasps_with(
-        &object,
-        &region,
-        &gripper(),
-        &Scene::new(),
-        &settings,
-        &task,
-    )
-    .unwrap();
+    let found =
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
     assert!(!found.grasps.is_empty() && found.rejected.count(Reason::Region) > 0);
     for grasp in &found.grasps {
-        assert!(
-            grasp.contacts.iter().all(|p| p.z > 0.045),
-            "{:?}",
-            grasp.contacts
-        );
+        assert!(grasp.contacts.iter().all(|p| p.z > 0.045), "{:?}", grasp.contacts);
         assert!(grasp.term("region").unwrap() >= 0.9);
     }
 }
 
 #[test]
 fn the_seed_decides_and_the_number_of_threads_does_not() {
-    let mesh = joined(
-        &bar(),
-        &moved(&cylinder(0.02, 0.1, 24), |p| p + 0.06 * DVec3::Z),
-    );
+    let mesh = joined(&bar(), &moved(&cylinder(0.02, 0.1, 24), |p| p + 0.06 * DVec3::Z));
     let [one, three, other] = [(1, 7), (3, 7), (1, 8)].map(|(threads, seed)| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        let settings = GraspSettings {
-            seed,
-            neighbour_rounds: 1,
-            ..few(40)
-        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = GraspSettings { seed, neighbour_rounds: 1, ..few(40) };
         pool.install(|| search(&mesh, &Scene::new(), &settings))
     });
     assert_eq!(one.grasps, three.grasps);
@@ -216,10 +153,7 @@ fn the_seed_decides_and_the_number_of_threads_does_not() {
 #[test]
 fn each_round_of_neighbours_finds_more() {
     let [none, one] = [0, 1].map(|neighbour_rounds| {
-        let settings = GraspSettings {
-            neighbour_rounds,
-            ..few(20)
-        };
+        let settings = GraspSettings { neighbour_rounds, ..few(20) };
         search(&bar(), &Scene::new(), &settings).n_survivors
     });
     assert!(none > 0 && one > none + 5, "{none}, then {one}");
@@ -231,18 +165,8 @@ fn a_cancelled_search_stops() {
     let (region, task) = (vec![1.0; object.n_weights()], Task::default());
     task.cancel();
     let settings = GraspSettings::default();
-    let found = find_grasps_with(
-        &object,
-        &region,
-        &gripper(),
-        &Scene::new(),
-        &settings,
-        &task,
-    );
-    assert!(matches!(
-        found,
-        Err(crate::Error::Geom(semfm_geom::Error::Cancelled))
-    ));
+    let found = find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task);
+    assert!(matches!(found, Err(crate::Error::Geom(semfm_geom::Error::Cancelled))));
 }
 
 #[test]
@@ -270,15 +194,9 @@ fn every_mesh_of_the_zoo_is_searched_at_every_size() {
 fn a_thin_open_sheet_is_held_by_its_border() {
     // 9 × 7 points of the zoo's grid, some 8 cm wide: no thickness and no inside.
     let grid = zoo::open_grid(9, 7);
-    let sheet = moved(&grid, |p| {
-        0.08 / grid.diagonal() * DVec3::new(p.x, p.y, 0.0)
-    });
+    let sheet = moved(&grid, |p| 0.08 / grid.diagonal() * DVec3::new(p.x, p.y, 0.0));
     let found = search(&sheet, &Scene::new(), &few(200));
-    assert!(
-        !found.grasps.is_empty(),
-        "{:?}",
-        found.rejected.iter().collect::<Vec<_>>()
-    );
+    assert!(!found.grasps.is_empty(), "{:?}", found.rejected.iter().collect::<Vec<_>>());
     assert!(found.grasps.iter().all(|g| g.closing().z.abs() > 0.88));
 }
 
@@ -291,9 +209,7 @@ fn hammer() -> Mesh {
         let across = DVec3::new(p.x, p.y, 0.0).normalize_or_zero();
         DVec3::new(0.0, 0.0, z) + r * across
     });
-    let head = moved(&zoo::icosphere(4), |p| {
-        DVec3::new(0.045 * p.x, 0.02 * p.y, 0.1 + 0.02 * p.z)
-    });
+    let head = moved(&zoo::icosphere(4), |p| DVec3::new(0.045 * p.x, 0.02 * p.y, 0.1 + 0.02 * p.z));
     joined(&handle, &head)
 }
 
@@ -316,36 +232,20 @@ fn noise_of_half_a_percent_leaves_half_of_the_grasps() {
         assert!(
             grasp.contact_width() < grasp.width && grasp.command_width() < grasp.contact_width()
         );
-        assert!(
-            !meets(&rough, grasp.width, &grasp.object_from_tcp),
-            "{grasp:?}"
-        );
+        assert!(!meets(&rough, grasp.width, &grasp.object_from_tcp), "{grasp:?}");
     }
     let object = GraspObject::with_surface(&rough, 1.0, SurfaceSettings::exact()).unwrap();
     let region = vec![1.0; object.n_weights()];
     let task = Task::default();
-    let bare = find_grasps_with(
-        &object,
-        &region,
-        &gripper(),
-        &Scene::new(),
-        &settings,
-        &task,
-    )
-    .unwrap();
-    assert!(
-        4 * bare.n_survivors < good.n_survivors,
-        "without smoothing {}",
-        bare.n_survivors
-    );
+    let bare =
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
+    assert!(4 * bare.n_survivors < good.n_survivors, "without smoothing {}", bare.n_survivors);
 }
 
 /// Whether a point of the mesh, or of the middle of one of its edges, is inside of a box of the closed default gripper:
 /// told without any of the code that the search uses.
 fn meets(mesh: &Mesh, width: f64, tcp: &Pose) -> bool {
-    let BoxGripper {
-        finger, tip, palm, ..
-    } = BoxGripper::default();
+    let BoxGripper { finger, tip, palm, .. } = BoxGripper::default();
     let inside = |p: DVec3| {
         let side = p.y.abs() - width / 2.0;
         let at_finger = p.x.abs() < finger[0] / 2.0
@@ -360,59 +260,28 @@ fn meets(mesh: &Mesh, width: f64, tcp: &Pose) -> bool {
     let tcp_from_object = tcp.inverse();
     (0..mesh.n_faces()).any(|face| {
         let [a, b, c] = mesh.corners(face).map(|p| tcp_from_object * p);
-        [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)]
-            .into_iter()
-            .any(inside)
+        [a, b, c, a.midpoint(b), b.midpoint(c), c.midpoint(a)].into_iter().any(inside)
     })
 }
 
 #[test]
 fn grasps_of_a_dense_mesh_are_those_of_the_mesh_itself() {
-    let dense = moved(&zoo::icosphere(5), |p| {
-        DVec3::new(0.06 * p.x, 0.02 * p.y, 0.03 * p.z)
-    });
-    let settings = SurfaceSettings {
-        working_vertices: 1500,
-        smooth: true,
-    };
+    let dense = moved(&zoo::icosphere(5), |p| DVec3::new(0.06 * p.x, 0.02 * p.y, 0.03 * p.z));
+    let settings = SurfaceSettings { working_vertices: 1500, smooth: true };
     let object = GraspObject::with_surface(&dense, 1.0, settings).unwrap();
     assert!(object.surface_report().is_simplified);
     let (region, task) = (vec![1.0; object.n_weights()], Task::default());
-    let settings = GraspSettings {
-        n_samples: 60,
-        neighbour_rounds: 1,
-        ..GraspSettings::default()
-    };
-    let found = find_grasps_with(
-        &object,
-        &region,
-        &gripper(),
-        &Scene::new(),
-        &settings,
-        &task,
-    )
-    .unwrap();
+    let settings = GraspSettings { n_samples: 60, neighbour_rounds: 1, ..GraspSettings::default() };
+    let found =
+        find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task).unwrap();
     assert_eq!(found.grasps.len(), settings.top);
-    assert_eq!(
-        found.rejected.total() + found.n_survivors,
-        found.n_candidates
-    );
+    assert_eq!(found.rejected.total() + found.n_survivors, found.n_candidates);
     let exact = GraspObject::with_surface(&dense, 1.0, SurfaceSettings::exact()).unwrap();
     for grasp in &found.grasps {
         assert!(!meets(&dense, grasp.width, &grasp.object_from_tcp));
-        let pose = PoseToExamine {
-            object_from_tcp: grasp.object_from_tcp,
-            width: grasp.width,
-        };
-        let again = examine_poses(
-            &exact,
-            &region,
-            &gripper(),
-            &Scene::new(),
-            &settings,
-            &[pose],
-        )
-        .unwrap();
+        let pose = PoseToExamine { object_from_tcp: grasp.object_from_tcp, width: grasp.width };
+        let again =
+            examine_poses(&exact, &region, &gripper(), &Scene::new(), &settings, &[pose]).unwrap();
         let again = again[0].as_ref().unwrap();
         assert!((again.width - grasp.width).abs() < 1e-9);
         for (here, there) in grasp.contacts.iter().zip(&again.contacts) {
@@ -427,27 +296,14 @@ fn the_best_grasp_stays_where_it_is_when_the_seed_changes() {
     let object = GraspObject::from_mesh(&mesh, 1.0).unwrap();
     let region = vec![1.0; object.n_weights()];
     // Gravity and one side to come from: else a round handle has many equal grasps.
-    let mut settings = GraspSettings {
-        n_samples: 200,
-        gravity: Some(DVec3::NEG_Z),
-        ..few(200)
-    };
+    let mut settings = GraspSettings { n_samples: 200, gravity: Some(DVec3::NEG_Z), ..few(200) };
     settings.neighbour_rounds = 1;
     let places: Vec<DVec3> = (0..3)
         .map(|seed| {
-            let settings = GraspSettings {
-                seed,
-                ..settings.clone()
-            };
+            let settings = GraspSettings { seed, ..settings.clone() };
             let task = Task::default();
-            let found = find_grasps_with(
-                &object,
-                &region,
-                &gripper(),
-                &Scene::new(),
-                &settings,
-                &task,
-            );
+            let found =
+                find_grasps_with(&object, &region, &gripper(), &Scene::new(), &settings, &task);
             let best = &found.unwrap().grasps[0];
             best.contacts[0].midpoint(best.contacts[1])
         })
@@ -460,10 +316,7 @@ fn the_best_grasp_stays_where_it_is_when_the_seed_changes() {
 #[test]
 fn an_uncertain_pose_keeps_the_gripper_away() {
     let margin = 0.004;
-    let settings = GraspSettings {
-        pose_margin: margin,
-        ..few(200)
-    };
+    let settings = GraspSettings { pose_margin: margin, ..few(200) };
     let table = Scene::new().with_table(DVec3::Z * -0.04, DVec3::Z).unwrap();
     let found = search(&bar(), &table, &settings);
     assert!(!found.grasps.is_empty());
@@ -473,15 +326,7 @@ fn an_uncertain_pose_keeps_the_gripper_away() {
         assert!(lowest > -0.04, "{lowest}");
     }
     let [sure, unsure] = [0.0, 0.012].map(|pose_margin| {
-        search(
-            &bar(),
-            &table,
-            &GraspSettings {
-                pose_margin,
-                ..few(200)
-            },
-        )
-        .n_survivors
+        search(&bar(), &table, &GraspSettings { pose_margin, ..few(200) }).n_survivors
     });
     assert!(unsure < sure, "{unsure} of {sure}");
 }
@@ -493,11 +338,8 @@ fn long_pads_hold_a_short_handle_with_their_tips() {
     let wall = moved(&cuboid(DVec3::new(0.2, 0.2, 0.01)), |p| p - 0.05 * DVec3::Z);
     let both = joined(&bail, &wall);
     let object = GraspObject::from_mesh(&both, 1.0).unwrap();
-    let region: Vec<f64> = both
-        .vertices()
-        .iter()
-        .map(|p| f64::from(u8::from(p.z > -0.02)))
-        .collect();
+    let region: Vec<f64> =
+        both.vertices().iter().map(|p| f64::from(u8::from(p.z > -0.02))).collect();
     let long = BoxGripper {
         opening: 0.0..=0.14,
         pad: [0.027, 0.065],
@@ -508,12 +350,7 @@ fn long_pads_hold_a_short_handle_with_their_tips() {
     let hand = GripperGeometry::from_boxes(&long).unwrap();
     let (settings, task) = (few(200), Task::default());
     let found = find_grasps_with(&object, &region, &hand, &Scene::new(), &settings, &task).unwrap();
-    assert!(
-        found.grasps.len() >= 10,
-        "{} {:?}",
-        found.grasps.len(),
-        found.rejected
-    );
+    assert!(found.grasps.len() >= 10, "{} {:?}", found.grasps.len(), found.rejected);
 }
 
 /// A rotation from three angles.

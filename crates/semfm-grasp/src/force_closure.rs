@@ -28,22 +28,14 @@ pub(crate) struct SoftContact {
 impl SoftContact {
     /// A round patch of `area` (m²) under even pressure holds 2/3 μ r about its normal.
     pub(crate) fn new(arm: DVec3, inward: DVec3, tangent: DVec3, area: f64, friction: f64) -> Self {
-        Self {
-            arm,
-            inward,
-            tangent,
-            torsion: 2.0 / 3.0 * friction * (area / PI).sqrt(),
-        }
+        Self { arm, inward, tangent, torsion: 2.0 / 3.0 * friction * (area / PI).sqrt() }
     }
 
     /// Forces on the edge of the friction cone, without torsion, and torsion both ways without
     /// tangential force: the corners of the soft finger's limit surface (Howe & Cutkosky 1996),
     /// whose hull lies inside it.
     fn wrenches(&self, friction: f64, length: f64) -> impl Iterator<Item = Wrench> + '_ {
-        let flat = self
-            .tangent
-            .reject_from_normalized(self.inward)
-            .try_normalize();
+        let flat = self.tangent.reject_from_normalized(self.inward).try_normalize();
         let u = flat.unwrap_or_else(|| self.inward.any_orthonormal_vector());
         let v = self.inward.cross(u);
         let edges = (0..CONE_EDGES).map(move |k| {
@@ -53,10 +45,7 @@ impl SoftContact {
         });
         let torsions = [-1.0, 1.0].into_iter().map(|sign| {
             let force = self.inward;
-            (
-                force,
-                self.arm.cross(force) + sign * self.torsion * self.inward,
-            )
+            (force, self.arm.cross(force) + sign * self.torsion * self.inward)
         });
         edges.chain(torsions).map(move |(force, torque)| {
             let torque = torque / length;
@@ -69,10 +58,8 @@ impl SoftContact {
 /// largest ball around the origin within the hull of their wrenches. Torques are divided by `length`
 /// metres. 0 where the grasp has no force closure.
 pub(crate) fn ferrari_canny(contacts: &[SoftContact], friction: f64, length: f64) -> f64 {
-    let wrenches: Vec<Wrench> = contacts
-        .iter()
-        .flat_map(|contact| contact.wrenches(friction, length))
-        .collect();
+    let wrenches: Vec<Wrench> =
+        contacts.iter().flat_map(|contact| contact.wrenches(friction, length)).collect();
     inner_radius(&wrenches)
 }
 
@@ -81,9 +68,7 @@ pub(crate) fn ferrari_canny(contacts: &[SoftContact], friction: f64, length: f64
 /// atan μ (Nguyen 1988). `closing` is the line's direction where both contacts are one point.
 pub(crate) fn widest_angle(patches: &[Patch; 2], closing: DVec3) -> f64 {
     let [left, right] = patches;
-    let line = (right.contact - left.contact)
-        .try_normalize()
-        .unwrap_or(closing);
+    let line = (right.contact - left.contact).try_normalize().unwrap_or(closing);
     let angle = |normal: DVec3, towards: DVec3| normal.dot(towards).clamp(-1.0, 1.0).acos();
     [
         angle(left.normal, -line),
@@ -103,13 +88,7 @@ mod tests {
 
     fn pair(half: f64, area: f64, friction: f64) -> [SoftContact; 2] {
         [-1.0, 1.0].map(|side| {
-            SoftContact::new(
-                side * half * DVec3::Y,
-                -side * DVec3::Y,
-                DVec3::Z,
-                area,
-                friction,
-            )
+            SoftContact::new(side * half * DVec3::Y, -side * DVec3::Y, DVec3::Z, area, friction)
         })
     }
 
@@ -154,10 +133,7 @@ mod tests {
             }
             let epsilon = ferrari_canny(&contacts, friction, r);
             assert!(epsilon <= least + 1e-4, "{epsilon} above {least}");
-            assert!(
-                epsilon >= least * (PI / 8.0).cos() - 1e-4,
-                "{epsilon} far below {least}"
-            );
+            assert!(epsilon >= least * (PI / 8.0).cos() - 1e-4, "{epsilon} far below {least}");
         }
     }
 
@@ -172,9 +148,7 @@ mod tests {
     fn epsilon_falls_with_friction_patch_and_lever_and_is_0_without_closure() {
         let at = |area, friction, offset: DVec3| {
             let mut contacts = pair(0.02, area, friction);
-            contacts
-                .iter_mut()
-                .for_each(|contact| contact.arm += offset);
+            contacts.iter_mut().for_each(|contact| contact.arm += offset);
             ferrari_canny(&contacts, friction, 0.1)
         };
         let good = at(3e-4, 0.5, DVec3::ZERO);
@@ -184,15 +158,7 @@ mod tests {
         assert!(at(3e-4, 0.5, 0.1 * DVec3::Z) < good);
         let sideways =
             [DVec3::NEG_Y, DVec3::X].map(|arm| SoftContact::new(arm, -arm, DVec3::Z, 1e-4, 0.5));
-        assert_eq!(
-            ferrari_canny(&sideways, 0.5, 1.0),
-            0.0,
-            "normals at a right angle"
-        );
-        assert_eq!(
-            ferrari_canny(&pair(0.02, 0.0, 0.5), 0.5, 0.1),
-            0.0,
-            "points hold no torsion"
-        );
+        assert_eq!(ferrari_canny(&sideways, 0.5, 1.0), 0.0, "normals at a right angle");
+        assert_eq!(ferrari_canny(&pair(0.02, 0.0, 0.5), 0.5, 0.1), 0.0, "points hold no torsion");
     }
 }

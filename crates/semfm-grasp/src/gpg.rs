@@ -77,16 +77,7 @@ impl<'a> Gpg<'a> {
         let least_cosine = (friction.atan() + NORMAL_SLACK).cos();
         let (points, slab, first) = (Vec::new(), Vec::new(), Vec::new());
         let (coordinates, beside) = Default::default();
-        Self {
-            object,
-            gripper,
-            least_cosine,
-            points,
-            coordinates,
-            beside,
-            slab,
-            first,
-        }
+        Self { object, gripper, least_cosine, points, coordinates, beside, slab, first }
     }
 
     /// Adds the placements around `seed` whose ends can oppose each other, and returns how many
@@ -98,13 +89,12 @@ impl<'a> Gpg<'a> {
         let samples = self.object.samples();
         let radius = (2.0 * reach.outer).hypot(depth);
         self.points.clear();
-        self.points
-            .extend(samples.tree.points_within(seed.point, radius).map(|i| {
-                (
-                    samples.points[i as usize] - seed.point,
-                    samples.normals[i as usize],
-                )
-            }));
+        self.points.extend(
+            samples
+                .tree
+                .points_within(seed.point, radius)
+                .map(|i| (samples.points[i as usize] - seed.point, samples.normals[i as usize])),
+        );
         for (axis, coordinates) in self.coordinates.iter_mut().enumerate() {
             coordinates.clear();
             coordinates.extend(self.points.iter().map(|(p, _)| p[axis] as f32));
@@ -112,11 +102,7 @@ impl<'a> Gpg<'a> {
         let Some((normal, axis)) = self.darboux(seed) else {
             return 0;
         };
-        let sides: &[f64] = if self.object.is_signed() {
-            &[1.0]
-        } else {
-            &[1.0, -1.0]
-        };
+        let sides: &[f64] = if self.object.is_signed() { &[1.0] } else { &[1.0, -1.0] };
         for side in sides {
             let approach = -normal * side;
             for turn in 0..TURNS {
@@ -152,11 +138,7 @@ impl<'a> Gpg<'a> {
             normal = -normal;
         }
         let axis = frame.x_axis.reject_from_normalized(normal);
-        Some((
-            normal,
-            axis.try_normalize()
-                .unwrap_or_else(|| normal.any_orthonormal_vector()),
-        ))
+        Some((normal, axis.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector())))
     }
 
     /// Slides the open gripper along its closing axis and pushes it forward at each place.
@@ -184,11 +166,7 @@ impl<'a> Gpg<'a> {
             let deeper = tip - shallow > bite;
             let tips = front + TIP_BITE;
             let with_tips = self.gripper.has_long_pads() && tip.min(shallow) - tips > bite;
-            let depths = [
-                Some(tip),
-                deeper.then_some(shallow),
-                with_tips.then_some(tips),
-            ];
+            let depths = [Some(tip), deeper.then_some(shallow), with_tips.then_some(tips)];
             for tip in depths.into_iter().flatten() {
                 let middle = tip - reach.tip;
                 let Some((held, opposed)) = self.held([left, right], middle) else {
@@ -203,10 +181,7 @@ impl<'a> Gpg<'a> {
                     continue;
                 }
                 let place = seed.point + *turn * (DVec3::Z * middle);
-                out.push(Candidate {
-                    tcp: Pose::from_parts(place, *turn),
-                    seed: held,
-                });
+                out.push(Candidate { tcp: Pose::from_parts(place, *turn), seed: held });
             }
         }
         refused
@@ -220,10 +195,7 @@ impl<'a> Gpg<'a> {
     /// Least z of the surface between two places along the closing axis.
     fn nearest_surface(&self, span: f64, from: f64, to: f64) -> f64 {
         let bins = self.bin(span, from)..=self.bin(span, to);
-        self.first[bins]
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min)
+        self.first[bins].iter().copied().fold(f64::INFINITY, f64::min)
     }
 
     /// What lies between pads whose middle is at `middle` along the approach: its extent along the
@@ -234,9 +206,7 @@ impl<'a> Gpg<'a> {
         let between = self.slab.iter().filter(|(p, _)| is_between(*p));
         let (low, high) = between
             .clone()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (p, _)| {
-                (l.min(p.y), h.max(p.y))
-            });
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (p, _)| (l.min(p.y), h.max(p.y)));
         if low > high {
             return None;
         }
@@ -251,8 +221,7 @@ impl<'a> Gpg<'a> {
     fn gather(&mut self, turn: &Rotation, span: f64, reach: GripperExtents) {
         self.slab.clear();
         self.first.clear();
-        self.first
-            .resize((2.0 * span / BIN) as usize + 2, f64::INFINITY);
+        self.first.resize((2.0 * span / BIN) as usize + 2, f64::INFINITY);
         let back = DMat3::from_quat(turn.inverse());
         let half_width = reach.finger_width / 2.0;
         let (across, along, ahead) = (back.row(0), back.row(1), back.row(2));
@@ -264,11 +233,7 @@ impl<'a> Gpg<'a> {
             (xs.iter().zip(ys).zip(zs)).map(|((x, y), z)| axis.x * x + axis.y * y + axis.z * z),
         );
         let wider = (half_width + 1e-6) as f32;
-        let near = self
-            .beside
-            .iter()
-            .zip(&self.points)
-            .filter(|(beside, _)| beside.abs() <= wider);
+        let near = self.beside.iter().zip(&self.points).filter(|(beside, _)| beside.abs() <= wider);
         for (_, (p, n)) in near {
             let y = along.dot(*p);
             let x = across.dot(*p);
@@ -296,11 +261,7 @@ mod tests {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.2, 128), 1.0).unwrap();
         let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let gpg = Gpg::new(&object, &gripper, 0.5);
-        let seed = Seed {
-            point: DVec3::X * 0.02,
-            normal: DVec3::X,
-            item: 0,
-        };
+        let seed = Seed { point: DVec3::X * 0.02, normal: DVec3::X, item: 0 };
         let (normal, axis) = gpg.darboux(&seed).unwrap();
         assert!(normal.x > 0.99 && axis.z.abs() > 0.99, "{normal} {axis}");
     }

@@ -45,9 +45,7 @@ impl Grasp {
     /// Distance between the two contacts along the closing direction, metres: where the pads touch. `width`, at which
     /// nothing is touched yet, is a little more, and much more on a noisy mesh.
     pub fn contact_width(&self) -> f64 {
-        (self.contacts[1] - self.contacts[0])
-            .dot(self.closing())
-            .abs()
+        (self.contacts[1] - self.contacts[0]).dot(self.closing()).abs()
     }
 
     /// What a hand that goes to a width with limited force is told, metres: so far below the contacts that its pads
@@ -68,9 +66,6 @@ impl Grasp {
 
     /// The value of the term called `name`.
     pub fn term(&self, name: &str) -> Option<f64> {
-        self.terms
-            .iter()
-            .find(|term| term.0 == name)
-            .map(|term| term.1)
+        self.terms.iter().find(|term| term.0 == name).map(|term| term.1)
     }
 }

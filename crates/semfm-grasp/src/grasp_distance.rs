@@ -58,10 +58,7 @@ mod tests {
         for i in 0..200 {
             let t = f64::from(i);
             let pose = |t: f64| {
-                Pose::new(
-                    DVec3::ZERO,
-                    DVec3::new(t.sin(), (0.7 * t).cos(), 3.0 * (0.3 * t).sin()),
-                )
+                Pose::new(DVec3::ZERO, DVec3::new(t.sin(), (0.7 * t).cos(), 3.0 * (0.3 * t).sin()))
             };
             let (a, b) = (pose(t), pose(t + 0.3));
             let rotation = GraspDistance::between(&a, &b).rotation;
@@ -80,10 +77,7 @@ mod tests {
         let here = Pose::new(DVec3::ZERO, 0.1 * DVec3::Z);
         let exchanged = Pose::new(0.003 * DVec3::X, (0.1 + PI) * DVec3::Z);
         let near = GraspDistance::between(&here, &exchanged);
-        assert!(
-            (near.translation - 0.003).abs() < 1e-12 && near.rotation < 1e-7,
-            "{near:?}"
-        );
+        assert!((near.translation - 0.003).abs() < 1e-12 && near.rotation < 1e-7, "{near:?}");
         let turned = GraspDistance::between(&here, &Pose::new(DVec3::ZERO, 0.6 * DVec3::Z));
         assert!((turned.rotation - 0.5).abs() < 1e-12);
         let upside_down = Pose::new(DVec3::ZERO, PI * DVec3::X);

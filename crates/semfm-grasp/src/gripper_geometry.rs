@@ -91,44 +91,25 @@ impl GripperGeometry {
     pub fn new(gripper: &Gripper) -> Result<Self> {
         let widest = *gripper.opening.end();
         if gripper.parts_at(widest).len() != gripper.parts.len() {
-            return Err(out_of_range(
-                "gripper parts",
-                "one pose for each part",
-                "another number",
-            ));
+            return Err(out_of_range("gripper parts", "one pose for each part", "another number"));
         }
         let mut pieces = Vec::new();
         let mut places = Vec::new(); // of each piece: its part, and its pose in the part's frame
         for (i, part) in gripper.parts.iter().enumerate() {
             let convex = Convex::pieces(part.shape.as_typed_shape()).ok_or_else(|| {
-                out_of_range(
-                    "shape of a gripper's part",
-                    "a shape with bounds",
-                    &part.link,
-                )
+                out_of_range("shape of a gripper's part", "a shape with bounds", &part.link)
             })?;
             for (pose, shape) in convex {
-                pieces.push(Piece {
-                    role: part.role,
-                    shape,
-                });
+                pieces.push(Piece { role: part.role, shape });
                 places.push((i, pose));
             }
         }
         let owned = gripper.clone();
         let motion = move |width: f64| {
             let parts = owned.parts_at(width);
-            places
-                .iter()
-                .map(|&(part, local)| parts[part].tcp_from_part * local)
-                .collect()
+            places.iter().map(|&(part, local)| parts[part].tcp_from_part * local).collect()
         };
-        Self::from_pieces(
-            gripper.opening.clone(),
-            gripper.pad,
-            pieces,
-            Arc::new(motion),
-        )
+        Self::from_pieces(gripper.opening.clone(), gripper.pad, pieces, Arc::new(motion))
     }
 
     /// A gripper of three boxes.
@@ -139,26 +120,16 @@ impl GripperGeometry {
         let [width, thickness, length] = boxes.finger.map(|extent| extent / 2.0);
         let palm = DVec3::from_array(boxes.palm) / 2.0;
         let finger = DVec3::new(width, thickness, length);
-        let part = |role, half| Piece {
-            role,
-            shape: Convex::cuboid(DVec3::ZERO, half),
-        };
-        let pieces = vec![
-            part(Role::Palm, palm),
-            part(Role::Left, finger),
-            part(Role::Right, finger),
-        ];
+        let part = |role, half| Piece { role, shape: Convex::cuboid(DVec3::ZERO, half) };
+        let pieces =
+            vec![part(Role::Palm, palm), part(Role::Left, finger), part(Role::Right, finger)];
         let finger_z = boxes.tip - length;
         let palm_z = boxes.tip - 2.0 * length - palm.z;
         let motion = move |opening: f64| {
             let y = opening / 2.0 + thickness;
-            [
-                DVec3::Z * palm_z,
-                DVec3::new(0.0, -y, finger_z),
-                DVec3::new(0.0, y, finger_z),
-            ]
-            .map(Pose::from_translation)
-            .to_vec()
+            [DVec3::Z * palm_z, DVec3::new(0.0, -y, finger_z), DVec3::new(0.0, y, finger_z)]
+                .map(Pose::from_translation)
+                .to_vec()
         };
         Self::from_pieces(boxes.opening.clone(), boxes.pad, pieces, Arc::new(motion))
     }
@@ -172,62 +143,28 @@ impl GripperGeometry {
         let (least, most) = (*opening.start(), *opening.end());
         if !(least >= 0.0 && most > least && most.is_finite()) {
             let found = format!("{least} to {most}");
-            return Err(out_of_range(
-                "gripper opening",
-                "0 ≤ least < most (metres)",
-                &found,
-            ));
+            return Err(out_of_range("gripper opening", "0 ≤ least < most (metres)", &found));
         }
         if !pad.iter().all(|extent| *extent > 0.0 && extent.is_finite()) {
-            return Err(out_of_range(
-                "gripper pad",
-                "two positive lengths",
-                &format!("{pad:?}"),
-            ));
+            return Err(out_of_range("gripper pad", "two positive lengths", &format!("{pad:?}")));
         }
         let has = |role| pieces.iter().any(|piece| piece.role == role);
         if !(has(Role::Left) && has(Role::Right)) {
-            return Err(out_of_range(
-                "gripper parts",
-                "at least one for each finger",
-                "none",
-            ));
+            return Err(out_of_range("gripper parts", "at least one for each finger", "none"));
         }
-        if motion(most)
-            .iter()
-            .chain(&motion(least))
-            .any(|pose| !pose.is_finite())
-        {
-            return Err(out_of_range(
-                "poses of the gripper's parts",
-                "finite numbers",
-                "others",
-            ));
+        if motion(most).iter().chain(&motion(least)).any(|pose| !pose.is_finite()) {
+            return Err(out_of_range("poses of the gripper's parts", "finite numbers", "others"));
         }
         let reach = GripperExtents::of(&pieces, &motion(most), most, pad);
-        let lengths = [
-            most,
-            pad[0],
-            pad[1],
-            reach.tip.abs(),
-            reach.palm.abs(),
-            reach.outer,
-        ];
+        let lengths = [most, pad[0], pad[1], reach.tip.abs(), reach.palm.abs(), reach.outer];
         let lengths = [&lengths[..], &[reach.finger_width, reach.finger_thickness]].concat();
-        if let Some(length) = lengths
-            .iter()
-            .find(|length| length.is_nan() || **length > 2.0 * MAX_SPAN)
+        if let Some(length) =
+            lengths.iter().find(|length| length.is_nan() || **length > 2.0 * MAX_SPAN)
         {
             let expected = format!("lengths of at most {} m", 2.0 * MAX_SPAN);
             return Err(out_of_range("gripper", &expected, &format!("{length:.3e}")));
         }
-        Ok(Self {
-            opening,
-            pad,
-            pieces,
-            motion,
-            reach,
-        })
+        Ok(Self { opening, pad, pieces, motion, reach })
     }
 
     /// Distances between the pads that the gripper can reach, metres.
@@ -252,56 +189,31 @@ impl GripperGeometry {
 
     /// The gripper with its pads `width` apart.
     pub(crate) fn at(&self, width: f64) -> PosedGripper<'_> {
-        PosedGripper {
-            gripper: self,
-            poses: (self.motion)(width),
-        }
+        PosedGripper { gripper: self, poses: (self.motion)(width) }
     }
 }
 
 impl GripperExtents {
     fn of(pieces: &[Piece], poses: &[Pose], opening: f64, pad: [f64; 2]) -> Self {
-        let boxes = || {
-            pieces
-                .iter()
-                .zip(poses)
-                .map(|(p, pose)| (p.role, p.shape.bounds_at(pose)))
-        };
-        let fingers = || {
-            boxes()
-                .filter(|(role, _)| *role != Role::Palm)
-                .map(|(_, b)| b)
-        };
-        let tip = fingers()
-            .map(|(_, high)| high.z)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let root = fingers()
-            .map(|(low, _)| low.z)
-            .fold(f64::INFINITY, f64::min);
+        let boxes = || pieces.iter().zip(poses).map(|(p, pose)| (p.role, p.shape.bounds_at(pose)));
+        let fingers = || boxes().filter(|(role, _)| *role != Role::Palm).map(|(_, b)| b);
+        let tip = fingers().map(|(_, high)| high.z).fold(f64::NEG_INFINITY, f64::max);
+        let root = fingers().map(|(low, _)| low.z).fold(f64::INFINITY, f64::min);
         let palm = boxes()
             .filter(|(role, _)| *role == Role::Palm)
             .map(|(_, (_, high))| high.z)
             .fold(f64::NEG_INFINITY, f64::max);
         let beside_pad =
             || fingers().filter(|(low, high)| high.z > -pad[1] / 2.0 && low.z < pad[1] / 2.0);
-        let thickness = beside_pad()
-            .map(|(low, high)| high.y.max(-low.y) - opening / 2.0)
-            .fold(1e-3, f64::max);
-        let width = beside_pad()
-            .map(|(low, high)| high.x.max(-low.x) * 2.0)
-            .fold(pad[0], f64::max);
+        let thickness =
+            beside_pad().map(|(low, high)| high.y.max(-low.y) - opening / 2.0).fold(1e-3, f64::max);
+        let width = beside_pad().map(|(low, high)| high.x.max(-low.x) * 2.0).fold(pad[0], f64::max);
         Self {
             tip,
-            palm: if palm.is_finite() {
-                palm.min(tip)
-            } else {
-                root
-            },
+            palm: if palm.is_finite() { palm.min(tip) } else { root },
             finger_thickness: thickness,
             finger_width: width,
-            outer: fingers()
-                .map(|(low, high)| high.y.max(-low.y))
-                .fold(opening / 2.0, f64::max),
+            outer: fingers().map(|(low, high)| high.y.max(-low.y)).fold(opening / 2.0, f64::max),
         }
     }
 }
@@ -326,11 +238,7 @@ impl PosedGripper<'_> {
     /// The same gripper seen from the TCP of `other`, both having their palm in one place: where a
     /// linkage carries the pads along z as it closes, the robot holds the flange still.
     pub(crate) fn with_palm_of(mut self, other: &Self) -> Self {
-        let palm = self
-            .gripper
-            .pieces
-            .iter()
-            .position(|piece| piece.role == Role::Palm);
+        let palm = self.gripper.pieces.iter().position(|piece| piece.role == Role::Palm);
         if let Some(palm) = palm {
             let shift = other.poses[palm] * self.poses[palm].inverse();
             self.poses.iter_mut().for_each(|pose| *pose = shift * *pose);
@@ -351,11 +259,7 @@ impl fmt::Debug for GripperGeometry {
 }
 
 fn out_of_range(what: &'static str, expected: &str, found: &str) -> Error {
-    Error::OutOfRange {
-        what,
-        expected: expected.into(),
-        found: found.into(),
-    }
+    Error::OutOfRange { what, expected: expected.into(), found: found.into() }
 }
 
 #[cfg(test)]
@@ -378,19 +282,13 @@ mod tests {
     fn a_hand_that_cannot_hold_is_refused() {
         for opening in [0.08..=0.02, -0.01..=0.08, 0.0..=f64::INFINITY, 0.0..=1e12] {
             assert!(
-                GripperGeometry::from_boxes(&BoxGripper {
-                    opening,
-                    ..BoxGripper::default()
-                })
-                .is_err()
+                GripperGeometry::from_boxes(&BoxGripper { opening, ..BoxGripper::default() })
+                    .is_err()
             );
         }
         assert!(
-            GripperGeometry::from_boxes(&BoxGripper {
-                pad: [0.0, 0.02],
-                ..BoxGripper::default()
-            })
-            .is_err()
+            GripperGeometry::from_boxes(&BoxGripper { pad: [0.0, 0.02], ..BoxGripper::default() })
+                .is_err()
         );
     }
 }

@@ -19,13 +19,9 @@ pub(crate) fn neighbours(
     kept: &[Grasp],
     separation: Separation,
 ) -> Vec<Candidate> {
-    let moves = steps(
-        BEYOND * separation.translation,
-        BEYOND * separation.rotation,
-    );
+    let moves = steps(BEYOND * separation.translation, BEYOND * separation.rotation);
     let mut grid = PoseGrid::new(separation);
-    kept.iter()
-        .for_each(|grasp| grid.insert(&grasp.object_from_tcp));
+    kept.iter().for_each(|grasp| grid.insert(&grasp.object_from_tcp));
     let mut proposed = Vec::new();
     for grasp in frontier {
         let seed = [-grasp.width / 2.0, grasp.width / 2.0];
@@ -83,10 +79,7 @@ mod tests {
 
     #[test]
     fn neighbours_keep_their_distance_from_all() {
-        let separation = Separation {
-            translation: 0.01,
-            rotation: 0.25,
-        };
+        let separation = Separation { translation: 0.01, rotation: 0.25 };
         let alone = [grasp(0.0)];
         assert_eq!(neighbours(&alone, &alone, separation).len(), 10);
         let two = [grasp(0.0), grasp(0.0103)];

@@ -62,12 +62,7 @@ pub(crate) enum Surface {
     /// Triangles with their outward unit normals (zero for a degenerate one).
     Mesh { mesh: Mesh, normals: Vec<DVec3> },
     /// Points with unit normals, and the area that each stands for.
-    Cloud {
-        points: Vec<DVec3>,
-        normals: Vec<DVec3>,
-        area: f64,
-        spacing: f64,
-    },
+    Cloud { points: Vec<DVec3>, normals: Vec<DVec3>, area: f64, spacing: f64 },
 }
 
 impl Surface {
@@ -105,11 +100,7 @@ impl GraspObject {
     pub fn with_surface(mesh: &Mesh, scale: f64, settings: SurfaceSettings) -> Result<Self> {
         if !(scale > 0.0 && scale.is_finite()) {
             let expected = "a positive number of metres for a unit of the mesh".into();
-            return Err(Error::OutOfRange {
-                what: "scale",
-                expected,
-                found: scale.to_string(),
-            });
+            return Err(Error::OutOfRange { what: "scale", expected, found: scale.to_string() });
         }
         let vertices = mesh.vertices().iter().map(|&p| p * scale).collect();
         let mesh = Mesh::new(vertices, mesh.faces().to_vec())?;
@@ -119,35 +110,15 @@ impl GraspObject {
         let centre_of_mass = centre_of_mass(&mesh, signs.as_ref());
         let radius = radius(mesh.vertices(), centre_of_mass);
         let working = WorkingSurface::of(&mesh, settings)?;
-        let report = working
-            .as_ref()
-            .map_or_else(|| SurfaceReport::of(&mesh), |working| working.report);
-        let working = working.map(
-            |WorkingSurface {
-                 mesh,
-                 to_given,
-                 report,
-             }| {
-                let signs = outward_signs(&mesh);
-                Working {
-                    body: Body::of_mesh(mesh, signs, report.smoothing_steps > 0),
-                    to_given,
-                }
-            },
-        );
+        let report =
+            working.as_ref().map_or_else(|| SurfaceReport::of(&mesh), |working| working.report);
+        let working = working.map(|WorkingSurface { mesh, to_given, report }| {
+            let signs = outward_signs(&mesh);
+            Working { body: Body::of_mesh(mesh, signs, report.smoothing_steps > 0), to_given }
+        });
         let exact = Body::of_mesh(mesh, signs, false);
-        let samples = working
-            .as_ref()
-            .map_or(&exact, |working| &working.body)
-            .samples()?;
-        Ok(Self {
-            exact,
-            working,
-            samples,
-            report,
-            centre_of_mass,
-            radius,
-        })
+        let samples = working.as_ref().map_or(&exact, |working| &working.body).samples()?;
+        Ok(Self { exact, working, samples, report, centre_of_mass, radius })
     }
 
     /// An object from surface points in metres. Normals (one per point, any length) are estimated
@@ -182,10 +153,7 @@ impl GraspObject {
         let spacing = median_spacing(points, &index);
         let mut normals: Vec<DVec3> = match normals {
             Some(given) => given.iter().map(|n| n.normalize_or_zero()).collect(),
-            None => points
-                .iter()
-                .map(|&p| fitted_normal(points, &index, p))
-                .collect(),
+            None => points.iter().map(|&p| fitted_normal(points, &index, p)).collect(),
         };
         if let Some(eye) = viewpoint {
             for (normal, &p) in normals.iter_mut().zip(points) {
@@ -245,17 +213,13 @@ impl GraspObject {
 
     /// Where contacts are sought.
     pub(crate) fn touched(&self) -> &Body {
-        self.working
-            .as_ref()
-            .map_or(&self.exact, |working| &working.body)
+        self.working.as_ref().map_or(&self.exact, |working| &working.body)
     }
 
     /// How far (metres) the object as it is reaches beyond the surface on which contacts are sought; `None` where
     /// the two are one.
     pub(crate) fn deviation(&self) -> Option<f64> {
-        self.working
-            .as_ref()
-            .map(|_| self.report.deviation.max(1e-4))
+        self.working.as_ref().map(|_| self.report.deviation.max(1e-4))
     }
 
     /// The surface on which contacts are sought.
@@ -303,9 +267,7 @@ impl Body {
     fn samples(&self) -> Result<Samples> {
         let (mesh, normals) = match &self.surface {
             Surface::Mesh { mesh, normals } => (mesh, normals),
-            Surface::Cloud {
-                points, normals, ..
-            } => {
+            Surface::Cloud { points, normals, .. } => {
                 return Ok(Samples::new(points.clone(), normals.clone()));
             }
         };
@@ -335,11 +297,7 @@ impl fmt::Debug for GraspObject {
 impl Samples {
     fn new(points: Vec<DVec3>, normals: Vec<DVec3>) -> Self {
         let tree = Obstacle::of_points(points.clone(), 0.0);
-        Self {
-            points,
-            normals,
-            tree,
-        }
+        Self { points, normals, tree }
     }
 }
 
@@ -377,22 +335,16 @@ impl Region {
             return Error::out_of_range(WHAT, "at least one above 0", "only zeros");
         }
         let weights: Vec<f64> = weights.iter().map(|w| w / most).collect();
-        let working: Option<Vec<f64>> = object.working.as_ref().map(|working| {
-            working
-                .to_given
-                .iter()
-                .map(|&id| weights[id as usize])
-                .collect()
-        });
+        let working: Option<Vec<f64>> = object
+            .working
+            .as_ref()
+            .map(|working| working.to_given.iter().map(|&id| weights[id as usize]).collect());
         let touched = working.as_ref().unwrap_or(&weights);
         let mut total = 0.0;
         let mut cumulative: Vec<f64> = match object.surface() {
             Surface::Mesh { mesh, .. } => (0..mesh.n_faces())
                 .map(|face| {
-                    let mean = mesh.faces()[face]
-                        .iter()
-                        .map(|&v| touched[v as usize])
-                        .sum::<f64>();
+                    let mean = mesh.faces()[face].iter().map(|&v| touched[v as usize]).sum::<f64>();
                     mesh.face_area(face) * mean / 3.0
                 })
                 .collect(),
@@ -406,11 +358,7 @@ impl Region {
             let found = format!("area times weight {total}");
             return Error::out_of_range(WHAT, "a region with an area", found);
         }
-        Ok(Self {
-            weights,
-            working,
-            cumulative,
-        })
+        Ok(Self { weights, working, cumulative })
     }
 
     /// Weights (0 to 1) of the vertices or points as given.
@@ -434,19 +382,11 @@ impl Region {
                 let [a, b, c] = mesh.corners(item);
                 let (u, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
                 let point = (1.0 - u) * a + u * (1.0 - v) * b + u * v * c;
-                Seed {
-                    point,
-                    normal: normals[item],
-                    item: item as u32,
-                }
+                Seed { point, normal: normals[item], item: item as u32 }
             }
-            Surface::Cloud {
-                points, normals, ..
-            } => Seed {
-                point: points[item],
-                normal: normals[item],
-                item: item as u32,
-            },
+            Surface::Cloud { points, normals, .. } => {
+                Seed { point: points[item], normal: normals[item], item: item as u32 }
+            }
         }
     }
 }
@@ -460,11 +400,8 @@ fn outward_signs(mesh: &Mesh) -> Option<Vec<f64>> {
     }
     let parts = components(mesh);
     let mut volumes = vec![0.0; parts.count];
-    let part_of_face: Vec<usize> = mesh
-        .faces()
-        .iter()
-        .map(|corners| parts.of_vertex[corners[0] as usize] as usize)
-        .collect();
+    let part_of_face: Vec<usize> =
+        mesh.faces().iter().map(|corners| parts.of_vertex[corners[0] as usize] as usize).collect();
     let (origin, _) = mesh.bounds();
     for (face, &part) in part_of_face.iter().enumerate() {
         volumes[part] += cone_volume(mesh, face, origin);
@@ -502,10 +439,7 @@ fn centre_of_mass(mesh: &Mesh, outward: Option<&Vec<f64>>) -> DVec3 {
 }
 
 fn radius(points: &[DVec3], centre: DVec3) -> f64 {
-    points
-        .iter()
-        .map(|p| p.distance(centre))
-        .fold(1e-6, f64::max)
+    points.iter().map(|p| p.distance(centre)).fold(1e-6, f64::max)
 }
 
 /// Median distance from a point to its nearest neighbour, over at most 2000 of the points.
@@ -550,10 +484,7 @@ mod tests {
     fn normals_of_a_closed_mesh_point_outwards_whatever_its_winding() {
         let sphere = zoo::icosphere(2);
         let flipped: Vec<[u32; 3]> = sphere.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
-        for mesh in [
-            sphere.clone(),
-            Mesh::new(sphere.vertices().to_vec(), flipped).unwrap(),
-        ] {
+        for mesh in [sphere.clone(), Mesh::new(sphere.vertices().to_vec(), flipped).unwrap()] {
             let object = GraspObject::from_mesh(&mesh, 0.1).unwrap();
             assert!(object.is_signed());
             let samples = object.samples();
@@ -569,20 +500,10 @@ mod tests {
     fn a_cloud_gets_normals_that_face_the_eye() {
         let sphere = zoo::icosphere(3);
         let eye = DVec3::new(0.0, 0.0, 4.0);
-        let seen: Vec<DVec3> = sphere
-            .vertices()
-            .iter()
-            .copied()
-            .filter(|p| p.z > 0.3)
-            .map(|p| p * 0.1)
-            .collect();
+        let seen: Vec<DVec3> =
+            sphere.vertices().iter().copied().filter(|p| p.z > 0.3).map(|p| p * 0.1).collect();
         let object = GraspObject::from_cloud(&seen, None, Some(eye)).unwrap();
-        for (p, n) in object
-            .samples()
-            .points
-            .iter()
-            .zip(&object.samples().normals)
-        {
+        for (p, n) in object.samples().points.iter().zip(&object.samples().normals) {
             assert!(n.dot(p.normalize()) > 0.9, "{p}: {n}");
         }
     }
@@ -591,21 +512,14 @@ mod tests {
     fn seeds_fall_where_the_weights_are() {
         let mesh = zoo::icosphere(3);
         let object = GraspObject::from_mesh(&mesh, 0.05).unwrap();
-        let top: Vec<f64> = mesh
-            .vertices()
-            .iter()
-            .map(|p| f64::from(u8::from(p.z > 0.5)) * 7.0)
-            .collect();
+        let top: Vec<f64> =
+            mesh.vertices().iter().map(|p| f64::from(u8::from(p.z > 0.5)) * 7.0).collect();
         let region = Region::new(&object, &top).unwrap();
         let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
         for _ in 0..200 {
             assert!(region.draw(&object, &mut rng).point.z > 0.05 * 0.35);
         }
-        for bad in [
-            vec![0.0; mesh.n_vertices()],
-            vec![1.0; 3],
-            vec![f64::NAN; mesh.n_vertices()],
-        ] {
+        for bad in [vec![0.0; mesh.n_vertices()], vec![1.0; 3], vec![f64::NAN; mesh.n_vertices()]] {
             assert!(Region::new(&object, &bad).is_err());
         }
     }

@@ -34,26 +34,16 @@ impl Obstacle {
     pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
         let triangles: Vec<[DVec3; 3]> =
             (0..mesh.n_faces()).map(|face| mesh.corners(face)).collect();
-        let boxes = triangles
-            .iter()
-            .map(|&[a, b, c]| (a.min(b).min(c), a.max(b).max(c)));
+        let boxes = triangles.iter().map(|&[a, b, c]| (a.min(b).min(c), a.max(b).max(c)));
         let tree = BoxTree::new(boxes);
         let closed = MeshReport::new(mesh).watertight;
-        Self {
-            items: Items::Triangles(triangles),
-            tree,
-            closed,
-        }
+        Self { items: Items::Triangles(triangles), tree, closed }
     }
 
     /// Balls of one radius around points (at least one).
     pub(crate) fn of_points(points: Vec<DVec3>, radius: f64) -> Self {
         let tree = BoxTree::new(points.iter().map(|&p| (p, p)));
-        Self {
-            tree,
-            items: Items::Points { points, radius },
-            closed: false,
-        }
+        Self { tree, items: Items::Points { points, radius }, closed: false }
     }
 
     /// Whether `solid`, grown by `margin`, touches anything.
@@ -118,9 +108,7 @@ impl Obstacle {
         let middle = centre.as_vec3a();
         let wider = (radius + 1e-5 * (radius + centre.abs().max_element())) as f32;
         let found = self.tree.passing(move |bounds| {
-            let outside = (bounds.low - middle)
-                .max(middle - bounds.high)
-                .max(Vec3A::ZERO);
+            let outside = (bounds.low - middle).max(middle - bounds.high).max(Vec3A::ZERO);
             outside.length_squared() <= wider * wider
         });
         found.filter(move |&i| self.corners(i)[0].distance_squared(centre) <= radius * radius)
@@ -199,10 +187,7 @@ mod tests {
     use semfm_geom::zoo;
 
     fn cube(centre: DVec3, half: f64) -> Solid {
-        Solid::oriented_box(
-            Pose::new(centre, DVec3::new(0.3, 0.2, 0.9)),
-            DVec3::splat(half),
-        )
+        Solid::oriented_box(Pose::new(centre, DVec3::new(0.3, 0.2, 0.9)), DVec3::splat(half))
     }
 
     #[test]
@@ -221,10 +206,7 @@ mod tests {
                     .map(|f| solid.distance(&mesh.corners(f), cap))
                     .fold(cap, f64::min);
                 let found = obstacle.distance(&solid, cap);
-                assert!(
-                    (found - least).abs() < 1e-9,
-                    "{name} {i}: {found} instead of {least}"
-                );
+                assert!((found - least).abs() < 1e-9, "{name} {i}: {found} instead of {least}");
             }
         }
     }
@@ -233,12 +215,7 @@ mod tests {
     fn inside_and_outside_of_closed_and_open_surfaces() {
         let sphere = Obstacle::of_mesh(&zoo::icosphere(2));
         assert!(sphere.encloses(DVec3::new(0.1, -0.3, 0.2)) && !sphere.encloses(DVec3::ONE));
-        assert_eq!(
-            sphere
-                .crossings(DVec3::new(-3.0, 0.01, 0.02), DVec3::X, 0.0, 9.0)
-                .len(),
-            2
-        );
+        assert_eq!(sphere.crossings(DVec3::new(-3.0, 0.01, 0.02), DVec3::X, 0.0, 9.0).len(), 2);
         let open = Obstacle::of_mesh(&zoo::open_grid(5, 5));
         assert!(!open.encloses(DVec3::new(0.5, 0.5, 0.1)));
     }

@@ -39,16 +39,9 @@ impl PadView {
             // A cell below the spacing of the points would be empty.
             Surface::Cloud { spacing, .. } => (2.0 * half_pad[0] / CELLS).max(*spacing),
         };
-        let mut grid = Grid::new(
-            half_pad.map(|half| half + BESIDE * cell),
-            cell,
-            closing.width,
-        );
+        let mut grid = Grid::new(half_pad.map(|half| half + BESIDE * cell), cell, closing.width);
         let half = DVec3::new(grid.half[0], closing.width / 2.0 + 1e-6, grid.half[1]);
-        let Pose {
-            rotation,
-            translation,
-        } = closing.tcp;
+        let Pose { rotation, translation } = closing.tcp;
         let solid = Solid::oriented_box(Pose::from_parts(translation, rotation), half);
         let tree = &object.touched().tree;
         for item in tree.near(&solid, 0.0) {
@@ -58,11 +51,7 @@ impl PadView {
                 Surface::Cloud { .. } => grid.add_point(corners[0]),
             }
         }
-        Self {
-            points: grid.points(),
-            cell_area: cell * cell,
-            half_pad,
-        }
+        Self { points: grid.points(), cell_area: cell * cell, half_pad }
     }
 
     /// Whether a point (TCP frame) lies in front of the pads.
@@ -86,13 +75,7 @@ impl Grid {
     fn new(half: [f64; 2], cell: f64, width: f64) -> Self {
         let n = half.map(|half| ((2.0 * half / cell).round() as usize).max(1));
         let nothing = vec![f64::NAN; n[0] * n[1]];
-        Self {
-            half,
-            cell,
-            n,
-            width,
-            first: [nothing.clone(), nothing],
-        }
+        Self { half, cell, n, width, first: [nothing.clone(), nothing] }
     }
 
     /// Middle of a cell along one axis.
@@ -190,15 +173,8 @@ mod tests {
         let object = GraspObject::from_mesh(&cylinder(0.02, 0.1, 512), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
-        let closing = close(
-            &object,
-            &region,
-            &gripper,
-            &Pose::IDENTITY,
-            [-0.02, 0.02],
-            1.5e-3,
-        )
-        .unwrap();
+        let closing =
+            close(&object, &region, &gripper, &Pose::IDENTITY, [-0.02, 0.02], 1.5e-3).unwrap();
         let view = PadView::new(&object, &gripper, &closing);
         for (points, side) in view.points.iter().zip([-1.0, 1.0]) {
             let n_before = points.iter().filter(|p| view.before_pad(**p)).count();

@@ -17,17 +17,11 @@ pub(crate) struct PoseGrid {
 
 impl PoseGrid {
     pub(crate) fn new(separation: Separation) -> Self {
-        Self {
-            separation,
-            cells: HashMap::new(),
-        }
+        Self { separation, cells: HashMap::new() }
     }
 
     pub(crate) fn insert(&mut self, pose: &Pose) {
-        self.cells
-            .entry(self.cell(pose.translation))
-            .or_default()
-            .push(*pose);
+        self.cells.entry(self.cell(pose.translation)).or_default().push(*pose);
     }
 
     /// Whether a pose of the set is nearer than the separation in both translation and rotation.
@@ -43,10 +37,7 @@ impl PoseGrid {
     }
 
     fn is_near(&self, a: &Pose, b: &Pose) -> bool {
-        let Separation {
-            translation,
-            rotation,
-        } = self.separation;
+        let Separation { translation, rotation } = self.separation;
         a.translation.distance_squared(b.translation) < translation * translation
             && GraspDistance::is_turned_less(a, b, rotation)
     }
@@ -66,18 +57,12 @@ mod tests {
     fn pose(i: u32) -> Pose {
         let t = f64::from(i);
         let place = 0.03 * DVec3::new((7.3 * t).sin(), (3.1 * t).cos(), (1.7 * t).sin());
-        Pose::new(
-            place,
-            DVec3::new(t.sin(), 0.5 * (2.0 * t).cos(), (5.0 * t).sin()),
-        )
+        Pose::new(place, DVec3::new(t.sin(), 0.5 * (2.0 * t).cos(), (5.0 * t).sin()))
     }
 
     #[test]
     fn the_grid_answers_as_a_full_search_does() {
-        let separation = Separation {
-            translation: 0.01,
-            rotation: 0.3,
-        };
+        let separation = Separation { translation: 0.01, rotation: 0.3 };
         let mut grid = PoseGrid::new(separation);
         (0..300).for_each(|i| grid.insert(&pose(i)));
         let mut found = 0;
@@ -90,10 +75,7 @@ mod tests {
             found += u32::from(near);
         }
         assert!((20..380).contains(&found), "{found}");
-        let mut apart = PoseGrid::new(Separation {
-            translation: 0.0,
-            rotation: 0.0,
-        });
+        let mut apart = PoseGrid::new(Separation { translation: 0.0, rotation: 0.0 });
         apart.insert(&pose(1));
         assert!(!apart.has_near(&pose(1)));
     }

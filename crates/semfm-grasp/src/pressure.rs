@@ -28,12 +28,7 @@ impl Pressure {
     /// The pressure on a point, spread over a cell.
     pub(crate) fn of_point(centre: DVec3, cell_area: f64) -> Self {
         let radius = MEAN_DISTANCE * cell_area.sqrt();
-        Self {
-            depth: 0.0,
-            centre,
-            radius,
-            area: cell_area,
-        }
+        Self { depth: 0.0, centre, radius, area: cell_area }
     }
 }
 
@@ -51,12 +46,7 @@ impl PressedSurface {
     pub(crate) fn new(points: Vec<DVec3>, side: f64, cell_area: f64) -> Self {
         let mut heights: Vec<f64> = points.iter().map(|p| -side * p.y).collect();
         heights.sort_unstable_by(f64::total_cmp);
-        Self {
-            points,
-            heights,
-            side,
-            cell_area,
-        }
+        Self { points, heights, side, cell_area }
     }
 
     /// The pressure of a force, newtons. `None` where there are no points.
@@ -64,12 +54,7 @@ impl PressedSurface {
         let first = *self.heights.first()?;
         let stop = stop(&self.heights, force / (FOUNDATION * self.cell_area));
         let depth = |p: &DVec3| stop + self.side * p.y;
-        let pressed = || {
-            self.points
-                .iter()
-                .map(|p| (p, depth(p)))
-                .filter(|(_, d)| *d > 0.0)
-        };
+        let pressed = || self.points.iter().map(|p| (p, depth(p))).filter(|(_, d)| *d > 0.0);
         let (mut total, mut squares, mut moment) = (0.0, 0.0, DVec3::ZERO);
         for (p, depth) in pressed() {
             total += depth;
@@ -81,12 +66,7 @@ impl PressedSurface {
         let radius = pressed().map(|(p, depth)| depth * distance(p)).sum::<f64>() / total;
         let radius = radius.max(MEAN_DISTANCE * self.cell_area.sqrt());
         let area = total * total / squares * self.cell_area;
-        Some(Pressure {
-            depth: stop - first,
-            centre,
-            radius,
-            area,
-        })
+        Some(Pressure { depth: stop - first, centre, radius, area })
     }
 }
 
@@ -139,10 +119,7 @@ mod tests {
             assert!(pressure.centre.x > 3e-3, "{pressure:?}");
             // ∫ k (depth − .2 t) dt over the pressed width, times the pad's length, is the force.
             let expected = (2.0 * 0.2 * 30.0 / (FOUNDATION * 0.018)).sqrt();
-            assert!(
-                (pressure.depth - expected).abs() < 0.15 * expected,
-                "{pressure:?}"
-            );
+            assert!((pressure.depth - expected).abs() < 0.15 * expected, "{pressure:?}");
         }
         assert!(pressed(Vec::new(), 1.0).is_none());
     }

@@ -32,17 +32,9 @@ impl Search<'_> {
     /// Moves the best grasps to where each is best in its neighbourhood, so that which one is best of all depends on
     /// the object and not on where the samples fell. Grasps that meet on the way become one.
     pub(crate) fn climb(&self, found: Found, task: &Task) -> Result<Found> {
-        let Found {
-            mut kept,
-            n_survivors,
-            sampled,
-        } = found;
+        let Found { mut kept, n_survivors, sampled } = found;
         if self.settings().neighbour_rounds == 0 {
-            return Ok(Found {
-                kept,
-                n_survivors,
-                sampled,
-            });
+            return Ok(Found { kept, n_survivors, sampled });
         }
         let climbed: Vec<Grasp> = kept[..kept.len().min(CLIMBERS)]
             .par_iter()
@@ -50,21 +42,14 @@ impl Search<'_> {
             .collect::<std::result::Result<_, _>>()?;
         kept.splice(..climbed.len(), climbed);
         let kept = suppress(kept, self.settings().separation);
-        Ok(Found {
-            kept,
-            n_survivors,
-            sampled,
-        })
+        Ok(Found { kept, n_survivors, sampled })
     }
 
     /// The steepest of the neighbours, again and again, with ever shorter steps.
     fn climbed(&self, start: &Grasp) -> Grasp {
         let mut best = start.clone();
         for share in STEPS {
-            let Separation {
-                translation,
-                rotation,
-            } = self.settings().separation;
+            let Separation { translation, rotation } = self.settings().separation;
             let moves = steps(share * translation, share * rotation);
             for _ in 0..MOVES {
                 let Some(better) = self.best_neighbour(&best, &moves) else {
@@ -92,17 +77,10 @@ impl Search<'_> {
         if !self.object().is_simplified() {
             return Ok(found);
         }
-        let Found {
-            kept,
-            mut n_survivors,
-            mut sampled,
-        } = found;
+        let Found { kept, mut n_survivors, mut sampled } = found;
         let (times, least) = EXAMINED;
-        let wanted = if all {
-            usize::MAX
-        } else {
-            self.settings().top.saturating_mul(times).max(least)
-        };
+        let wanted =
+            if all { usize::MAX } else { self.settings().top.saturating_mul(times).max(least) };
         let mut exact = Vec::new();
         for part in kept.chunks(least) {
             let results: Vec<std::result::Result<Grasp, Box<Near>>> = part
@@ -123,10 +101,6 @@ impl Search<'_> {
             }
         }
         exact.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Ok(Found {
-            kept: exact,
-            n_survivors,
-            sampled,
-        })
+        Ok(Found { kept: exact, n_survivors, sampled })
     }
 }

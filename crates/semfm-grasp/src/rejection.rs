@@ -155,11 +155,7 @@ pub(crate) struct Refusal {
 impl Refusal {
     /// `Ok` where `by` is not positive: the amount by which a limit is missed.
     pub(crate) fn where_positive(reason: Reason, by: f64) -> Result<(), Self> {
-        if by > 0.0 {
-            Err(Self { reason, by })
-        } else {
-            Ok(())
-        }
+        if by > 0.0 { Err(Self { reason, by }) } else { Ok(()) }
     }
 }
 
@@ -200,10 +196,7 @@ impl Rejected {
 
     /// Reasons that occurred, with their counts, in the order of examination.
     pub fn iter(&self) -> impl Iterator<Item = (Reason, usize)> + '_ {
-        Reason::ALL
-            .into_iter()
-            .map(|reason| (reason, self.count(reason)))
-            .filter(|row| row.1 > 0)
+        Reason::ALL.into_iter().map(|reason| (reason, self.count(reason))).filter(|row| row.1 > 0)
     }
 
     /// The stage that kept most candidates from being grasps: of those that reached it, it let the smallest share
@@ -230,10 +223,7 @@ impl Rejected {
     }
 
     pub(crate) fn merge(&mut self, other: &Self) {
-        self.counts
-            .iter_mut()
-            .zip(&other.counts)
-            .for_each(|(sum, count)| *sum += count);
+        self.counts.iter_mut().zip(&other.counts).for_each(|(sum, count)| *sum += count);
     }
 }
 
@@ -270,11 +260,8 @@ mod tests {
     fn the_main_reason_is_what_keeps_most_back() {
         let counts = |rows: &[(Reason, usize)]| rows.iter().copied().collect::<Rejected>();
         // Too thick, but ten that a gripper could span run into the object.
-        let thick = counts(&[
-            (Reason::ForceClosure, 6000),
-            (Reason::Width, 3990),
-            (Reason::Collision, 10),
-        ]);
+        let thick =
+            counts(&[(Reason::ForceClosure, 6000), (Reason::Width, 3990), (Reason::Collision, 10)]);
         assert_eq!(thick.main_reason(10_000), Some(Reason::Width));
         // Good grasps all of them, but for what is asked last.
         let near = counts(&[(Reason::ForceClosure, 9000), (Reason::Clearance, 1000)]);

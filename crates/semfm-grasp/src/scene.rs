@@ -40,16 +40,9 @@ impl Scene {
         direction("normal of the table", normal)?;
         if !point.is_finite() {
             let expected = "finite coordinates".into();
-            return Err(Error::OutOfRange {
-                what: "table",
-                expected,
-                found: point.to_string(),
-            });
+            return Err(Error::OutOfRange { what: "table", expected, found: point.to_string() });
         }
-        self.table = Some(Table {
-            point,
-            normal: normal.normalize(),
-        });
+        self.table = Some(Table { point, normal: normal.normalize() });
         Ok(self)
     }
 
@@ -57,8 +50,7 @@ impl Scene {
     /// watertight.
     pub fn with_mesh(mut self, mesh: &Mesh) -> Self {
         let distinct = without_repeated_faces(mesh);
-        self.obstacles
-            .push(Obstacle::of_mesh(distinct.as_ref().unwrap_or(mesh)));
+        self.obstacles.push(Obstacle::of_mesh(distinct.as_ref().unwrap_or(mesh)));
         self
     }
 
@@ -75,8 +67,7 @@ impl Scene {
             return Error::out_of_range("points of the scene", "finite coordinates", found);
         }
         if !points.is_empty() {
-            self.obstacles
-                .push(Obstacle::of_points(points.to_vec(), margin));
+            self.obstacles.push(Obstacle::of_points(points.to_vec(), margin));
         }
         Ok(self)
     }
@@ -111,11 +102,7 @@ mod tests {
         assert!(Scene::new().with_cloud(&[DVec3::NAN], 0.0).is_err());
         let scene = Scene::new().with_cloud(&[], 0.1).unwrap();
         assert!(scene.obstacles().is_empty());
-        let table = Scene::new()
-            .with_table(DVec3::ZERO, 3.0 * DVec3::Z)
-            .unwrap()
-            .table()
-            .unwrap();
+        let table = Scene::new().with_table(DVec3::ZERO, 3.0 * DVec3::Z).unwrap().table().unwrap();
         assert_eq!(table.normal, DVec3::Z);
     }
 }

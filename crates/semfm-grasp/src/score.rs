@@ -80,14 +80,7 @@ impl<'a> Scorer<'a> {
         });
         let best_epsilon = ferrari_canny(&ideal, settings.friction, object.radius());
         let down = settings.gravity.or(down).map(DVec3::normalize);
-        Self {
-            object,
-            gripper,
-            settings,
-            down,
-            pad,
-            best_epsilon,
-        }
+        Self { object, gripper, settings, down, pad, best_epsilon }
     }
 
     /// Scores a grasp whose widest contact angle (radians, see `force_closure`) is `angle`.
@@ -107,10 +100,7 @@ impl<'a> Scorer<'a> {
             ("contact", self.pad_share(closing) / FULL_CONTACT),
             ("friction", 1.0 - angle / friction.atan()),
             ("epsilon", epsilon / self.best_epsilon.max(1e-12)),
-            (
-                "gravity",
-                self.share_of_torque(&turned, self.turning_arm(closing, arm)),
-            ),
+            ("gravity", self.share_of_torque(&turned, self.turning_arm(closing, arm))),
             ("weight", self.share_of_force()),
             ("lever", 1.0 - arm.length() / self.object.radius()),
             ("bite", self.bite(left).min(self.bite(right))),
@@ -124,9 +114,7 @@ impl<'a> Scorer<'a> {
             let cosine = (closing.tcp.rotation * DVec3::Z).dot(demonstrated.normalize());
             terms.push(("approach", cosine));
         }
-        terms
-            .iter_mut()
-            .for_each(|term| term.1 = term.1.clamp(0.0, 1.0));
+        terms.iter_mut().for_each(|term| term.1 = term.1.clamp(0.0, 1.0));
         let weights = &self.settings.weights;
         let hold = weights.probability(&terms);
         Score {
@@ -141,20 +129,11 @@ impl<'a> Scorer<'a> {
     /// The object at rest between the pads; where a pad meets less than a cell of its grid, it meets a point.
     fn turned(&self, closing: &Closing) -> TurnedObject {
         let view = PadView::new(self.object, self.gripper, closing);
-        let GraspSettings {
-            friction,
-            grip_force,
-            ..
-        } = *self.settings;
+        let GraspSettings { friction, grip_force, .. } = *self.settings;
         turn_until_held(&view, friction, grip_force).unwrap_or_else(|| {
-            let points = closing
-                .patches
-                .map(|patch| closing.tcp.inverse() * patch.contact);
+            let points = closing.patches.map(|patch| closing.tcp.inverse() * patch.contact);
             let pressures = points.map(|point| Pressure::of_point(point, view.cell_area));
-            TurnedObject {
-                turn: 0.0,
-                pressures,
-            }
+            TurnedObject { turn: 0.0, pressures }
         })
     }
 
@@ -162,11 +141,7 @@ impl<'a> Scorer<'a> {
     /// arm of `arm` metres.
     fn share_of_torque(&self, turned: &TurnedObject, arm: f64) -> f64 {
         let [one, other] = turned.pressures;
-        let GraspSettings {
-            friction,
-            grip_force,
-            ..
-        } = self.settings;
+        let GraspSettings { friction, grip_force, .. } = self.settings;
         let held = friction * grip_force * (one.radius + other.radius);
         held / (held + self.load() * arm)
     }
@@ -184,11 +159,7 @@ impl<'a> Scorer<'a> {
 
     /// How evenly the less even pad is pressed: the area of an even pressure against the pad's.
     fn evenness(&self, turned: &TurnedObject) -> f64 {
-        let least = turned
-            .pressures
-            .iter()
-            .map(|p| p.area)
-            .fold(f64::INFINITY, f64::min);
+        let least = turned.pressures.iter().map(|p| p.area).fold(f64::INFINITY, f64::min);
         least / (self.pad[0] * self.pad[1])
     }
 
@@ -207,11 +178,7 @@ impl<'a> Scorer<'a> {
 
     /// Share of its pad that the smaller patch covers.
     pub(crate) fn pad_share(&self, closing: &Closing) -> f64 {
-        let least = closing
-            .patches
-            .iter()
-            .map(|patch| patch.area)
-            .fold(f64::INFINITY, f64::min);
+        let least = closing.patches.iter().map(|patch| patch.area).fold(f64::INFINITY, f64::min);
         (least / (self.pad[0] * self.pad[1])).min(1.0)
     }
 
@@ -244,42 +211,26 @@ mod tests {
         let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
         let settings = GraspSettings::default();
         let scorer = Scorer::new(&object, &gripper, &settings, Some(DVec3::NEG_Z));
-        let fit = Fit {
-            width: 0.03,
-            opening: 0.08,
-            clearance: 0.02,
-        };
+        let fit = Fit { width: 0.03, opening: 0.08, clearance: 0.02 };
         let at = |x: f64, z: f64| {
             let tcp = Pose::new(DVec3::new(x, 0.0, z), DVec3::X * PI);
             let closing = close(&object, &region, &gripper, &tcp, [-0.015, 0.015], 1.5e-3).unwrap();
             scorer.score(&closing, &fit, 0.0)
         };
         let value = |score: &Score, name: &str| {
-            score
-                .terms
-                .iter()
-                .find(|term| term.0 == name)
-                .map(|term| term.1)
-                .unwrap()
+            score.terms.iter().find(|term| term.0 == name).map(|term| term.1).unwrap()
         };
         let middle = at(0.0, 0.0);
         for (name, value) in &middle.terms {
             // A full pad is pressed evenly but for the cells on its rim.
-            assert!(
-                *value > 0.75 || *name == "epsilon" && *value > 0.5,
-                "{name} is {value}"
-            );
+            assert!(*value > 0.75 || *name == "epsilon" && *value > 0.5, "{name} is {value}");
         }
         let end = at(0.08, 0.0);
         assert!(end.score < middle.score && end.epsilon < middle.epsilon);
         // Full pads of 18 mm: torsion 2 μ F r with r = .3826 · 18 mm, against 1.5 · .3 kg · g on 8 cm.
         let held: f64 = 2.0 * 0.5 * 30.0 * 0.3826 * 0.018;
         let gravity = held / (held + UNKNOWN_MASS * LOAD * 0.08);
-        assert!(
-            (value(&end, "gravity") - gravity).abs() < 0.01,
-            "{:?}",
-            end.terms
-        );
+        assert!((value(&end, "gravity") - gravity).abs() < 0.01, "{:?}", end.terms);
         assert!((value(&end, "lever") - (1.0 - 0.08 / object.radius())).abs() < 1e-9);
         let shallow = at(0.0, 0.02);
         assert!((value(&shallow, "bite") - 0.004 / 0.018).abs() < 1e-9);
@@ -291,29 +242,13 @@ mod tests {
         let object = GraspObject::from_mesh(&cuboid(DVec3::splat(0.03)), 1.0).unwrap();
         let region = Region::new(&object, &vec![1.0; object.n_weights()]).unwrap();
         let gripper = GripperGeometry::from_boxes(&BoxGripper::default()).unwrap();
-        let closing = close(
-            &object,
-            &region,
-            &gripper,
-            &Pose::IDENTITY,
-            [-0.015, 0.015],
-            1.5e-3,
-        )
-        .unwrap();
-        let fit = Fit {
-            width: 0.03,
-            opening: 0.08,
-            clearance: 1.0,
-        };
+        let closing =
+            close(&object, &region, &gripper, &Pose::IDENTITY, [-0.015, 0.015], 1.5e-3).unwrap();
+        let fit = Fit { width: 0.03, opening: 0.08, clearance: 1.0 };
         let scores = [DVec3::Z, DVec3::X].map(|approach| {
             let demonstrated_approach = Some(approach);
-            let settings = GraspSettings {
-                demonstrated_approach,
-                ..GraspSettings::default()
-            };
-            Scorer::new(&object, &gripper, &settings, None)
-                .score(&closing, &fit, 0.0)
-                .score
+            let settings = GraspSettings { demonstrated_approach, ..GraspSettings::default() };
+            Scorer::new(&object, &gripper, &settings, None).score(&closing, &fit, 0.0).score
         });
         assert!(
             (scores[1] - 0.5 * scores[0]).abs() < 1e-9,

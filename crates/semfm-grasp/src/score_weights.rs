@@ -110,10 +110,8 @@ impl ScoreWeights {
 
     /// The probability that a grasp with these terms holds.
     pub(crate) fn probability(&self, terms: &[(&'static str, f64)]) -> f64 {
-        let weighted = self
-            .physical()
-            .into_iter()
-            .filter_map(|(name, w)| Some(w * term(terms, name)?));
+        let weighted =
+            self.physical().into_iter().filter_map(|(name, w)| Some(w * term(terms, name)?));
         1.0 / (1.0 + (-self.constant - weighted.sum::<f64>()).exp())
     }
 
@@ -132,25 +130,13 @@ impl ScoreWeights {
         if !(log_odds.iter().all(|w| w.is_finite()) && self.constant.is_finite()) {
             let expected = "finite log-odds".into();
             let found = format!("{} and {log_odds:?}", self.constant);
-            return Err(Error::OutOfRange {
-                what: "weights",
-                expected,
-                found,
-            });
+            return Err(Error::OutOfRange { what: "weights", expected, found });
         }
-        match self
-            .preferences()
-            .into_iter()
-            .find(|(_, share)| !(0.0..=1.0).contains(share))
-        {
+        match self.preferences().into_iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
             None => Ok(()),
             Some((what, share)) => {
                 let expected = "a share from 0 to 1".into();
-                Err(Error::OutOfRange {
-                    what,
-                    expected,
-                    found: share.to_string(),
-                })
+                Err(Error::OutOfRange { what, expected, found: share.to_string() })
             }
         }
     }
@@ -174,24 +160,15 @@ mod tests {
         assert!(weights.probability(&all(1.0)) > 0.9 && weights.probability(&all(0.0)) < 0.05);
         assert_eq!(weights.preference(&all(1.0)), 1.0);
         let half = weights.preference(&[("region", 0.0)]);
-        assert!(
-            (half - (1.0 - weights.region)).abs() < 1e-12,
-            "what was not asked counts nothing"
-        );
+        assert!((half - (1.0 - weights.region)).abs() < 1e-12, "what was not asked counts nothing");
     }
 
     #[test]
     fn bad_weights_are_named() {
         ScoreWeights::default().check().unwrap();
-        let bad = ScoreWeights {
-            approach: 1.5,
-            ..Default::default()
-        };
+        let bad = ScoreWeights { approach: 1.5, ..Default::default() };
         assert!(bad.check().unwrap_err().to_string().contains("approach"));
-        let bad = ScoreWeights {
-            gravity: f64::NAN,
-            ..Default::default()
-        };
+        let bad = ScoreWeights { gravity: f64::NAN, ..Default::default() };
         assert!(bad.check().unwrap_err().to_string().contains("weights"));
     }
 }

@@ -59,11 +59,7 @@ pub(crate) struct Near {
 
 impl Near {
     fn boxed(refusal: Refusal, candidate: &Candidate, closing: Option<&Closing>) -> Box<Self> {
-        Box::new(Self {
-            refusal,
-            candidate: *candidate,
-            closing: closing.cloned(),
-        })
+        Box::new(Self { refusal, candidate: *candidate, closing: closing.cloned() })
     }
 }
 
@@ -87,14 +83,7 @@ impl<'a> Search<'a> {
         let down = scene.table().map(|table| -table.normal);
         let scorer = Scorer::new(object, gripper, settings, down);
         let collision = Collision::new(object, scene, gripper, settings);
-        Self {
-            object,
-            region,
-            gripper,
-            settings,
-            collision,
-            scorer,
-        }
+        Self { object, region, gripper, settings, collision, scorer }
     }
 
     pub(crate) fn object(&self) -> &GraspObject {
@@ -118,11 +107,7 @@ impl<'a> Search<'a> {
                 |(gpg, candidates), i| {
                     candidates.clear();
                     let sampled = self.sample(i as u64, gpg, candidates);
-                    task.step(
-                        "examine",
-                        done.fetch_add(1, Ordering::Relaxed) + 1,
-                        n_samples,
-                    )?;
+                    task.step("examine", done.fetch_add(1, Ordering::Relaxed) + 1, n_samples)?;
                     Ok(sampled)
                 },
             )
@@ -141,14 +126,7 @@ impl<'a> Search<'a> {
         let mut sampled = Sampled::default();
         if on_mesh && i.is_multiple_of(2) {
             let friction = self.settings.friction;
-            antipodal(
-                self.object,
-                self.gripper,
-                &seed,
-                friction,
-                &mut rng,
-                candidates,
-            );
+            antipodal(self.object, self.gripper, &seed, friction, &mut rng, candidates);
         } else {
             let refused = gpg.grow(&seed, candidates);
             sampled.n_candidates += refused;
@@ -186,34 +164,23 @@ impl<'a> Search<'a> {
             let before: HashSet<PoseBits> = kept.iter().map(pose_bits).collect();
             kept.append(&mut part.grasps);
             kept = suppress(kept, separation);
-            frontier = kept
-                .iter()
-                .filter(|grasp| !before.contains(&pose_bits(grasp)))
-                .cloned()
-                .collect();
+            frontier =
+                kept.iter().filter(|grasp| !before.contains(&pose_bits(grasp))).cloned().collect();
             sampled.absorb(part);
         }
-        Ok(Found {
-            kept,
-            n_survivors,
-            sampled,
-        })
+        Ok(Found { kept, n_survivors, sampled })
     }
 
     /// The stages, cheap ones first.
     pub(crate) fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
-        self.approach(candidate)
-            .map_err(|refusal| Near::boxed(refusal, candidate, None))?;
+        self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
         let mut closing = self.closed(candidate, self.object.touched(), self.region.touched())?;
         let refused = |refusal, closing: &Closing| Near::boxed(refusal, candidate, Some(closing));
-        let angle = self
-            .contacts(&closing)
-            .map_err(|refusal| refused(refusal, &closing))?;
+        let angle = self.contacts(&closing).map_err(|refusal| refused(refusal, &closing))?;
         if let Some(reach) = self.object.deviation() {
             closing = widened(closing, self.object.exact(), self.gripper, reach);
         }
-        self.examine_closed(&closing, angle)
-            .map_err(|refusal| refused(refusal, &closing))
+        self.examine_closed(&closing, angle).map_err(|refusal| refused(refusal, &closing))
     }
 
     /// The stages on the surface that answers are of.
@@ -230,19 +197,13 @@ impl<'a> Search<'a> {
 
     /// The stages on the object as it is, for a grasp that was found on a simpler surface.
     pub(crate) fn examine_exactly(&self, grasp: &Grasp) -> std::result::Result<Grasp, Box<Near>> {
-        let ends = grasp
-            .contacts
-            .map(|contact| (grasp.object_from_tcp.inverse() * contact).y);
+        let ends = grasp.contacts.map(|contact| (grasp.object_from_tcp.inverse() * contact).y);
         let seed = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-        self.examine_as_is(&Candidate {
-            tcp: grasp.object_from_tcp,
-            seed,
-        })
+        self.examine_as_is(&Candidate { tcp: grasp.object_from_tcp, seed })
     }
 
     fn examine_as_is(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
-        self.approach(candidate)
-            .map_err(|refusal| Near::boxed(refusal, candidate, None))?;
+        self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
         let closing = self.closed(candidate, self.object.exact(), self.region.given())?;
         self.contacts(&closing)
             .and_then(|angle| self.examine_closed(&closing, angle))
@@ -279,12 +240,7 @@ impl<'a> Search<'a> {
 
     fn width(&self, closing: &Closing) -> std::result::Result<(), Refusal> {
         let opening = self.gripper.opening();
-        let asked = self
-            .settings
-            .limits
-            .width
-            .clone()
-            .unwrap_or(0.0..=f64::INFINITY);
+        let asked = self.settings.limits.width.clone().unwrap_or(0.0..=f64::INFINITY);
         let least = opening.start().max(*asked.start());
         let most = (opening.end() - 2.0 * TOUCH_GAP).min(*asked.end());
         let beyond = (least - closing.width).max(closing.width - most);
@@ -302,10 +258,7 @@ impl<'a> Search<'a> {
         let [left, right] = &closing.patches;
         let outside = limits.pad_in_region - left.region.min(right.region);
         if outside > 1e-9 {
-            return Err(Refusal {
-                reason: Reason::Region,
-                by: outside,
-            });
+            return Err(Refusal { reason: Reason::Region, by: outside });
         }
         Ok(angle)
     }
@@ -328,11 +281,7 @@ impl<'a> Search<'a> {
 
     /// A refused candidate as a grasp, with what is known of it.
     pub(crate) fn miss(&self, near: Near) -> Miss {
-        let Near {
-            refusal: Refusal { reason, by },
-            candidate,
-            closing,
-        } = near;
+        let Near { refusal: Refusal { reason, by }, candidate, closing } = near;
         let widest = *self.gripper.opening().end();
         let by = match (&closing, reason) {
             (Some(closing), reason)
@@ -347,21 +296,11 @@ impl<'a> Search<'a> {
         let (tcp, width, contacts, normals) = closing.map_or_else(
             || {
                 let ends = seed.map(|y| candidate.tcp * (DVec3::Y * y));
-                (
-                    candidate.tcp,
-                    seed[1] - seed[0],
-                    ends,
-                    [-closing_axis, closing_axis],
-                )
+                (candidate.tcp, seed[1] - seed[0], ends, [-closing_axis, closing_axis])
             },
             |closing| {
                 let patches = closing.patches;
-                (
-                    closing.tcp,
-                    closing.width,
-                    patches.map(|p| p.contact),
-                    patches.map(|p| p.normal),
-                )
+                (closing.tcp, closing.width, patches.map(|p| p.contact), patches.map(|p| p.normal))
             },
         );
         let grasp = Grasp {
@@ -384,14 +323,8 @@ impl<'a> Search<'a> {
 type PoseBits = ([u64; 3], [u64; 4]);
 
 fn pose_bits(grasp: &Grasp) -> PoseBits {
-    let Pose {
-        translation,
-        rotation,
-    } = grasp.object_from_tcp;
-    (
-        translation.to_array().map(f64::to_bits),
-        rotation.to_array().map(f64::to_bits),
-    )
+    let Pose { translation, rotation } = grasp.object_from_tcp;
+    (translation.to_array().map(f64::to_bits), rotation.to_array().map(f64::to_bits))
 }
 
 impl Sampled {
@@ -419,29 +352,19 @@ impl Sampled {
         self.grasps.extend(part.grasps);
         self.rejected.merge(&part.rejected);
         self.n_candidates += part.n_candidates;
-        part.nearest
-            .into_iter()
-            .flatten()
-            .for_each(|near| self.consider(near));
+        part.nearest.into_iter().flatten().for_each(|near| self.consider(near));
     }
 
     /// All grasps of the samples, near ones too, as the answer.
     pub(crate) fn into_found(mut self) -> Found {
         let kept = std::mem::take(&mut self.grasps);
-        Found {
-            n_survivors: kept.len(),
-            kept,
-            sampled: self,
-        }
+        Found { n_survivors: kept.len(), kept, sampled: self }
     }
 
     /// Keeps, for each reason, what missed by least, of that the first.
     fn consider(&mut self, near: Near) {
         let best = &mut self.nearest[near.refusal.reason as usize];
-        if best
-            .as_ref()
-            .is_none_or(|best| near.refusal.by < best.refusal.by)
-        {
+        if best.as_ref().is_none_or(|best| near.refusal.by < best.refusal.by) {
             *best = Some(near);
         }
     }

@@ -56,12 +56,7 @@ pub(crate) fn diverse(
             *d = d.min(apart.relative(radius));
         }
     }
-    grasps
-        .into_iter()
-        .zip(chosen)
-        .filter(|(_, chosen)| *chosen)
-        .map(|(grasp, _)| grasp)
-        .collect()
+    grasps.into_iter().zip(chosen).filter(|(_, chosen)| *chosen).map(|(grasp, _)| grasp).collect()
 }
 
 /// `top` of the grasps, each as likely as any other; best first.
@@ -101,24 +96,13 @@ mod tests {
             grasp(0.05, 0.0, 0.2),
             grasp(0.0, 1.0, 0.3),
         ];
-        let kept = suppress(
-            all,
-            Separation {
-                translation: 0.01,
-                rotation: 0.26,
-            },
-        );
-        assert_eq!(
-            kept.iter().map(|g| g.score).collect::<Vec<_>>(),
-            [0.9, 0.3, 0.2]
-        );
+        let kept = suppress(all, Separation { translation: 0.01, rotation: 0.26 });
+        assert_eq!(kept.iter().map(|g| g.score).collect::<Vec<_>>(), [0.9, 0.3, 0.2]);
     }
 
     #[test]
     fn random_grasps_are_no_better_than_the_others() {
-        let all: Vec<Grasp> = (0..1000)
-            .map(|i| grasp(0.0, 0.0, f64::from(i) / 1000.0))
-            .collect();
+        let all: Vec<Grasp> = (0..1000).map(|i| grasp(0.0, 0.0, f64::from(i) / 1000.0)).collect();
         let some = drawn(all.clone(), 200, 5);
         let mean = some.iter().map(|grasp| grasp.score).sum::<f64>() / 200.0;
         assert!((mean - 0.5).abs() < 0.06, "{mean}"); // three standard deviations of such a mean
@@ -135,10 +119,7 @@ mod tests {
             grasp(0.1, 1.5, 0.3),
         ];
         let scores = |diversity: f64| -> Vec<f64> {
-            diverse(all.clone(), 2, diversity, 0.1)
-                .iter()
-                .map(|g| g.score)
-                .collect()
+            diverse(all.clone(), 2, diversity, 0.1).iter().map(|g| g.score).collect()
         };
         assert_eq!(scores(0.0), [0.9, 0.8], "the plain ranking");
         assert_eq!(scores(0.1), [0.9, 0.75], "at most a tenth below the second");

@@ -116,10 +116,7 @@ impl Default for GraspSettings {
             diversity: 0.1,
             selection: Selection::Best,
             pose_margin: 0.0,
-            separation: Separation {
-                translation: 0.01,
-                rotation: 15f64.to_radians(),
-            },
+            separation: Separation { translation: 0.01, rotation: 15f64.to_radians() },
             limits: Limits::default(),
             demonstrated_approach: None,
             gravity: None,
@@ -155,53 +152,30 @@ impl GraspSettings {
         length("retreat", self.retreat)?;
         length("pose_margin", self.pose_margin)?;
         length("separation.translation", self.separation.translation)?;
-        within(
-            "separation.rotation",
-            self.separation.rotation,
-            0.0,
-            3.2,
-            "0 to π",
-        )?;
+        within("separation.rotation", self.separation.rotation, 0.0, 3.2, "0 to π")?;
         within("compliance", self.compliance, 1e-5, 0.1, "0.01 mm to 0.1 m")?;
         within("friction", self.friction, 1e-3, 10.0, "0.001 to 10")?;
         within("grip_force", self.grip_force, 0.1, 1e4, "0.1 to 10 000 N")?;
         if let Some(mass) = self.mass {
             within("mass", mass, 1e-4, 1e3, "0.1 g to 1000 kg")?;
         }
-        within(
-            "n_samples",
-            self.n_samples as f64,
-            1.0,
-            1e7,
-            "1 to 10 million",
-        )?;
+        within("n_samples", self.n_samples as f64, 1.0, 1e7, "1 to 10 million")?;
         within("top", self.top as f64, 1.0, f64::MAX, "at least 1")?;
         if let Some(width) = &self.limits.width {
             let (least, most) = (*width.start(), *width.end());
             if !(least >= 0.0 && most >= least) {
                 let found = format!("{least} to {most}");
                 let expected = "0 ≤ least ≤ most (metres)".into();
-                return Err(Error::OutOfRange {
-                    what: "limits.width",
-                    expected,
-                    found,
-                });
+                return Err(Error::OutOfRange { what: "limits.width", expected, found });
             }
         }
         if let Some(cone) = self.limits.approach {
             direction("limits.approach.axis", cone.axis)?;
-            within(
-                "limits.approach.half_angle",
-                cone.half_angle,
-                0.0,
-                3.2,
-                "0 to π",
-            )?;
+            within("limits.approach.half_angle", cone.half_angle, 0.0, 3.2, "0 to π")?;
         }
-        for (what, vector) in [
-            ("demonstrated_approach", self.demonstrated_approach),
-            ("gravity", self.gravity),
-        ] {
+        for (what, vector) in
+            [("demonstrated_approach", self.demonstrated_approach), ("gravity", self.gravity)]
+        {
             vector.map_or(Ok(()), |vector| direction(what, vector))?;
         }
         self.weights.check()
@@ -220,11 +194,7 @@ fn within(what: &'static str, x: f64, least: f64, most: f64, expected: &str) -> 
     if x >= least && x <= most {
         return Ok(());
     }
-    Err(Error::OutOfRange {
-        what,
-        expected: expected.into(),
-        found: x.to_string(),
-    })
+    Err(Error::OutOfRange { what, expected: expected.into(), found: x.to_string() })
 }
 
 pub(crate) fn direction(what: &'static str, vector: DVec3) -> Result<()> {
@@ -232,11 +202,7 @@ pub(crate) fn direction(what: &'static str, vector: DVec3) -> Result<()> {
         return Ok(());
     }
     let expected = "a direction, finite and not zero".into();
-    Err(Error::OutOfRange {
-        what,
-        expected,
-        found: vector.to_string(),
-    })
+    Err(Error::OutOfRange { what, expected, found: vector.to_string() })
 }
 
 #[cfg(test)]
@@ -246,19 +212,9 @@ mod tests {
     #[test]
     fn the_default_passes_and_a_bad_number_is_named() {
         GraspSettings::default().check().unwrap();
-        let bad = GraspSettings {
-            friction: f64::NAN,
-            ..GraspSettings::default()
-        };
+        let bad = GraspSettings { friction: f64::NAN, ..GraspSettings::default() };
         assert!(bad.check().unwrap_err().to_string().contains("friction"));
         let gravity = Some(DVec3::ZERO);
-        assert!(
-            GraspSettings {
-                gravity,
-                ..GraspSettings::default()
-            }
-            .check()
-            .is_err()
-        );
+        assert!(GraspSettings { gravity, ..GraspSettings::default() }.check().is_err());
     }
 }

@@ -84,10 +84,9 @@ impl Convex {
                 DVec3::ZERO,
                 DVec3::new(shape.radius, shape.half_height, shape.radius),
             ),
-            TypedShape::RoundCuboid(shape) => Self::single_box(
-                DVec3::ZERO,
-                shape.inner_shape.half_extents + shape.border_radius,
-            ),
+            TypedShape::RoundCuboid(shape) => {
+                Self::single_box(DVec3::ZERO, shape.inner_shape.half_extents + shape.border_radius)
+            }
             _ => None,
         }
     }
@@ -103,34 +102,20 @@ impl Convex {
 
     /// A box as the only piece; `None` where it has no bounds to speak of.
     fn single_box(centre: DVec3, half: DVec3) -> Option<Vec<(Pose, Self)>> {
-        (centre.is_finite() && half.is_finite() && half.max_element() < 1e6).then(|| {
-            vec![(
-                Pose::IDENTITY,
-                Self {
-                    centre,
-                    half,
-                    hull: None,
-                },
-            )]
-        })
+        (centre.is_finite() && half.is_finite() && half.max_element() < 1e6)
+            .then(|| vec![(Pose::IDENTITY, Self { centre, half, hull: None })])
     }
 
     /// The box with this centre and these half extents.
     pub(crate) fn cuboid(centre: DVec3, half: DVec3) -> Self {
-        Self {
-            centre,
-            half,
-            hull: None,
-        }
+        Self { centre, half, hull: None }
     }
 
     /// Corners of the shape in its own frame.
     fn corners(&self) -> Vec<DVec3> {
         match &self.hull {
             Some(hull) => hull.points.iter().map(|&p| p + self.centre).collect(),
-            None => (0..8)
-                .map(|i| self.centre + self.half * corner_signs(i))
-                .collect(),
+            None => (0..8).map(|i| self.centre + self.half * corner_signs(i)).collect(),
         }
     }
 
@@ -145,11 +130,7 @@ impl Convex {
         let local = pose.rotation.inverse() * direction;
         let least = match &self.hull {
             None => -self.half.dot(local.abs()),
-            Some(hull) => hull
-                .points
-                .iter()
-                .map(|p| p.dot(local))
-                .fold(f64::INFINITY, f64::min),
+            Some(hull) => hull.points.iter().map(|p| p.dot(local)).fold(f64::INFINITY, f64::min),
         };
         let least = least + self.centre.dot(local);
         least + pose.translation.dot(direction)
@@ -179,11 +160,8 @@ impl Convex {
             return Solid::new(frame, half, hull);
         }
         let start = self.corners();
-        let all: Vec<DVec3> = start
-            .iter()
-            .copied()
-            .chain(start.iter().map(|&p| motion * p))
-            .collect();
+        let all: Vec<DVec3> =
+            start.iter().copied().chain(start.iter().map(|&p| motion * p)).collect();
         let (low, high) = bounds(&all).unwrap_or_default();
         let centre = low.midpoint(high);
         let frame = *from * Pose::from_translation(centre);
@@ -200,16 +178,9 @@ impl Hull {
     fn new(points: Vec<DVec3>) -> Self {
         let slabs = SLABS.map(|direction| {
             let none = [f64::INFINITY, f64::NEG_INFINITY];
-            points
-                .iter()
-                .map(|p| p.dot(direction))
-                .fold(none, |[l, h], x| [l.min(x), h.max(x)])
+            points.iter().map(|p| p.dot(direction)).fold(none, |[l, h], x| [l.min(x), h.max(x)])
         });
-        Self {
-            points: points.into(),
-            path: DVec3::ZERO,
-            slabs,
-        }
+        Self { points: points.into(), path: DVec3::ZERO, slabs }
     }
 
     /// Of points that are at rest: the same along `path`, seen from the middle of the way.
@@ -219,23 +190,16 @@ impl Hull {
             let half = path.dot(direction).abs() / 2.0;
             *slab = [slab[0] - half, slab[1] + half];
         }
-        Self {
-            points: self.points.clone(),
-            path,
-            slabs,
-        }
+        Self { points: self.points.clone(), path, slabs }
     }
 
     /// Whether one of [`SLABS`] shows that the triangle is farther than `margin`.
     fn is_beside(&self, corners: [DVec3; 3], margin: f64) -> bool {
-        self.slabs
-            .iter()
-            .zip(SLABS)
-            .any(|([low, high], direction)| {
-                let [a, b, c] = corners.map(|p| p.dot(direction));
-                let wide = margin * direction.length();
-                a.min(b).min(c) > high + wide || a.max(b).max(c) < low - wide
-            })
+        self.slabs.iter().zip(SLABS).any(|([low, high], direction)| {
+            let [a, b, c] = corners.map(|p| p.dot(direction));
+            let wide = margin * direction.length();
+            a.min(b).min(c) > high + wide || a.max(b).max(c) < low - wide
+        })
     }
 }
 
@@ -253,12 +217,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     fn new(frame: Pose, half: DVec3, hull: Option<Hull>) -> Self {
-        Self {
-            frame,
-            turn: DMat3::from_quat(frame.rotation).transpose(),
-            half,
-            hull,
-        }
+        Self { frame, turn: DMat3::from_quat(frame.rotation).transpose(), half, hull }
     }
 
     /// An oriented box: its frame in the object's, and its half extents.
@@ -369,16 +328,10 @@ impl GrownBox {
     /// never no for a hit).
     #[inline]
     pub(crate) fn overlaps(&self, bounds: &Bounds) -> bool {
-        let (centre, extent) = (
-            (bounds.low + bounds.high) * 0.5,
-            (bounds.high - bounds.low) * 0.5,
-        );
+        let (centre, extent) = ((bounds.low + bounds.high) * 0.5, (bounds.high - bounds.low) * 0.5);
         let offset = self.centre - centre;
         offset.abs().cmple(extent + self.reach).all()
-            && (self.turn * offset)
-                .abs()
-                .cmple(self.half + self.spread * extent)
-                .all()
+            && (self.turn * offset).abs().cmple(self.half + self.spread * extent).all()
     }
 }
 
@@ -396,10 +349,7 @@ impl SupportMap for Hull {
 }
 
 fn separated(body: &impl SupportMap, triangle: &Triangle, margin: f64) -> bool {
-    matches!(
-        closest(body, triangle, margin, false),
-        GJKResult::NoIntersection(_)
-    )
+    matches!(closest(body, triangle, margin, false), GJKResult::NoIntersection(_))
 }
 
 fn gap(body: &impl SupportMap, triangle: &Triangle, cap: f64) -> f64 {
@@ -414,12 +364,7 @@ fn closest(body: &impl SupportMap, triangle: &Triangle, max: f64, exact: bool) -
     let towards = -(triangle.a + triangle.b + triangle.c);
     let direction = towards.try_normalize().unwrap_or(Vector::X);
     let mut simplex = VoronoiSimplex::new();
-    simplex.reset(CsoPoint::from_shapes(
-        &Pose::IDENTITY,
-        body,
-        triangle,
-        direction,
-    ));
+    simplex.reset(CsoPoint::from_shapes(&Pose::IDENTITY, body, triangle, direction));
     gjk::closest_points(&Pose::IDENTITY, body, triangle, max, exact, &mut simplex)
 }
 
@@ -458,10 +403,7 @@ mod tests {
     fn a_hull_and_a_box_of_the_same_corners_agree() {
         let plain = Convex::cuboid(DVec3::X, DVec3::new(0.5, 0.2, 0.3));
         let hull = Hull::new(plain.corners_around_centre());
-        let hull = Convex {
-            hull: Some(hull),
-            ..plain.clone()
-        };
+        let hull = Convex { hull: Some(hull), ..plain.clone() };
         let pose = Pose::new(DVec3::new(0.1, 0.2, 0.3), DVec3::new(0.5, -0.4, 0.2));
         let (a, b) = (plain.at(&pose), hull.at(&pose));
         let mut hits = 0;

@@ -13,18 +13,9 @@ pub(crate) fn cuboid(size: DVec3) -> Mesh {
         let sign = |bit: usize| if i >> bit & 1 == 0 { -0.5 } else { 0.5 };
         size * DVec3::new(sign(0), sign(1), sign(2))
     };
-    let quads = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let faces = quads
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .collect();
+    let quads =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     Mesh::new((0..8).map(corner).collect(), faces).unwrap()
 }
 
@@ -41,12 +32,7 @@ pub(crate) fn cylinder(radius: f64, height: f64, n: u32) -> Mesh {
     let faces = (0..n)
         .flat_map(|i| {
             let j = (i + 1) % n;
-            [
-                [i, j, n + j],
-                [i, n + j, n + i],
-                [2 * n, j, i],
-                [2 * n + 1, n + i, n + j],
-            ]
+            [[i, j, n + j], [i, n + j, n + i], [2 * n, j, i], [2 * n + 1, n + i, n + j]]
         })
         .collect();
     Mesh::new(vertices, faces).unwrap()
@@ -62,11 +48,7 @@ pub(crate) fn joined(a: &Mesh, b: &Mesh) -> Mesh {
 
 /// The mesh moved by a map of its points.
 pub(crate) fn moved(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
-    Mesh::new(
-        mesh.vertices().iter().map(|&p| map(p)).collect(),
-        mesh.faces().to_vec(),
-    )
-    .unwrap()
+    Mesh::new(mesh.vertices().iter().map(|&p| map(p)).collect(), mesh.faces().to_vec()).unwrap()
 }
 
 /// The mesh with independent normal noise of deviation `sigma` on each coordinate (twelve uniform numbers less six
@@ -74,10 +56,8 @@ pub(crate) fn moved(mesh: &Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
 pub(crate) fn noisy(mesh: &Mesh, sigma: f64, seed: u64) -> Mesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
-    let points = mesh
-        .vertices()
-        .iter()
-        .map(|&p| p + sigma * DVec3::from_array([(); 3].map(|()| normal())));
+    let points =
+        mesh.vertices().iter().map(|&p| p + sigma * DVec3::from_array([(); 3].map(|()| normal())));
     let points: Vec<DVec3> = points.collect();
     Mesh::new(points, mesh.faces().to_vec()).unwrap()
 }

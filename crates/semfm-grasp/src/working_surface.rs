@@ -24,20 +24,14 @@ pub struct SurfaceSettings {
 impl Default for SurfaceSettings {
     /// 16,000 triangles are 2 mm apart on a hammer and 4 mm on a pitcher: a pad of 18 mm feels some fifty.
     fn default() -> Self {
-        Self {
-            working_vertices: 8000,
-            smooth: true,
-        }
+        Self { working_vertices: 8000, smooth: true }
     }
 }
 
 impl SurfaceSettings {
     /// The mesh as it is, whatever its size and noise.
     pub fn exact() -> Self {
-        Self {
-            working_vertices: 0,
-            smooth: false,
-        }
+        Self { working_vertices: 0, smooth: false }
     }
 }
 
@@ -100,10 +94,7 @@ impl WorkingSurface {
         let wanted = settings.working_vertices;
         if wanted > 0 && mesh.n_vertices() as f64 >= LARGE * wanted as f64 {
             let most_distance = MOST_DEVIATION / mesh.diagonal();
-            let simplification = SimplifySettings {
-                target_vertices: wanted,
-                most_distance,
-            };
+            let simplification = SimplifySettings { target_vertices: wanted, most_distance };
             let cleaning = CleanSettings::default();
             let task = Task::default();
             let prepared = WorkingMesh::prepare(&working, &cleaning, &simplification, &task)?;
@@ -123,21 +114,14 @@ impl WorkingSurface {
         }
         report.n_triangles = working.n_faces();
         report.deviation += SPIKES * report.noise;
-        Ok(Some(Self {
-            mesh: working,
-            to_given,
-            report,
-        }))
+        Ok(Some(Self { mesh: working, to_given, report }))
     }
 }
 
 impl SurfaceReport {
     /// Of a mesh that stands for itself.
     pub fn of(mesh: &Mesh) -> Self {
-        Self {
-            n_triangles: mesh.n_faces(),
-            ..Self::default()
-        }
+        Self { n_triangles: mesh.n_faces(), ..Self::default() }
     }
 }
 
@@ -155,10 +139,7 @@ fn smooth(mesh: &mut Mesh, n_steps: &mut usize) -> Result<f64> {
     for _ in 0..steps {
         for factor in [TAUBIN.0, TAUBIN.1] {
             let pulls = rings.laplacian(&points);
-            points
-                .iter_mut()
-                .zip(pulls)
-                .for_each(|(p, pull)| *p += factor * pull);
+            points.iter_mut().zip(pulls).for_each(|(p, pull)| *p += factor * pull);
         }
     }
     *mesh = Mesh::new(points, mesh.faces().to_vec())?;
@@ -186,13 +167,7 @@ fn noise(mesh: &Mesh, rings: &Rings) -> f64 {
     let around = rings.laplacian(&normals);
     let mut parts: Vec<f64> = (0..mesh.n_vertices())
         .filter(|&v| !rings.of[v].is_empty())
-        .filter_map(|v| {
-            Some(
-                bent[v]
-                    .dot((2.0 * normals[v] + around[v]).try_normalize()?)
-                    .abs(),
-            )
-        })
+        .filter_map(|v| Some(bent[v].dot((2.0 * normals[v] + around[v]).try_normalize()?).abs()))
         .collect();
     if parts.is_empty() {
         return 0.0;
@@ -210,9 +185,8 @@ struct Rings {
 impl Rings {
     fn of(mesh: &Mesh) -> Self {
         let adjacency = VertexAdjacency::new(mesh);
-        let mut of: Vec<Vec<u32>> = (0..mesh.n_vertices())
-            .map(|v| adjacency.of(v).to_vec())
-            .collect();
+        let mut of: Vec<Vec<u32>> =
+            (0..mesh.n_vertices()).map(|v| adjacency.of(v).to_vec()).collect();
         let mut sides: Vec<[u32; 2]> = mesh
             .faces()
             .iter()
@@ -238,14 +212,8 @@ impl Rings {
     /// Mean over the ring less the own value; zero where there is no ring.
     fn laplacian(&self, values: &[DVec3]) -> Vec<DVec3> {
         let pull = |(ring, &own): (&Vec<u32>, &DVec3)| {
-            let sum = ring
-                .iter()
-                .fold(DVec3::ZERO, |sum, &id| sum + values[id as usize]);
-            if ring.is_empty() {
-                DVec3::ZERO
-            } else {
-                sum / ring.len() as f64 - own
-            }
+            let sum = ring.iter().fold(DVec3::ZERO, |sum, &id| sum + values[id as usize]);
+            if ring.is_empty() { DVec3::ZERO } else { sum / ring.len() as f64 - own }
         };
         self.of.iter().zip(values).map(pull).collect()
     }
@@ -276,60 +244,36 @@ mod tests {
             assert!((found / sigma - 1.0).abs() < 0.2, "{found} for {sigma}");
         }
         for mesh in [ball(), cylinder(0.02, 0.1, 96), cuboid(DVec3::splat(0.1))] {
-            assert!(
-                WorkingSurface::of(&mesh, SurfaceSettings::default())
-                    .unwrap()
-                    .is_none()
-            );
+            assert!(WorkingSurface::of(&mesh, SurfaceSettings::default()).unwrap().is_none());
         }
     }
 
     #[test]
     fn a_noisy_ball_becomes_a_ball_again() {
         let rough = noisy(&ball(), 0.6e-3, 2);
-        let smooth = WorkingSurface::of(&rough, SurfaceSettings::default())
-            .unwrap()
-            .unwrap();
+        let smooth = WorkingSurface::of(&rough, SurfaceSettings::default()).unwrap().unwrap();
         assert!(smooth.report.smoothing_steps > 5 && !smooth.report.is_simplified);
         let spread = |mesh: &Mesh| {
             let n = mesh.n_vertices() as f64;
-            let squares: f64 = mesh
-                .vertices()
-                .iter()
-                .map(|p| (p.length() - 0.03).powi(2))
-                .sum();
+            let squares: f64 = mesh.vertices().iter().map(|p| (p.length() - 0.03).powi(2)).sum();
             (squares / n).sqrt()
         };
         assert!(spread(&rough) > 0.5e-3 && spread(&smooth.mesh) < 0.25e-3);
         // Normals of triangles, which pads ask for, point outwards again.
         let off = (0..smooth.mesh.n_faces()).map(|face| {
             let [a, b, c] = smooth.mesh.corners(face);
-            smooth
-                .mesh
-                .face_normal_scaled(face)
-                .angle_between(a + b + c)
+            smooth.mesh.face_normal_scaled(face).angle_between(a + b + c)
         });
         let mut angles: Vec<f64> = off.collect();
         angles.sort_by(f64::total_cmp);
-        assert!(
-            angles[angles.len() * 9 / 10] < 0.25,
-            "{}",
-            angles[angles.len() * 9 / 10]
-        );
-        assert!(
-            WorkingSurface::of(&rough, SurfaceSettings::exact())
-                .unwrap()
-                .is_none()
-        );
+        assert!(angles[angles.len() * 9 / 10] < 0.25, "{}", angles[angles.len() * 9 / 10]);
+        assert!(WorkingSurface::of(&rough, SurfaceSettings::exact()).unwrap().is_none());
     }
 
     #[test]
     fn a_dense_mesh_is_simplified_on_its_own_vertices() {
         let dense = moved(&zoo::icosphere(5), |p| 0.05 * p); // 10,242 vertices
-        let settings = SurfaceSettings {
-            working_vertices: 2000,
-            smooth: true,
-        };
+        let settings = SurfaceSettings { working_vertices: 2000, smooth: true };
         let working = WorkingSurface::of(&dense, settings).unwrap().unwrap();
         assert!(working.report.is_simplified && working.report.smoothing_steps == 0);
         assert!(working.mesh.n_vertices() <= 3000 && working.report.deviation <= MOST_DEVIATION);

@@ -70,11 +70,8 @@ pub(crate) fn inner_radius(points: &[Wrench]) -> f64 {
     if scale <= 0.0 || !scale.is_finite() {
         return 0.0;
     }
-    let points: Vec<Wrench> = points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| joggled(p, i, scale))
-        .collect();
+    let points: Vec<Wrench> =
+        points.iter().enumerate().map(|(i, p)| joggled(p, i, scale)).collect();
     let Some(simplex) = first_simplex(&points, scale) else {
         return 0.0;
     };
@@ -108,26 +105,13 @@ impl<'a> Hull<'a> {
             std::array::from_fn(|d| simplex.iter().map(|&i| points[i][d]).sum::<f64>() / 7.0);
         let facets = Vec::with_capacity(512);
         let (free, seen, is_seen, ridges) = Default::default();
-        let mut hull = Self {
-            points,
-            centre,
-            facets,
-            free,
-            seen,
-            is_seen,
-            ridges,
-        };
+        let mut hull = Self { points, centre, facets, free, seen, is_seen, ridges };
         for left_out in 0..7 {
             let others = |k: usize| if k < left_out { k } else { k + 1 };
             let corners = std::array::from_fn(|k| simplex[others(k)] as u16);
             let neighbours = std::array::from_fn(|k| others(k) as u32);
             let plane = hull.plane_of(&corners).unwrap_or(Plane::NONE);
-            hull.facets.push(Facet {
-                corners,
-                neighbours,
-                plane,
-                is_exact: true,
-            });
+            hull.facets.push(Facet { corners, neighbours, plane, is_exact: true });
         }
         hull
     }
@@ -142,12 +126,7 @@ impl<'a> Hull<'a> {
         loop {
             let offset = |facet: &Facet| facet.plane.offset;
             let by_offset = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
-            let (at, least) = self
-                .facets
-                .iter()
-                .map(offset)
-                .enumerate()
-                .min_by(by_offset)?;
+            let (at, least) = self.facets.iter().map(offset).enumerate().min_by(by_offset)?;
             if self.facets[at].is_exact {
                 return (least < f64::INFINITY).then_some(self.facets[at].plane);
             }
@@ -193,10 +172,7 @@ impl<'a> Hull<'a> {
         let old = self.facets[seen as usize];
         let beyond = old.neighbours[k];
         let p = &self.points[usize::from(apex)];
-        let mut facet = Facet {
-            is_exact: false,
-            ..old
-        };
+        let mut facet = Facet { is_exact: false, ..old };
         facet.corners[k] = apex;
         facet.neighbours = [NO_FACET; 6];
         facet.neighbours[k] = beyond;
@@ -223,8 +199,7 @@ impl<'a> Hull<'a> {
         }
         self.replace(beyond, seen, id);
         for other in (0..6).filter(|&other| other != k) {
-            self.ridges
-                .push((ridge(&facet.corners, k, other), id, other as u8));
+            self.ridges.push((ridge(&facet.corners, k, other), id, other as u8));
         }
     }
 
@@ -232,10 +207,7 @@ impl<'a> Hull<'a> {
     fn replace(&mut self, facet: u32, old: u32, id: u32) {
         if facet != NO_FACET {
             let neighbours = &mut self.facets[facet as usize].neighbours;
-            neighbours
-                .iter_mut()
-                .filter(|neighbour| **neighbour == old)
-                .for_each(|n| *n = id);
+            neighbours.iter_mut().filter(|neighbour| **neighbour == old).for_each(|n| *n = id);
         }
     }
 
@@ -256,8 +228,7 @@ fn ridge(corners: &[u16; 6], k: usize, other: usize) -> u64 {
     let mut rest = (0..6).filter(|&i| i != k && i != other).map(|i| corners[i]);
     let mut four: [u16; 4] = std::array::from_fn(|_| rest.next().unwrap_or(0));
     four.sort_unstable();
-    four.into_iter()
-        .fold(0, |packed, corner| packed << POINT_BITS | u64::from(corner))
+    four.into_iter().fold(0, |packed, corner| packed << POINT_BITS | u64::from(corner))
 }
 
 /// Seven points that span six dimensions, each the farthest from the span of those before it.
@@ -273,11 +244,11 @@ fn first_simplex(points: &[Wrench], scale: f64) -> Option<Vec<usize>> {
             }
             rest
         };
-        let (i, rest) = points.iter().map(beyond).enumerate().max_by(|a, b| {
-            dot(&a.1, &a.1)
-                .total_cmp(&dot(&b.1, &b.1))
-                .then(b.0.cmp(&a.0))
-        })?;
+        let (i, rest) = points
+            .iter()
+            .map(beyond)
+            .enumerate()
+            .max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)).then(b.0.cmp(&a.0)))?;
         let length = dot(&rest, &rest).sqrt();
         // Flat but for the joggle is flat.
         if length <= 10.0 * JOGGLE * scale {
@@ -291,10 +262,7 @@ fn first_simplex(points: &[Wrench], scale: f64) -> Option<Vec<usize>> {
 
 impl Plane {
     /// Seen by no point, and farther from the origin than all others.
-    const NONE: Self = Self {
-        normal: [0.0; 6],
-        offset: f64::INFINITY,
-    };
+    const NONE: Self = Self { normal: [0.0; 6], offset: f64::INFINITY };
 
     /// The plane through six points with `inside` below it; `None` where they span less.
     fn through(corners: [Wrench; 6], inside: &Wrench) -> Option<Self> {
@@ -303,15 +271,8 @@ impl Plane {
             std::array::from_fn(|r| std::array::from_fn(|d| corners[r + 1][d] - base[d]));
         let normal = null_vector(&mut rows)?;
         let offset = dot(&normal, &base);
-        let flip = if dot(&normal, inside) > offset {
-            -1.0
-        } else {
-            1.0
-        };
-        Some(Self {
-            normal: normal.map(|x| flip * x),
-            offset: flip * offset,
-        })
+        let flip = if dot(&normal, inside) > offset { -1.0 } else { 1.0 };
+        Some(Self { normal: normal.map(|x| flip * x), offset: flip * offset })
     }
 
     /// The plane through `p` and what two planes share, of which the first is seen from `p` and the second is not:
@@ -359,9 +320,7 @@ fn null_vector(rows: &mut [Wrench; 5]) -> Option<Wrench> {
         let pivot = rows[k];
         for row in rows.iter_mut().skip(k + 1) {
             let factor = row[k] / pivot[k];
-            row.iter_mut()
-                .zip(&pivot)
-                .for_each(|(x, p)| *x -= factor * p);
+            row.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= factor * p);
         }
     }
     // Entries in the order of the swapped columns, the last one free.
@@ -372,10 +331,7 @@ fn null_vector(rows: &mut [Wrench; 5]) -> Option<Wrench> {
     }
     let length = dot(&swapped, &swapped).sqrt();
     let mut x = [0.0; 6];
-    columns
-        .into_iter()
-        .zip(swapped)
-        .for_each(|(column, value)| x[column] = value / length);
+    columns.into_iter().zip(swapped).for_each(|(column, value)| x[column] = value / length);
     length.is_finite().then_some(x)
 }
 
@@ -414,10 +370,7 @@ mod tests {
             .collect();
         let found = inner_radius(&cube);
         assert!((found - 1.0).abs() < 1e-4, "{found}");
-        assert!(
-            inner_radius(&cross[..11]) < 1e-4,
-            "the origin is on the boundary"
-        );
+        assert!(inner_radius(&cross[..11]) < 1e-4, "the origin is on the boundary");
         assert_eq!(inner_radius(&cross[..4]), 0.0, "flat");
         assert_eq!(inner_radius(&[]), 0.0);
     }
@@ -426,15 +379,11 @@ mod tests {
     fn the_radius_is_the_least_support_over_all_facets() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         for _ in 0..5 {
-            let points: Vec<Wrench> = (0..12)
-                .map(|_| std::array::from_fn(|_| rng.random::<f64>() - 0.45))
-                .collect();
+            let points: Vec<Wrench> =
+                (0..12).map(|_| std::array::from_fn(|_| rng.random::<f64>() - 0.45)).collect();
             let found = inner_radius(&points);
             let support = |normal: &Wrench| {
-                points
-                    .iter()
-                    .map(|p| dot(normal, p))
-                    .fold(f64::NEG_INFINITY, f64::max)
+                points.iter().map(|p| dot(normal, p)).fold(f64::NEG_INFINITY, f64::max)
             };
             // Every six points whose plane has all others on one side make a facet.
             let mut least = f64::INFINITY;
@@ -450,10 +399,7 @@ mod tests {
                     }
                 }
             }
-            assert!(
-                (found - least.max(0.0)).abs() < 1e-4,
-                "{found} instead of {least}"
-            );
+            assert!((found - least.max(0.0)).abs() < 1e-4, "{found} instead of {least}");
         }
     }
 }
