@@ -10,9 +10,9 @@ const TOLERANCE: f64 = 1e-9;
 /// amount: wrenches of cones are full of coplanar groups, on which facets have no normal.
 const JOGGLE: f64 = 1e-5;
 
-/// Stops where rounding would let the hull grow for ever, with a radius that is then too small;
-/// hulls of two contacts take below 400.
-const MOST_FACETS: usize = 4000;
+/// Stops after so many rounds for each point, where rounding would let the hull grow for ever: a round makes a point a
+/// corner, and without rounding no point twice.
+const MOST_ROUNDS: usize = 4;
 
 /// A plane between two others is taken from them unless it is shorter than this, that is unless they are nearly opposite.
 const LEAST_BETWEEN: f64 = 1e-3;
@@ -47,13 +47,17 @@ struct Hull<'a> {
     points: &'a [Wrench],
     /// A point inside.
     centre: Wrench,
-    /// Facets of the hull, and former ones, whose plane is [`Plane::NONE`].
+    /// Facets of the hull, and former ones.
     facets: Vec<Facet>,
+    /// Offsets of their planes; infinite for former facets.
+    offsets: Vec<f64>,
     /// Places of former facets.
     free: Vec<u32>,
     /// What the last point sees: ids, and for each facet whether it is one of them.
     seen: Vec<u32>,
     is_seen: Vec<bool>,
+    /// Ridges around that: a facet of it, and which corner lies opposite.
+    rim: Vec<(u32, u8)>,
     /// Ridges of the latest facets that end in the apex: four corners, the facet, and which corner lies opposite.
     ridges: Vec<(u64, u32, u8)>,
 }
@@ -76,26 +80,19 @@ pub(crate) fn inner_radius(points: &[Wrench]) -> f64 {
         return 0.0;
     };
     let mut hull = Hull::of_simplex(&points, &simplex);
-    loop {
-        let Some(nearest) = hull.nearest() else {
-            return 0.0;
-        };
-        let Plane { normal, offset } = nearest;
-        let Some((apex, reach)) = points
-            .iter()
-            .map(|p| dot(&normal, p))
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+    let mut radius = 0.0;
+    for _ in 0..MOST_ROUNDS * points.len() {
+        let Some((first, Plane { normal, offset })) = hull.nearest() else { return 0.0 };
+        radius = offset.max(0.0);
+        let heights = points.iter().map(|p| dot(&normal, p)).enumerate();
+        let farthest = heights.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        let Some((apex, _)) = farthest.filter(|(_, reach)| *reach > offset + TOLERANCE * scale)
         else {
-            return 0.0;
+            break;
         };
-        if reach <= offset + TOLERANCE * scale || hull.facets.len() > MOST_FACETS {
-            return offset.max(0.0);
-        }
-        if !hull.expand(apex as u16, 1e-13 * scale) {
-            return offset.max(0.0);
-        }
+        hull.expand(apex as u16, first, 1e-13 * scale);
     }
+    radius
 }
 
 impl<'a> Hull<'a> {
@@ -103,15 +100,16 @@ impl<'a> Hull<'a> {
     fn of_simplex(points: &'a [Wrench], simplex: &[usize]) -> Self {
         let centre =
             std::array::from_fn(|d| simplex.iter().map(|&i| points[i][d]).sum::<f64>() / 7.0);
-        let facets = Vec::with_capacity(512);
-        let (free, seen, is_seen, ridges) = Default::default();
-        let mut hull = Self { points, centre, facets, free, seen, is_seen, ridges };
+        let (facets, offsets) = (Vec::with_capacity(512), Vec::with_capacity(512));
+        let (free, seen, is_seen, rim, ridges) = Default::default();
+        let mut hull = Self { points, centre, facets, offsets, free, seen, is_seen, rim, ridges };
         for left_out in 0..7 {
             let others = |k: usize| if k < left_out { k } else { k + 1 };
             let corners = std::array::from_fn(|k| simplex[others(k)] as u16);
             let neighbours = std::array::from_fn(|k| others(k) as u32);
             let plane = hull.plane_of(&corners).unwrap_or(Plane::NONE);
             hull.facets.push(Facet { corners, neighbours, plane, is_exact: true });
+            hull.offsets.push(plane.offset);
         }
         hull
     }
@@ -121,50 +119,59 @@ impl<'a> Hull<'a> {
         Plane::through(corners.map(|i| self.points[usize::from(i)]), &self.centre)
     }
 
-    /// The plane of the facet nearest to the origin; `None` where there is no facet.
-    fn nearest(&mut self) -> Option<Plane> {
+    /// The facet nearest to the origin, its plane that of its corners; `None` where there is no facet.
+    fn nearest(&mut self) -> Option<(u32, Plane)> {
         loop {
-            let offset = |facet: &Facet| facet.plane.offset;
-            let by_offset = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
-            let (at, least) = self.facets.iter().map(offset).enumerate().min_by(by_offset)?;
-            if self.facets[at].is_exact {
-                return (least < f64::INFINITY).then_some(self.facets[at].plane);
+            let offsets = self.offsets.iter().copied().enumerate();
+            let (at, least) = offsets.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let facet = self.facets[at];
+            if least == f64::INFINITY || facet.is_exact {
+                return (least < f64::INFINITY).then_some((at as u32, facet.plane));
             }
-            let plane = self.plane_of(&self.facets[at].corners);
+            let plane = self.plane_of(&facet.corners);
+            self.offsets[at] = plane.map_or(f64::INFINITY, |plane| plane.offset);
             self.facets[at].is_exact = true;
-            self.facets[at].plane = plane.unwrap_or(Plane::NONE);
+            self.facets[at].plane = plane.unwrap_or(facet.plane);
         }
     }
 
-    /// Replaces all facets that the point `apex` sees by those between it and the rim of what it sees. `false` where it
-    /// sees none.
-    fn expand(&mut self, apex: u16, least: f64) -> bool {
+    /// Replaces all facets that the point `apex` sees, one of which is `first`, by those between it and the rim of what it
+    /// sees.
+    fn expand(&mut self, apex: u16, first: u32, least: f64) {
         let p = self.points[usize::from(apex)];
+        // What a point sees of a convex surface hangs together.
         self.seen.clear();
+        self.seen.push(first);
         self.is_seen.clear();
-        for (id, facet) in (0u32..).zip(&self.facets) {
-            let sees = facet.plane.height(&p) > least;
-            self.is_seen.push(sees);
-            if sees {
-                self.seen.push(id);
-            }
-        }
-        self.ridges.clear();
-        for at in 0..self.seen.len() {
+        self.is_seen.resize(self.facets.len(), false);
+        self.is_seen[first as usize] = true;
+        self.rim.clear();
+        let mut at = 0;
+        while at < self.seen.len() {
             let seen = self.seen[at];
-            for k in 0..6 {
-                let beyond = self.facets[seen as usize].neighbours[k];
-                if beyond == NO_FACET || !self.is_seen[beyond as usize] {
-                    self.add_between(seen, k, apex);
+            at += 1;
+            for (k, beyond) in self.facets[seen as usize].neighbours.into_iter().enumerate() {
+                if beyond != NO_FACET && self.is_seen[beyond as usize] {
+                    continue;
+                }
+                if beyond != NO_FACET && self.facets[beyond as usize].plane.height(&p) > least {
+                    self.is_seen[beyond as usize] = true;
+                    self.seen.push(beyond);
+                } else {
+                    self.rim.push((seen, k as u8));
                 }
             }
         }
+        self.ridges.clear();
+        for at in 0..self.rim.len() {
+            let (seen, k) = self.rim[at];
+            self.add_between(seen, usize::from(k), apex);
+        }
         for &seen in &self.seen {
-            self.facets[seen as usize].plane = Plane::NONE;
+            self.offsets[seen as usize] = f64::INFINITY;
         }
         self.free.extend(&self.seen);
         self.join();
-        !self.seen.is_empty()
     }
 
     /// Adds the facet between `apex` and the ridge of a seen facet opposite its corner `k`.
@@ -194,8 +201,10 @@ impl<'a> Hull<'a> {
         let id = self.free.pop().unwrap_or(self.facets.len() as u32);
         if id as usize == self.facets.len() {
             self.facets.push(facet);
+            self.offsets.push(facet.plane.offset);
         } else {
             self.facets[id as usize] = facet;
+            self.offsets[id as usize] = facet.plane.offset;
         }
         self.replace(beyond, seen, id);
         for other in (0..6).filter(|&other| other != k) {
@@ -261,7 +270,7 @@ fn first_simplex(points: &[Wrench], scale: f64) -> Option<Vec<usize>> {
 }
 
 impl Plane {
-    /// Seen by no point, and farther from the origin than all others.
+    /// Of corners that span none: seen by no point, and farther from the origin than all others.
     const NONE: Self = Self { normal: [0.0; 6], offset: f64::INFINITY };
 
     /// The plane through six points with `inside` below it; `None` where they span less.
