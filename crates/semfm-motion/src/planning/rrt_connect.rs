@@ -216,8 +216,7 @@ impl<V: Validity> Search<'_, V> {
         if !arrived {
             end = between(start, &end, self.longest_edge / distance);
         }
-        self.validity
-            .motion_is_free(start, &end)
+        edge_is_free(self.validity, start, &end)
             .then(|| Step { node: tree.add(&end, from), arrived })
     }
 }
