@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
+from .._identity import content_name
 from .._semfm import write_file
 from ..sidecar.errors import SidecarError
 from .endpoint import Endpoint, Reply
@@ -48,7 +48,7 @@ class CachedEndpoint:
 
     def _name(self, question: Question) -> str:
         decides = {"question": question.content(), "endpoint": self.describe()}
-        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+        return content_name(decides)
 
 
 def _read(path: Path) -> Reply | None:

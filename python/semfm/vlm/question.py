@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from .._identity import picture_identity
 from . import marking
 from .object_views import ObjectView
 
@@ -50,7 +51,7 @@ class Question:
 
     def content(self) -> dict[str, Any]:
         """All that the model is given, pictures by the hash of their pixels."""
-        parts = [part if isinstance(part, str) else _hash(part) for part in self.parts]
+        parts = [part if isinstance(part, str) else picture_identity(part) for part in self.parts]
         return {"system": self.system, "parts": parts, "schema": self.schema()}
 
     def schema(self) -> dict[str, Any]:
@@ -139,8 +140,3 @@ def _prompt(name: str, **values: object) -> str:
 @cache
 def _file(name: str) -> str:
     return (resources.files(__package__) / "prompts" / f"{name}.md").read_text("utf-8")
-
-
-def _hash(picture: Image.Image) -> str:
-    size = f"{picture.mode} {picture.width} {picture.height} ".encode()
-    return "sha256:" + hashlib.sha256(size + picture.tobytes()).hexdigest()
