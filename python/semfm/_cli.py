@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Union
 
 from .errors import SemfmError
@@ -13,7 +14,15 @@ from .errors import SemfmError
 _Word = Union[str, "os.PathLike[str]"]
 
 
-def run_semfm_cli(words: Sequence[_Word]) -> list[str]:
+@dataclass(frozen=True)
+class CliAnswer:
+    """What a command printed: data (stdout) and the lines of its messages (stderr)."""
+
+    data: str
+    messages: list[str]
+
+
+def run_semfm_cli(words: Sequence[_Word]) -> CliAnswer:
     """Runs ``semfm-cli WORDS`` of this installation in a process of its own.
 
     Parameters
@@ -23,8 +32,7 @@ def run_semfm_cli(words: Sequence[_Word]) -> list[str]:
 
     Returns
     -------
-    list of str
-        The lines of its messages.
+    CliAnswer
 
     Raises
     ------
@@ -36,7 +44,7 @@ def run_semfm_cli(words: Sequence[_Word]) -> list[str]:
     lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
     if done.returncode != 0:
         raise SemfmError(_reason(lines) or f"semfm-cli {words[0]}: exit code {done.returncode}")
-    return lines
+    return CliAnswer(done.stdout, lines)
 
 
 def _reason(lines: Sequence[str]) -> str:

@@ -1,7 +1,9 @@
-"""A chat-completions server for tests that misbehaves on command."""
+"""A server of chat completions and of picture edits for tests that misbehaves on command."""
 
 from __future__ import annotations
 
+import base64
+import email
 import json
 import threading
 import time
@@ -31,13 +33,18 @@ class Handler(BaseHTTPRequestHandler):
     fake: FakeEndpoint
 
     def do_POST(self) -> None:
-        body = json.loads(self.rfile.read(int(self.headers["content-length"])))
+        kind, data = (
+            self.headers["content-type"],
+            self.rfile.read(int(self.headers["content-length"])),
+        )
+        is_form = kind.startswith("multipart/form-data")
+        body = form(kind, data) if is_form else json.loads(data)
         with self.fake.lock:
             self.fake.requests.append(body)
             self.fake.keys.append(self.headers.get("authorization"))
             self.fake.times.append(time.monotonic())
             act = self.fake.acts.pop(0) if len(self.fake.acts) > 1 else self.fake.acts[0]
-        if self.path != "/v1/chat/completions":
+        if self.path != ("/v1/images/edits" if is_form else "/v1/chat/completions"):
             return status(404)(self)
         answer(act)(self) if isinstance(act, str) else act(self)
 
@@ -69,6 +76,24 @@ def answer(text: str | None, finish_reason: str = "stop", **message: object):
         ],
         "usage": {"prompt_tokens": 100, "completion_tokens": 20, "total_tokens": 120},
     }
+    return raw(json.dumps(body))
+
+
+def form(kind: str, data: bytes) -> dict[str, Union[str, bytes]]:
+    """The fields of a form: bytes where a field is a file, else text."""
+    message = email.message_from_bytes(b"content-type: " + kind.encode() + b"\r\n\r\n" + data)
+    fields: dict[str, Union[str, bytes]] = {}
+    for part in message.get_payload():
+        value = part.get_payload(decode=True)
+        name = part.get_param("name", header="content-disposition")
+        fields[name] = value if part.get_filename() else value.decode()
+    return fields
+
+
+def edited(picture: bytes, **more: object):
+    """A sound answer to an edit: the bytes of a picture's file."""
+    entry = {"b64_json": base64.b64encode(picture).decode(), **more}
+    body = {"created": 1, "data": [entry], "usage": {"total_tokens": 1200}}
     return raw(json.dumps(body))
 
 

@@ -97,6 +97,9 @@ def from_numpy(array):
 
 CAMERA = {"fx": 300.0, "fy": 310.0, "cx": 110.0, "cy": 80.0}
 SIZE = (240, 180)
+#: Colours, sRGB from 0 to 1.
+MUG_COLOR = (0.35, 0.5, 0.75)
+SKIN = (0.9, 0.7, 0.58)
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,11 @@ class Scene:
         return str(self.folder / "picture.png")
 
     @property
+    def reference(self) -> str:
+        """The mug without the hand."""
+        return str(self.folder / "reference.png")
+
+    @property
     def checkout(self) -> Path:
         return self.folder / "checkout"
 
@@ -127,9 +135,9 @@ class Scene:
         path.write_text(json.dumps({**json.loads(path.read_text()), **truth}))
 
 
-def make_scene(folder: Path) -> Scene:
+def make_scene(folder: Path, instance: int = 0) -> Scene:
     """Writes the files. Nothing stands in the middle of the picture: no wrong sign goes unseen."""
-    demo = semfm.demo_object("containers", n_vertices=1500)
+    demo = semfm.demo_object("containers", instance=instance, n_vertices=1500)
     turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     scale = 0.14 / demo.mesh.diagonal
     mug = semfm.Mesh(scale * demo.mesh.vertices @ turn.T + [0.045, 0.02, 0.5], demo.mesh.faces)
@@ -137,13 +145,17 @@ def make_scene(folder: Path) -> Scene:
     ball = semfm.zoo.icosphere(4)
     hand = semfm.Mesh(ball.vertices * [0.02, 0.05, 0.02] + grip + [0.0, 0.0, -0.015], ball.faces)
     camera = semfm.Pinhole.with_pixel_centres_at_integers(*SIZE, *CAMERA.values())
-    views = [semfm.render(mesh, [camera], supersampling=1)[0] for mesh in (mug, hand)]
+    views = [
+        semfm.render(mesh, [camera], colors=np.tile(color, (mesh.n_vertices, 1)))[0]
+        for mesh, color in ((mug, MUG_COLOR), (hand, SKIN))
+    ]
     depths = [np.asarray(view.depth, dtype=np.float64) for view in views]
     nearest = np.minimum(*depths)
     masks = [np.isfinite(depth) & (depth == nearest) for depth in depths]
     picture = np.where(masks[1][..., None], views[1].rgb, views[0].rgb)
     folder.mkdir(parents=True, exist_ok=True)
     Image.fromarray(picture).save(folder / "picture.png")
+    Image.fromarray(views[0].rgb).save(folder / "reference.png")
     for name, mask in zip(("mask", "hand"), masks):
         Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(folder / f"{name}.png")
     np.save(folder / "depth.npy", np.where(np.isfinite(nearest), nearest, 0).astype(np.float32))

@@ -186,7 +186,7 @@ def _command(module, *words, **options):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a system without /dev/full")
-@pytest.mark.parametrize("module", ["semfm.sidecar", "semfm.vlm", "semfm.reconstruct", "semfm.batch", "semfm"])
+@pytest.mark.parametrize("module", ["semfm.sidecar", "semfm.vlm", "semfm.reconstruct", "semfm.dataset", "semfm.batch", "semfm"])
 def test_every_command_says_that_stdout_is_full(module):
     with open("/dev/full", "w") as full:
         run = _command(module, "--help", stdout=full)

@@ -109,7 +109,7 @@ def read_seen(
             words.append(f"--depth={os.fspath(depth)}")
         if depth_scale is not None:
             words.append(f"--depth-scale={depth_scale}")
-        notes = run_semfm_cli([*words, "--quiet", "-o", os.fspath(scene)])
+        notes = run_semfm_cli([*words, "--quiet", "-o", os.fspath(scene)]).messages
         seen = _read_scene(scene, len(masks), intrinsics is not None, notes)
     if seen.depth is not None:
         for name, mask in zip(masks, seen.masks):
