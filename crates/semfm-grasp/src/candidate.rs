@@ -3,6 +3,8 @@
 use parry3d_f64::math::{Pose, Rotation};
 use semfm_geom::math::{DMat3, DVec3};
 
+use crate::grasp::Grasp;
+
 /// Where the gripper might go, before anybody has checked it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -10,6 +12,13 @@ pub(crate) struct Candidate {
     pub(crate) tcp: Pose,
     /// An interval along the TCP's y axis that the grasp is to hold, metres.
     pub(crate) seed: [f64; 2],
+}
+
+impl Candidate {
+    /// The pose of a grasp, to be examined once more or moved.
+    pub(crate) fn again(grasp: &Grasp) -> Self {
+        Self { tcp: grasp.object_from_tcp, seed: [-grasp.width / 2.0, grasp.width / 2.0] }
+    }
 }
 
 /// The rotation whose y and z axes are `closing` and `approach` (unit, orthogonal).

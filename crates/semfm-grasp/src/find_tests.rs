@@ -242,6 +242,23 @@ fn noise_of_half_a_percent_leaves_half_of_the_grasps() {
     assert!(4 * bare.n_survivors < good.n_survivors, "without smoothing {}", bare.n_survivors);
 }
 
+/// Where few are asked for, most grasps are told from them before their score is known.
+#[test]
+fn the_few_best_are_those_of_all() {
+    let best = |top: usize| {
+        let settings =
+            GraspSettings { n_samples: 60, top, diversity: 0.0, ..GraspSettings::default() };
+        search(&hammer(), &Scene::new(), &settings)
+    };
+    let (few, all) = (best(5), best(usize::MAX));
+    assert!(all.grasps.len() > 200, "{}", all.grasps.len());
+    assert_eq!(few.grasps.len(), 5);
+    for (one, other) in few.grasps.iter().zip(&all.grasps) {
+        assert!((one.score - other.score).abs() < 1e-9 && one.is_scored(), "{one:?} {other:?}");
+    }
+    assert!(all.grasps.iter().all(crate::grasp::Grasp::is_scored));
+}
+
 /// Whether a point of the mesh, or of the middle of one of its edges, is inside of a box of the closed default gripper:
 /// told without any of the code that the search uses.
 fn meets(mesh: &Mesh, width: f64, tcp: &Pose) -> bool {

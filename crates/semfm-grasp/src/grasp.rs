@@ -64,6 +64,11 @@ impl Grasp {
         self.object_from_tcp.rotation * DVec3::Y
     }
 
+    /// Whether `score` is the score, and no bound of it.
+    pub(crate) fn is_scored(&self) -> bool {
+        !self.terms.is_empty()
+    }
+
     /// The value of the term called `name`.
     pub fn term(&self, name: &str) -> Option<f64> {
         self.terms.iter().find(|term| term.0 == name).map(|term| term.1)

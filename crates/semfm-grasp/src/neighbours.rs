@@ -24,9 +24,9 @@ pub(crate) fn neighbours(
     kept.iter().for_each(|grasp| grid.insert(&grasp.object_from_tcp));
     let mut proposed = Vec::new();
     for grasp in frontier {
-        let seed = [-grasp.width / 2.0, grasp.width / 2.0];
+        let Candidate { tcp: here, seed } = Candidate::again(grasp);
         for motion in &moves {
-            let tcp = grasp.object_from_tcp * *motion;
+            let tcp = here * *motion;
             if !grid.has_near(&tcp) {
                 grid.insert(&tcp);
                 proposed.push(Candidate { tcp, seed });

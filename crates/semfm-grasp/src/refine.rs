@@ -13,7 +13,7 @@ use crate::select::suppress;
 use crate::settings::Separation;
 
 /// Grasps that climb: 32 take 1.7 s where a whole search takes 10, and end where 10 do.
-const CLIMBERS: usize = 10;
+pub(crate) const CLIMBERS: usize = 10;
 
 /// Lengths of the steps, as shares of the distance that makes two grasps two: from a centimetre to a millimetre.
 const STEPS: [f64; 4] = [1.0, 0.5, 0.25, 0.12];
@@ -62,13 +62,20 @@ impl Search<'_> {
     }
 
     fn best_neighbour(&self, grasp: &Grasp, moves: &[Pose]) -> Option<Grasp> {
-        let seed = [-grasp.width / 2.0, grasp.width / 2.0];
+        let here = Candidate::again(grasp);
+        let least = grasp.score + RISE;
         let tried = moves.iter().filter_map(|motion| {
-            let tcp = grasp.object_from_tcp * *motion;
-            self.examine(&Candidate { tcp, seed }).ok()
+            self.examine_above(&Candidate { tcp: here.tcp * *motion, ..here }, least).ok()
         });
         let best = tried.reduce(|a, b| if b.score > a.score { b } else { a })?;
-        (best.score > grasp.score + RISE).then_some(best)
+        (best.score > least).then_some(best)
+    }
+
+    /// How many grasps are to pass on the object as it is, where contacts are sought on a simpler surface.
+    pub(crate) fn n_examined_exactly(&self) -> Option<usize> {
+        let (times, least) = EXAMINED;
+        let wanted = self.settings().top.saturating_mul(times).max(least);
+        self.object().is_simplified().then_some(wanted)
     }
 
     /// Where contacts were sought on a simpler surface: the best grasps (`all` of them, or a multiple of those asked
@@ -78,11 +85,9 @@ impl Search<'_> {
             return Ok(found);
         }
         let Found { kept, mut n_survivors, mut sampled } = found;
-        let (times, least) = EXAMINED;
-        let wanted =
-            if all { usize::MAX } else { self.settings().top.saturating_mul(times).max(least) };
+        let wanted = self.n_examined_exactly().filter(|_| !all).unwrap_or(usize::MAX);
         let mut exact = Vec::new();
-        for part in kept.chunks(least) {
+        for part in kept.chunks(EXAMINED.1) {
             let results: Vec<std::result::Result<Grasp, Box<Near>>> = part
                 .par_iter()
                 .map(|grasp| task.check().map(|()| self.examine_exactly(grasp)))

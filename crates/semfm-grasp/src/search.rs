@@ -22,9 +22,10 @@ use crate::grasp::Grasp;
 use crate::gripper_geometry::GripperGeometry;
 use crate::neighbours::neighbours;
 use crate::object::{Body, GraspObject, Region, Surface};
+use crate::refine::CLIMBERS;
 use crate::rejection::{Miss, Reason, Refusal, Rejected};
 use crate::scene::Scene;
-use crate::score::Scorer;
+use crate::score::{Score, Scorer};
 use crate::select::suppress;
 use crate::settings::GraspSettings;
 
@@ -152,12 +153,13 @@ impl<'a> Search<'a> {
         let rounds = self.settings.neighbour_rounds;
         for round in 0..rounds {
             task.step("spread", round, rounds)?;
+            let least = self.least_returned(&kept);
             let mut part = Sampled::default();
             let candidates = neighbours(&frontier, &kept, separation);
             part.n_candidates = candidates.len();
             let results: Vec<_> = candidates
                 .par_iter()
-                .map(|candidate| task.check().map(|()| self.examine(candidate)))
+                .map(|candidate| task.check().map(|()| self.examine_above(candidate, least)))
                 .collect::<std::result::Result<_, _>>()?;
             results.into_iter().for_each(|result| part.record(result));
             n_survivors += part.grasps.len();
@@ -168,11 +170,46 @@ impl<'a> Search<'a> {
                 kept.iter().filter(|grasp| !before.contains(&pose_bits(grasp))).cloned().collect();
             sampled.absorb(part);
         }
-        Ok(Found { kept, n_survivors, sampled })
+        Ok(Found { kept: self.scored(kept), n_survivors, sampled })
+    }
+
+    /// The score that a grasp must reach to be returned, as far as is known: of `kept` (best first) so many reach it
+    /// that enough are left where all that climb become one, or half of those examined on the object as it is fail.
+    fn least_returned(&self, kept: &[Grasp]) -> f64 {
+        let GraspSettings { top, diversity, .. } = *self.settings;
+        let wanted = self.n_examined_exactly().map_or(top, |n| n.saturating_mul(2));
+        let last = wanted.saturating_add(CLIMBERS);
+        let of_last = kept.iter().filter(|grasp| grasp.is_scored()).nth(last - 1);
+        of_last.map_or(f64::NEG_INFINITY, |grasp| (1.0 - diversity) * grasp.score)
+    }
+
+    /// Without those whose score is not known because it cannot reach that of any returned.
+    fn scored(&self, kept: Vec<Grasp>) -> Vec<Grasp> {
+        let least = self.least_returned(&kept);
+        let mut scored: Vec<Grasp> = kept
+            .into_iter()
+            .filter_map(|grasp| match grasp.is_scored() {
+                true => Some(grasp),
+                // What was better has been merged since.
+                false if grasp.score >= least => self.examine(&Candidate::again(&grasp)).ok(),
+                false => None,
+            })
+            .collect();
+        scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+        scored
     }
 
     /// The stages, cheap ones first.
     pub(crate) fn examine(&self, candidate: &Candidate) -> std::result::Result<Grasp, Box<Near>> {
+        self.examine_above(candidate, f64::NEG_INFINITY)
+    }
+
+    /// [`Search::examine`], but where the score cannot reach `least` the grasp has a bound of it instead, and no terms.
+    pub(crate) fn examine_above(
+        &self,
+        candidate: &Candidate,
+        least: f64,
+    ) -> std::result::Result<Grasp, Box<Near>> {
         self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
         let mut closing = self.closed(candidate, self.object.touched(), self.region.touched())?;
         let refused = |refusal, closing: &Closing| Near::boxed(refusal, candidate, Some(closing));
@@ -180,7 +217,7 @@ impl<'a> Search<'a> {
         if let Some(reach) = self.object.deviation() {
             closing = widened(closing, self.object.exact(), self.gripper, reach);
         }
-        self.examine_closed(&closing, angle).map_err(|refusal| refused(refusal, &closing))
+        self.examine_closed(&closing, angle, least).map_err(|refusal| refused(refusal, &closing))
     }
 
     /// The stages on the surface that answers are of.
@@ -206,7 +243,7 @@ impl<'a> Search<'a> {
         self.approach(candidate).map_err(|refusal| Near::boxed(refusal, candidate, None))?;
         let closing = self.closed(candidate, self.object.exact(), self.region.given())?;
         self.contacts(&closing)
-            .and_then(|angle| self.examine_closed(&closing, angle))
+            .and_then(|angle| self.examine_closed(&closing, angle, f64::NEG_INFINITY))
             .map_err(|refusal| Near::boxed(refusal, candidate, Some(&closing)))
     }
 
@@ -223,11 +260,22 @@ impl<'a> Search<'a> {
     }
 
     /// The stages after the contacts are found good.
-    fn examine_closed(&self, closing: &Closing, angle: f64) -> std::result::Result<Grasp, Refusal> {
+    fn examine_closed(
+        &self,
+        closing: &Closing,
+        angle: f64,
+        least: f64,
+    ) -> std::result::Result<Grasp, Refusal> {
         self.width(closing)?;
         self.collision.above_table(closing)?;
         let fit = self.collision.fit(closing)?;
-        Ok(self.grasp(closing, &fit, angle))
+        let unknown = least > f64::NEG_INFINITY;
+        let bound = unknown.then(|| self.scorer.at_most(closing, &fit, angle));
+        let score = match bound.filter(|bound| *bound < least) {
+            Some(bound) => Score::of_bound(bound),
+            None => self.scorer.score(closing, &fit, angle),
+        };
+        Ok(self.grasp(closing, &fit, score))
     }
 
     fn approach(&self, candidate: &Candidate) -> std::result::Result<(), Refusal> {
@@ -263,8 +311,7 @@ impl<'a> Search<'a> {
         Ok(angle)
     }
 
-    fn grasp(&self, closing: &Closing, fit: &Fit, angle: f64) -> Grasp {
-        let score = self.scorer.score(closing, fit, angle);
+    fn grasp(&self, closing: &Closing, fit: &Fit, score: Score) -> Grasp {
         Grasp {
             object_from_tcp: closing.tcp,
             width: fit.width,
