@@ -221,9 +221,16 @@ def fit(arguments) -> None:
     names = [name for name in PHYSICAL if name in records[0]["terms"]]
     p = left_out(records, names)
     print(f"\n{len(records)} trials, {usual.sum()} at the usual grip, {len({r['object'] for r in records})} objects")
-    print(f"AUC, left-out objects: usual {roc_auc_score(y[usual], p[usual]):.3f}, all {roc_auc_score(y, p):.3f}")
     own = np.array([r["score"] for r in records])
-    print(f"AUC of the program's score, usual: {roc_auc_score(y[usual], own[usual]):.3f}")
+    hands = np.array([r["hand"] for r in records])
+    print("\n| hand | trials at the usual grip | held | strict | AUC of the fit, left-out objects | AUC of the score |")
+    print("|---|---|---|---|---|---|")
+    held = np.array([r["hold"] for r in records])
+    for hand in (*HANDS, "all"):
+        of = usual & ((hands == hand) | (hand == "all"))
+        areas = [roc_auc_score(y[of], said[of]) for said in (p, own)]
+        print(f"| {hand} | {of.sum()} | {held[of].mean():.2f} | {y[of].mean():.2f} | {areas[0]:.3f} | {areas[1]:.3f} |")
+    print(f"AUC of the fit over all grips, left-out objects: {roc_auc_score(y, p):.3f}")
     chosen = model().fit(features(records, names), y)
     print("\n| term | weight | alone | without it |")
     print("|---|---|---|---|")

@@ -285,9 +285,14 @@ fn what_is_missing_is_named() {
         assert!(!mug.at("never.json").exists());
     }
     let text = |name: &str| mug.at(name).to_str().unwrap().to_owned();
-    for (gripper, word) in
-        [("barrett".to_owned(), "robotiq-2f85"), (text("broken.urdf"), "broken.urdf")]
-    {
+    std::fs::write(mug.at("three.urdf"), hand_of_three_fingers()).unwrap();
+    for (gripper, word) in [
+        ("barrett".to_owned(), "robotiq-2f85"),
+        ("barrett".to_owned(), "suction cups and hands of three or more fingers are not covered"),
+        (text("broken.urdf"), "broken.urdf"),
+        (text("three.urdf"), "three.urdf: no gripper found: expected two fingers"),
+        (text("three.urdf"), "suction cups and hands of three or more fingers are not covered"),
+    ] {
         let (mesh, region, out) = (text("mug.obj"), text("grip.json"), text("never.json"));
         let answer = run(&[
             "grasp",
@@ -303,4 +308,22 @@ fn what_is_missing_is_named() {
         assert_eq!(answer.code, Some(2), "{answer:?}");
         assert!(answer.err.contains(word), "{}", answer.err);
     }
+}
+
+/// Three equal fingers around a palm that close on its middle, as URDF.
+fn hand_of_three_fingers() -> String {
+    let mut urdf = "<robot name='three'><link name='palm'/>".to_owned();
+    for i in 0..3 {
+        let turn = f64::from(i) * std::f64::consts::TAU / 3.0;
+        let (sin, cos) = turn.sin_cos();
+        urdf += &format!(
+            "<link name='finger_{i}'><collision><geometry><box size='0.02 0.01 0.06'/></geometry></collision></link>
+            <joint name='drive_{i}' type='prismatic'><parent link='palm'/><child link='finger_{i}'/>
+              <origin xyz='{} {} 0' rpy='0 0 {turn}'/><axis xyz='0 1 0'/>
+              <limit lower='0' upper='0.04' effort='1' velocity='1'/></joint>",
+            0.05 * sin,
+            -0.05 * cos
+        );
+    }
+    urdf + "</robot>"
 }
