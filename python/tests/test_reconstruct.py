@@ -438,7 +438,7 @@ def test_bad_input_is_refused_by_name(scene, tmp_path, capsys):
         ([scene.picture, *scene.words("mask", "depth")], "--intrinsics beside it"),
         (
             [scene.picture, *scene.words("mask", "intrinsics"), "--depth", empty],
-            "at least 30 pixels with a depth",
+            "at least 30 pixels under it with a depth, found 0 of",
         ),
         ([scene.picture, *scene.words("mask"), *depth, "--longest", 0.1], "--longest"),
         ([scene.picture, *scene.words("mask"), "--longest", -1], "0 to 100 metres"),

@@ -227,6 +227,8 @@ def _in_metres(args: argparse.Namespace, made: Reconstruction, seen: Seen | None
 def _made_by_tool(
     args: argparse.Namespace, seen: Seen, stages: _Stages
 ) -> tuple[Reconstruction, dict[str, Any]]:
+    for file, mask in zip((args.mask, args.hand_mask), seen.masks):
+        seen.check_returns(mask, file)
     options = {"checkout": args.sam3d, "config": args.sam3d_config}
     tool = open_tool(args.tool, **(options if args.tool in TOOLS else {}))
     stages.done("load")

@@ -65,6 +65,17 @@ class Seen:
         rays = self.camera.rays(pixels).reshape(height, width, 3)
         return (self.depth[:, :, None] * rays).astype(np.float32)
 
+    def check_returns(self, mask: NDArray[np.bool_], name: str) -> None:
+        """Refuses a mask under which fewer than :data:`RETURNS_AT_LEAST` pixels have a depth, where
+        there is depth; raises SidecarError.
+        """
+        if self.depth is None:
+            return
+        n_returns = int(np.isfinite(self.depth[mask]).sum())
+        if n_returns < RETURNS_AT_LEAST:
+            wanted = f"at least {RETURNS_AT_LEAST} pixels under it with a depth"
+            raise expected(name, "mask", wanted, f"{n_returns} of {int(mask.sum())}")
+
 
 def read_seen(
     picture: _Path,
@@ -91,8 +102,7 @@ def read_seen(
     Raises
     ------
     SidecarError
-        For what is not as it must be, in the words of `semfm-cli`, and for a mask under which fewer
-        than :data:`RETURNS_AT_LEAST` pixels have a depth.
+        For what is not as it must be, in the words of `semfm-cli`.
     """
     if depth is not None and intrinsics is None:
         raise expected("--depth", "camera", "--intrinsics beside it", "none")
@@ -111,12 +121,6 @@ def read_seen(
             words.append(f"--depth-scale={depth_scale}")
         notes = run_semfm_cli([*words, "--quiet", "-o", os.fspath(scene)]).messages
         seen = _read_scene(scene, len(masks), intrinsics is not None, notes)
-    if seen.depth is not None:
-        for name, mask in zip(masks, seen.masks):
-            n_returns = int(np.isfinite(seen.depth[mask]).sum())
-            if n_returns < RETURNS_AT_LEAST:
-                wanted = f"at least {RETURNS_AT_LEAST} pixels with a depth under {name}"
-                raise expected(depth, "depth", wanted, f"{n_returns} of {int(mask.sum())}")
     return seen
 
 
