@@ -76,6 +76,7 @@ pub fn make(workspace: &Workspace) -> Result<()> {
     for name in ["transfer", "features", "grasps"] {
         keep(workspace, &at(&format!("transfer/{name}.png")), name)?;
     }
+    keep(workspace, &at("plan/motion.png"), "motion")?;
     keep(workspace, &at("views.png"), "views")?;
     match photograph(workspace, &made)? {
         Some(picture) => keep(workspace, &picture, "page")?,
