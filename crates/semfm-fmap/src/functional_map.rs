@@ -33,20 +33,21 @@ impl FunctionalMap {
     ) -> Result<Self> {
         Error::length("point map (target vertices)", target.n_vertices(), map.n_target())?;
         check_size("the functional map", k, source, target)?;
-        Ok(Self::projected(map.pull_back_basis(source, k), target))
+        Ok(Self::projected(map.pull_back_basis(source, k), target.first(k), &target.mass))
     }
 
-    /// Φ_targetᵀ M_target F of functions F (n_target × k) on the target, of size k × k.
-    pub(crate) fn projected(mut functions: Mat<f64>, target: &Eigenbasis) -> Self {
+    /// Φ_targetᵀ M_target F of functions F (n × k) on vertices of the target that have these rows of the basis
+    /// (n × k) and these masses (n); of size k × k.
+    pub(crate) fn projected(mut functions: Mat<f64>, basis: MatRef<'_, f64>, mass: &[f64]) -> Self {
         let k = functions.ncols();
         for c in 0..k {
-            for (x, m) in functions.col_mut(c).iter_mut().zip(&target.mass) {
+            for (x, m) in functions.col_as_slice_mut(c).iter_mut().zip(mass) {
                 *x *= m;
             }
         }
         let mut matrix = Mat::zeros(k, k);
-        let basis = target.first(k).transpose();
-        matmul(matrix.as_mut(), Accum::Replace, basis, functions.as_ref(), 1.0, Par::Seq);
+        let (basis, functions) = (basis.transpose(), functions.as_ref());
+        matmul(matrix.as_mut(), Accum::Replace, basis, functions, 1.0, Par::Seq);
         Self { matrix }
     }
 

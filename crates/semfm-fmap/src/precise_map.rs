@@ -223,7 +223,7 @@ impl FunctionalMap {
         Error::length("precise map (target vertices)", target.n_vertices(), map.n_target())?;
         Error::length("precise map (source vertices)", source.n_vertices(), map.n_source())?;
         check_size("the functional map", k, source, target)?;
-        Ok(Self::projected(map.pull_back_basis(source.first(k)), target))
+        Ok(Self::projected(map.pull_back_basis(source.first(k)), target.first(k), &target.mass))
     }
 }
 

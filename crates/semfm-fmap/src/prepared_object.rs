@@ -299,10 +299,10 @@ impl PreparedObject {
     pub(crate) fn rows_onto_vertices(&self, on_points: MatRef<'_, f64>) -> Mat<f64> {
         let mix = &self.derived.mix;
         let mut out = Mat::zeros(self.point_of_vertex().len(), on_points.ncols());
-        for c in 0..on_points.ncols() {
-            let column = on_points.col(c);
-            let mixed = mix.points.chunks(mix.count).zip(mix.weights.chunks(mix.count));
-            for (x, (points, weights)) in out.col_mut(c).iter_mut().zip(mixed) {
+        for (c, column) in on_points.col_iter().enumerate() {
+            let column: Vec<f64> = column.iter().copied().collect();
+            let mixed = mix.points.chunks_exact(mix.count).zip(mix.weights.chunks_exact(mix.count));
+            for (x, (points, weights)) in out.col_as_slice_mut(c).iter_mut().zip(mixed) {
                 *x = points.iter().zip(weights).map(|(&j, w)| w * column[j as usize]).sum();
             }
         }

@@ -27,8 +27,7 @@ pub(crate) struct Equations<'a> {
 pub(crate) fn least_squares(blocks: &[Equations<'_>]) -> Result<FunctionalMap> {
     let left: Vec<_> = blocks.iter().map(|block| block.left).collect();
     let projection = SampledProjection::new(&left)?;
-    let right: Vec<_> = blocks.iter().map(|block| block.right).collect();
-    Ok(projection.solve(&left, &right))
+    Ok(projection.solve(blocks))
 }
 
 /// The left-hand side of such equations. That of fewer functions is a leading block of it, and so is its Cholesky factor,
@@ -54,12 +53,12 @@ impl SampledProjection {
         Ok(Self { factor: gram.llt(Side::Lower).map_err(failed)? })
     }
 
-    /// C (k × k_source) from the first k columns of the blocks A and the blocks B (rows × k_source each).
-    pub fn solve(&self, left: &[MatRef<'_, f64>], right: &[MatRef<'_, f64>]) -> FunctionalMap {
-        let k = left[0].ncols();
-        let mut map = Mat::<f64>::zeros(k, right[0].ncols());
-        for (a, b) in left.iter().zip(right) {
-            matmul(map.as_mut(), Accum::Add, a.transpose(), b, 1.0, Par::Seq);
+    /// C (k × k_source) from the first k columns of the blocks A and the blocks B.
+    pub fn solve(&self, blocks: &[Equations<'_>]) -> FunctionalMap {
+        let k = blocks[0].left.ncols();
+        let mut map = Mat::<f64>::zeros(k, blocks[0].right.ncols());
+        for Equations { left, right } in blocks {
+            matmul(map.as_mut(), Accum::Add, left.transpose(), right, 1.0, Par::Seq);
         }
         let lower = self.factor.L().submatrix(0, 0, k, k);
         solve_lower_triangular_in_place(lower, map.as_mut(), Par::Seq);
@@ -78,7 +77,7 @@ mod tests {
         let right = Mat::from_fn(40, 6, |i, j| ((i * j + 2 * j) as f64).cos());
         let all = SampledProjection::new(&[left.as_ref()]).unwrap();
         let few = left.subcols(0, 6);
-        let found = all.solve(&[few], &[right.as_ref()]);
+        let found = all.solve(&[Equations { left: few, right: right.as_ref() }]);
         // (Aᵀ A + ρ I) C = Aᵀ B
         let mut rest = few.transpose() * (few * found.matrix()) - few.transpose() * &right;
         rest += RIDGE * 40.0 * found.matrix();

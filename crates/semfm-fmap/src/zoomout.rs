@@ -8,9 +8,8 @@ use faer::MatRef;
 use semfm_geom::{Eigenbasis, Task};
 
 use crate::functional_map::check_size;
-use crate::match_search::{Direction, MatchSearch};
-use crate::point_map::rows_of;
-use crate::sampled_projection::{Equations, SampledProjection, least_squares};
+use crate::match_search::{Direction, MatchSearch, all_matches};
+use crate::sampled_projection::{SampledProjection, least_squares};
 use crate::{Error, FunctionalMap, PointMap, Result};
 
 /// One shape as ZoomOut sees it.
@@ -90,29 +89,23 @@ pub fn zoomout(
     if k == k_final {
         return Ok(map);
     }
-    let sampled = match target.samples {
-        [] => None,
-        samples => {
-            let rows = rows_of(target.basis.first(k_final), samples);
-            Some((SampledProjection::new(&[rows.as_ref()])?, rows))
-        }
-    };
     let (on_source, on_target) = ((source, source.samples), (target, target.samples));
     let mut search =
         MatchSearch::new(on_source, on_target, k_final, weight, Direction::TargetToSource);
+    let sampled = match target.samples {
+        [] => None,
+        _ => Some(SampledProjection::new(&[search.target_basis()])?),
+    };
+    let vertices = search.target_vertices();
+    let mass: Vec<f64> = vertices.map(|v| target.basis.mass[v as usize]).collect();
     while k < k_final {
         task.step("zoomout", k, k_final)?;
-        let source_of = search.matches(&map)?;
+        search.turn(&map)?;
         k = (k + settings.step).min(k_final);
+        let matched = search.matched(k);
         map = match &sampled {
-            None => {
-                let points = PointMap { source_of };
-                FunctionalMap::from_point_map(&points, source.basis, target.basis, k)?
-            }
-            Some((projection, rows)) => {
-                let right = rows_of(source.basis.first(k), &source_of);
-                projection.solve(&[rows.subcols(0, k)], &[right.as_ref()])
-            }
+            None => FunctionalMap::projected(matched.on_points, matched.on_queries, &mass),
+            Some(projection) => projection.solve(&[matched.equations()]),
         };
     }
     Ok(map)
@@ -134,7 +127,7 @@ pub fn zoomout_bidirectional(
     task: &Task,
 ) -> Result<FunctionalMap> {
     check(settings, source, target)?;
-    let Matches { mut source_of, mut target_of } = matches;
+    let Matches { source_of, target_of } = matches;
     Error::length("matches of the target's samples", target.samples.len(), source_of.len())?;
     Error::length("matches of the source's samples", source.samples.len(), target_of.len())?;
     check_vertices("matches of the target's samples", &source_of, source.basis)?;
@@ -154,25 +147,18 @@ pub fn zoomout_bidirectional(
         weight,
         Direction::SourceToTarget,
     );
+    forth.start_from(&source_of);
+    back.start_from(&target_of);
     let mut k = settings.k_start.min(k_final);
     loop {
         task.step("zoomout", k, k_final)?;
-        let (on_source, on_target) = (source.basis.first(k), target.basis.first(k));
-        let map = least_squares(&[
-            Equations {
-                left: rows_of(on_target, target.samples).as_ref(),
-                right: rows_of(on_source, &source_of).as_ref(),
-            },
-            Equations {
-                left: rows_of(on_target, &target_of).as_ref(),
-                right: rows_of(on_source, source.samples).as_ref(),
-            },
-        ])?;
+        let (of_target, of_source) = (forth.matched(k), back.matched(k));
+        let map = least_squares(&[of_target.equations(), of_source.equations()])?;
         if k >= k_final {
             return Ok(map);
         }
-        let (of_target, of_source) = rayon::join(|| forth.matches(&map), || back.matches(&map));
-        (source_of, target_of) = (of_target?, of_source?);
+        let (of_target, of_source) = rayon::join(|| forth.turn(&map), || back.turn(&map));
+        of_target.and(of_source)?;
         k = (k + settings.step).min(k_final);
     }
 }
@@ -188,7 +174,8 @@ pub fn point_map(
     target: &MapSide<'_>,
     feature_weight: f64,
 ) -> Result<PointMap> {
-    let source_of = all_matches(map, source, target, feature_weight, Direction::TargetToSource)?;
+    let source_of =
+        checked_matches(map, source, target, feature_weight, Direction::TargetToSource)?;
     Ok(PointMap { source_of })
 }
 
@@ -202,11 +189,11 @@ pub fn reverse_point_map(
     target: &MapSide<'_>,
     feature_weight: f64,
 ) -> Result<Vec<u32>> {
-    all_matches(map, source, target, feature_weight, Direction::SourceToTarget)
+    checked_matches(map, source, target, feature_weight, Direction::SourceToTarget)
 }
 
 /// Matches of all vertices.
-fn all_matches(
+fn checked_matches(
     map: &FunctionalMap,
     source: &MapSide<'_>,
     target: &MapSide<'_>,
@@ -216,7 +203,7 @@ fn all_matches(
     let k = map.k_source().max(map.k_target());
     check_size("the point map", k, source.basis, target.basis)?;
     check_features(source, target)?;
-    MatchSearch::new((source, &[]), (target, &[]), k, feature_weight, direction).matches(map)
+    all_matches(map, source, target, feature_weight, direction)
 }
 
 fn check(settings: &ZoomOutSettings, source: &MapSide<'_>, target: &MapSide<'_>) -> Result<()> {

@@ -37,7 +37,7 @@ pub fn nearest_rows(queries: MatRef<'_, f64>, points: MatRef<'_, f64>) -> Result
     nearest_of(&queries, &points, &Patches::of(&queries, &points), None)
 }
 
-/// For each of the queries the nearest of the points, ties to the first.
+/// For each of the queries the nearest of the points, ties to the first or to that of the lowest rank.
 ///
 /// `guesses` are points that may be near, one for each query: with good ones the search is shorter.
 ///
@@ -202,7 +202,8 @@ impl<'a> Search<'a> {
         for id in ids {
             let current = *winner.1.get_or_insert_with(|| self.distance(query, winner.0));
             let distance = self.distance(query, id);
-            if distance < current || (distance == current && id < winner.0) {
+            let is_first = || self.points.rank(id) < self.points.rank(winner.0);
+            if distance < current || (distance == current && is_first()) {
                 winner = (id, Some(distance));
             }
         }

@@ -15,7 +15,7 @@ pub(super) const TILE: usize = 6;
 /// 38, 32, 25, 22, 25, 27 %): fewer columns tell less, more make the balls wide.
 pub(super) const CHUNK: usize = 24;
 /// Groups that one thread packs at a time.
-const GROUPS: usize = 64;
+const GROUPS: usize = 256;
 
 /// A common shift and a power of two: distances change by that factor alone, and f32 neither overflows nor loses small
 /// differences in a large mean.
@@ -79,9 +79,11 @@ impl<const WIDTH: usize> Packed<WIDTH> {
                     let (factor, shift) = (factor * frame.scale, frame.mean[c] * frame.scale);
                     let groups = row_ids.as_chunks::<WIDTH>().0.iter();
                     for (group, ids) in numbers.chunks_exact_mut(WIDTH * k).zip(groups) {
-                        let out = &mut group[c * WIDTH..][..WIDTH];
-                        for (x, &id) in out.iter_mut().zip(ids) {
-                            *x = (factor * column[id as usize] - shift) as f32;
+                        let out: &mut [f32; WIDTH] = &mut group.as_chunks_mut().0[c];
+                        let in_f32 = |x: f64| (factor * x - shift) as f32;
+                        match neighbours(column, ids) {
+                            Some(column) => *out = column.map(in_f32),
+                            None => *out = ids.map(|id| in_f32(column[id as usize])),
                         }
                     }
                 }
@@ -98,6 +100,16 @@ impl<const WIDTH: usize> Packed<WIDTH> {
     pub fn group(&self, g: usize) -> &[f32] {
         &self.numbers[g * self.k * WIDTH..][..self.k * WIDTH]
     }
+}
+
+/// The numbers of these rows where they stand one after the other.
+#[inline(always)]
+fn neighbours<'a, const WIDTH: usize>(
+    column: &'a [f64],
+    ids: &[u32; WIDTH],
+) -> Option<&'a [f64; WIDTH]> {
+    let are_neighbours = ids.iter().zip(ids[0]..).all(|(&id, next)| id == next);
+    column.get(ids[0] as usize..)?.first_chunk().filter(|_| are_neighbours)
 }
 
 /// The ball around each panel in the first [`CHUNK`] columns, in panels themselves.

@@ -8,15 +8,21 @@ use super::panels::{CHUNK, PANEL, TILE};
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
     /// All points; every [`PANEL`] of them lie near each other.
-    pub(super) points: Vec<u32>,
+    pub points: Vec<u32>,
     /// All queries; every [`TILE`] of them lie near each other.
-    pub(super) queries: Vec<u32>,
+    pub queries: Vec<u32>,
 }
 
 impl Patches {
     /// Patches from the first [`CHUNK`] columns, which on shapes are the smoothest.
     pub fn of(queries: &Rows<'_>, points: &Rows<'_>) -> Self {
         Self { points: halved(points, PANEL), queries: halved(queries, TILE) }
+    }
+
+    /// Patches of rows that stand in such an order already.
+    pub fn in_order(n_queries: usize, n_points: usize) -> Self {
+        let all = |n: usize| (0..n as u32).collect();
+        Self { points: all(n_points), queries: all(n_queries) }
     }
 }
 

@@ -15,15 +15,25 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    fn of(numbers: impl ExactSizeIterator<Item = f64>) -> Self {
-        let n = numbers.len().max(1) as f64;
-        let (mut sum, mut least, mut greatest) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
-        for x in numbers {
-            sum += x;
-            least = if x < least { x } else { least };
-            greatest = if x > greatest { x } else { greatest };
+    /// Of some numbers times a factor.
+    fn of(numbers: &[f64], factor: f64) -> Self {
+        let mut lanes = Lanes {
+            sums: [0.0; LANES],
+            least: [f64::INFINITY; LANES],
+            greatest: [f64::NEG_INFINITY; LANES],
+        };
+        let (whole, rest) = numbers.as_chunks::<LANES>();
+        for numbers in whole {
+            for (lane, x) in numbers.iter().enumerate() {
+                lanes.add(lane, factor * x);
+            }
         }
-        Self { mean: sum / n, least, greatest }
+        rest.iter().for_each(|x| lanes.add(0, factor * x));
+        Self {
+            mean: lanes.sums.iter().sum::<f64>() / numbers.len().max(1) as f64,
+            least: lanes.least.into_iter().fold(f64::INFINITY, f64::min),
+            greatest: lanes.greatest.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        }
     }
 
     /// At least as far as any number from `from`; NaN where one is.
@@ -32,30 +42,65 @@ impl Range {
     }
 }
 
-/// Rows put together from the columns of one or two matrices, without copying them:
-/// \[left, scale · right\], on some rows or on all.
+/// Sums and comparisons that run side by side, where one after the other each would wait for the last.
+struct Lanes {
+    sums: [f64; LANES],
+    least: [f64; LANES],
+    greatest: [f64; LANES],
+}
+
+const LANES: usize = 8;
+
+impl Lanes {
+    #[inline(always)]
+    fn add(&mut self, lane: usize, x: f64) {
+        self.sums[lane] += x;
+        self.least[lane] = if x < self.least[lane] { x } else { self.least[lane] };
+        self.greatest[lane] = if x > self.greatest[lane] { x } else { self.greatest[lane] };
+    }
+}
+
+/// The columns of a matrix, each with what it is multiplied by.
+fn columns<'a>(matrix: MatRef<'a, f64>, scale: f64) -> impl Iterator<Item = (Cow<'a, [f64]>, f64)> {
+    matrix.col_iter().map(move |column| match column.try_as_col_major() {
+        Some(column) => (Cow::Borrowed(column.as_slice()), scale),
+        None => (Cow::Owned(column.iter().copied().collect()), scale),
+    })
+}
+
+/// Rows put together from the columns of one or two matrices (left and scale · right, in turns), without copying them, on
+/// some rows or on all.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows<'a> {
     /// One column each, and what it is multiplied by.
     columns: Vec<(Cow<'a, [f64]>, f64)>,
     /// Which rows; `None` for all.
     ids: Option<&'a [u32]>,
+    /// Which of equal rows counts as the first: that of the lowest rank; `None` for that of the lowest number.
+    ranks: Option<&'a [u32]>,
     n_rows: usize,
 }
 
 impl<'a> Rows<'a> {
     pub fn of(matrix: MatRef<'a, f64>) -> Self {
-        let rows = Self { columns: Vec::new(), ids: None, n_rows: matrix.nrows() };
-        rows.beside(matrix, 1.0)
+        let columns = columns(matrix, 1.0).collect();
+        Self { columns, ids: None, ranks: None, n_rows: matrix.nrows() }
     }
 
-    /// The same rows continued by those of another matrix, scaled.
+    /// The same rows with the numbers of another matrix, scaled, between theirs: the columns of both take turns. Where
+    /// each has its telling columns first, so have both together, and a search that looks at those first leaves more out.
     pub fn beside(mut self, matrix: MatRef<'a, f64>, scale: f64) -> Self {
         assert_eq!(matrix.nrows(), self.n_rows, "one row beside one row");
-        self.columns.extend(matrix.col_iter().map(|column| match column.try_as_col_major() {
-            Some(column) => (Cow::Borrowed(column.as_slice()), scale),
-            None => (Cow::Owned(column.iter().copied().collect()), scale),
-        }));
+        let (mut left, mut right) = (self.columns.into_iter(), columns(matrix, scale));
+        let mut both = Vec::with_capacity(left.len() + matrix.ncols());
+        loop {
+            let turn = [left.next(), right.next()];
+            if turn.iter().all(Option::is_none) {
+                break;
+            }
+            both.extend(turn.into_iter().flatten());
+        }
+        self.columns = both;
         self
     }
 
@@ -63,6 +108,17 @@ impl<'a> Rows<'a> {
     pub fn chosen(mut self, ids: &'a [u32]) -> Self {
         self.ids = Some(ids);
         self
+    }
+
+    /// The same rows, of which that of the lowest rank (one for each) counts as the first.
+    pub fn ranked(mut self, ranks: &'a [u32]) -> Self {
+        self.ranks = Some(ranks);
+        self
+    }
+
+    /// Where row `i` stands among equal ones.
+    pub fn rank(&self, i: u32) -> u32 {
+        self.ranks.map_or(i, |ranks| ranks[i as usize])
     }
 
     pub fn len(&self) -> usize {
@@ -104,9 +160,12 @@ impl<'a> Rows<'a> {
     pub fn ranges(&self) -> Vec<Range> {
         let columns = self.columns.iter();
         columns
-            .map(|(column, scale)| match self.ids {
-                None => Range::of(column.iter().map(|x| scale * x)),
-                Some(ids) => Range::of(ids.iter().map(|&i| scale * column[i as usize])),
+            .map(|(column, factor)| match self.ids {
+                None => Range::of(column, *factor),
+                Some(ids) => {
+                    let chosen: Vec<f64> = ids.iter().map(|&i| column[i as usize]).collect();
+                    Range::of(&chosen, *factor)
+                }
             })
             .collect()
     }

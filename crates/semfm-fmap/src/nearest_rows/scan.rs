@@ -158,23 +158,27 @@ impl ScanTile<'_> {
                 return;
             }
         }
-        let mut squares = [[0.0f32; PANEL]; TILE];
-        store::<S, N>(&sums, &mut squares);
-        self.note(&squares, &radii, g);
+        for (q, sums) in sums.iter().enumerate() {
+            let reach = self.scratch.reach[q];
+            if is_any_within(simd, std::array::from_ref(sums), &[reach], &radii) {
+                let mut squares = [0.0f32; PANEL];
+                S::as_mut_simd_f32s(&mut squares).0.copy_from_slice(sums);
+                self.note(q, &squares, &radii, g);
+            }
+        }
     }
 
-    fn note(&mut self, squares: &[[f32; PANEL]; TILE], radii: &[f32; PANEL], g: usize) {
+    /// Notes those of a panel's points that are within reach of a query.
+    fn note(&mut self, q: usize, squares: &[f32; PANEL], radii: &[f32; PANEL], g: usize) {
         let shrinks = !matches!(self.start, Start::Within);
         let ids = &self.points.ids[g * PANEL..][..PANEL];
-        for (q, squares) in squares.iter().enumerate() {
-            let reach = &mut self.scratch.reach[q];
-            for ((&square, radius), &id) in squares.iter().zip(radii).zip(ids) {
-                let limit = *reach + radius;
-                if square <= limit * limit {
-                    self.scratch.near[q].push(Near { square, id });
-                    if shrinks {
-                        *reach = reach.min(self.margin.beyond(square.sqrt()));
-                    }
+        let reach = &mut self.scratch.reach[q];
+        for ((&square, radius), &id) in squares.iter().zip(radii).zip(ids) {
+            let limit = *reach + radius;
+            if square <= limit * limit {
+                self.scratch.near[q].push(Near { square, id });
+                if shrinks {
+                    *reach = reach.min(self.margin.beyond(square.sqrt()));
                 }
             }
         }
@@ -204,12 +208,12 @@ fn add_squares<S: Simd, const N: usize>(
     *sums = held;
 }
 
-/// Whether any sum is at most (reach + radius)².
+/// Whether any sum of some queries is at most (reach + radius)².
 #[inline(always)]
 fn is_any_within<S: Simd, const N: usize>(
     simd: S,
-    sums: &[[S::f32s; N]; TILE],
-    reach: &[f32; TILE],
+    sums: &[[S::f32s; N]],
+    reach: &[f32],
     radii: &[f32; PANEL],
 ) -> bool {
     let radii = S::as_simd_f32s(radii).0;
