@@ -219,6 +219,14 @@ def test_what_is_there_is_not_made_again(again, endpoint, capsys):
     assert rows_of(data) == [["label"], ["region", "label"]]
 
 
+def test_a_label_that_the_plan_no_longer_names_is_told(again, endpoint, capsys, scenes):
+    data, words = again
+    words[0] = write_plan(data.parent, entry(scenes[0], "mug0"))
+    assert main(words) == 0
+    assert "containers/mug1 is there and not in the plan" in capsys.readouterr().err
+    assert (data / "objects/containers/mug1.json").exists()
+
+
 def test_one_that_fails_stops_no_other_and_is_made_the_next_time(again, endpoint, capsys, scenes):
     data, words = again
     words[words.index("--seed") + 1] = "8"

@@ -29,7 +29,7 @@ from .image_endpoint import (
     image_settings,
 )
 from .plan import read_plan
-from .run import Row, run_plan, summary
+from .run import Row, labels_beside, run_plan, summary
 from .stages import Makers
 
 _PROGRAM = "semfm-dataset"
@@ -124,6 +124,8 @@ def _run(argv: Sequence[str] | None) -> int:
     finally:
         stop.set()
         progress.close()
+    for title in labels_beside(plan, root):
+        _say(args, f"{title} is there and not in the plan; `semfm-cli eval` reads it all the same")
     return _report(args, rows)
 
 

@@ -146,7 +146,10 @@ class EditEndpoint:
             wanted = f"{self.settings.public_url}: expected a picture in `b64_json`"
             raise EndpointError("reply", f"{wanted}, found what is none: {error}") from None
         revised = getattr(first, "revised_prompt", None)
-        tokens = getattr(getattr(response, "usage", None), "total_tokens", None)
+        usage = getattr(response, "usage", None)
+        # Older clients do not know the field and leave it as it came.
+        is_raw, key = isinstance(usage, dict), "total_tokens"
+        tokens = usage.get(key) if is_raw else getattr(usage, key, None)
         return ImageReply(
             picture,
             self.settings.model,

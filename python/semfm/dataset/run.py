@@ -91,6 +91,15 @@ def run_plan(
     return rows
 
 
+def labels_beside(plan: Sequence[PlannedObject], root: Path) -> list[str]:
+    """Labels in the dataset's folder, as CATEGORY/NAME, of objects that the plan does not name (any
+    more). `semfm-cli eval` reads them all the same.
+    """
+    there = (root / "objects").glob("*/*.json")
+    found = {f"{path.parent.name}/{path.stem}" for path in there}
+    return sorted(found - {item.title for item in plan})
+
+
 def summary(rows: Sequence[Row]) -> dict[str, Any]:
     """The content of ``dataset.json``."""
     counts = {
