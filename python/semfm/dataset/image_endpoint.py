@@ -147,9 +147,10 @@ class EditEndpoint:
             raise EndpointError("reply", f"{wanted}, found what is none: {error}") from None
         revised = getattr(first, "revised_prompt", None)
         usage = getattr(response, "usage", None)
-        # Older clients do not know the field and leave it as it came.
-        is_raw, key = isinstance(usage, dict), "total_tokens"
-        tokens = usage.get(key) if is_raw else getattr(usage, key, None)
+        if isinstance(usage, dict):  # older clients do not know the field
+            tokens = usage.get("total_tokens")
+        else:
+            tokens = getattr(usage, "total_tokens", None)
         return ImageReply(
             picture,
             self.settings.model,
