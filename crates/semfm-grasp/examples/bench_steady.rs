@@ -76,7 +76,10 @@ fn bench(mesh: &Mesh, variation: &Variation) -> Result<(), Box<dyn Error + Send 
         let found = find_grasps_with(&object, &region, &gripper, &scene, &settings, &task)?;
         let seconds = start.elapsed().as_secs_f64();
         let (n, survivors) = (found.n_candidates, found.n_survivors);
-        println!("  seed {seed}: {survivors} survivors of {n} candidates, {seconds:.2} s");
+        let best = found.grasps.first().map_or(f64::NAN, |grasp| grasp.score);
+        println!(
+            "  seed {seed}: {survivors} survivors of {n} candidates, best {best:.3}, {seconds:.2} s"
+        );
         middles.extend(found.grasps.first().map(|g| g.contacts[0].midpoint(g.contacts[1])));
     }
     let pairs = middles.iter().flat_map(|a| middles.iter().map(move |b| a.distance(*b)));

@@ -1,6 +1,6 @@
 //! Convex bodies at rest or swept along a line, as collision tests want them.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{Mat3A, Vec3A};
 use parry3d_f64::math::{Pose, Vector};
@@ -34,9 +34,12 @@ pub(crate) struct Convex {
 struct Hull {
     points: Arc<[DVec3]>,
     path: DVec3,
-    /// Least and largest value along each of [`SLABS`].
-    slabs: [[f64; 2]; SLABS.len()],
+    /// Least and largest value along each of [`SLABS`], once asked for: most of what a gripper sweeps has nothing near.
+    slabs: OnceLock<Slabs>,
 }
+
+/// For each direction of [`SLABS`] the least and the largest value.
+type Slabs = [[f64; 2]; SLABS.len()];
 
 /// Directions between the axes along which hulls are bounded. With them nine triangles of ten that miss a hull but
 /// meet its box are told without a search for the closest points.
@@ -95,7 +98,9 @@ impl Convex {
     fn single_hull(points: &[DVec3]) -> Option<Vec<(Pose, Self)>> {
         let (low, high) = bounds(points)?;
         let (centre, half) = (low.midpoint(high), (high - low) / 2.0);
-        let hull = Some(Hull::new(points.iter().map(|&p| p - centre).collect()));
+        let hull = Hull::new(points.iter().map(|&p| p - centre).collect());
+        hull.slabs(); // once for all poses
+        let hull = Some(hull);
         let piece = Self { centre, half, hull };
         Some(vec![(Pose::IDENTITY, piece)])
     }
@@ -174,28 +179,42 @@ impl Convex {
     }
 }
 
+/// Slabs of what moves along a path, seen from its middle.
+fn widened(at_rest: &Slabs, path: DVec3) -> Slabs {
+    std::array::from_fn(|k| {
+        let ([low, high], half) = (at_rest[k], path.dot(SLABS[k]).abs() / 2.0);
+        [low - half, high + half]
+    })
+}
+
 impl Hull {
     fn new(points: Vec<DVec3>) -> Self {
-        let slabs = SLABS.map(|direction| {
-            let none = [f64::INFINITY, f64::NEG_INFINITY];
-            points.iter().map(|p| p.dot(direction)).fold(none, |[l, h], x| [l.min(x), h.max(x)])
-        });
-        Self { points: points.into(), path: DVec3::ZERO, slabs }
+        Self { points: points.into(), path: DVec3::ZERO, slabs: OnceLock::new() }
     }
 
     /// Of points that are at rest: the same along `path`, seen from the middle of the way.
     fn moved(&self, path: DVec3) -> Self {
-        let mut slabs = self.slabs;
-        for (slab, direction) in slabs.iter_mut().zip(SLABS) {
-            let half = path.dot(direction).abs() / 2.0;
-            *slab = [slab[0] - half, slab[1] + half];
+        let slabs = OnceLock::new();
+        if let Some(at_rest) = self.slabs.get() {
+            let _ = slabs.set(widened(at_rest, path));
         }
         Self { points: self.points.clone(), path, slabs }
     }
 
+    fn slabs(&self) -> &Slabs {
+        self.slabs.get_or_init(|| {
+            let at_rest = SLABS.map(|direction| {
+                let none = [f64::INFINITY, f64::NEG_INFINITY];
+                let along = self.points.iter().map(|p| p.dot(direction));
+                along.fold(none, |[l, h], x| [l.min(x), h.max(x)])
+            });
+            widened(&at_rest, self.path)
+        })
+    }
+
     /// Whether one of [`SLABS`] shows that the triangle is farther than `margin`.
     fn is_beside(&self, corners: [DVec3; 3], margin: f64) -> bool {
-        self.slabs.iter().zip(SLABS).any(|([low, high], direction)| {
+        self.slabs().iter().zip(SLABS).any(|([low, high], direction)| {
             let [a, b, c] = corners.map(|p| p.dot(direction));
             let wide = margin * direction.length();
             a.min(b).min(c) > high + wide || a.max(b).max(c) < low - wide
