@@ -120,6 +120,13 @@ fn lens_of(path: &Path, value: &Value) -> Result<Option<Distortion>> {
     let coefficients: Vec<f64> = match listed.map(|list| list.get("data").unwrap_or(list)) {
         Some(list) => Vec::deserialize(list).map_err(|error| fault(error.to_string()))?,
         None if is_fisheye => {
+            let others = ["p1", "p2", "k5", "k6"].into_iter().find_map(|name| {
+                let value = value.get(name).filter(|value| value.as_f64() != Some(0.0))?;
+                Some(format!("{name} = {value}, which a fisheye lens does not have"))
+            });
+            if let Some(found) = others {
+                return Err(fault(found));
+            }
             ["k1", "k2", "k3", "k4"].iter().map(|n| value[*n].as_f64().unwrap_or(0.0)).collect()
         }
         None if named.contains(&field) && value.get(field).is_some() => {
@@ -293,6 +300,7 @@ mod tests {
             r#""D": [0.1, 0.2]"#,
             r#""coeffs": [0.1, 0, 0, 0, 0], "model": "distortion.inverse_brown_conrady""#,
             r#""lens": {"radial": [0.1]}"#,
+            r#""model": "fisheye", "k1": 0.1, "k2": 0.0, "p1": 0.01, "p2": 0.0"#,
         ] {
             let error = read(&format!("{{{k}, {rest}}}")).unwrap_err().to_string();
             assert!(error.contains("undistort"), "{error}");
