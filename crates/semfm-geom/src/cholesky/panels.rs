@@ -44,6 +44,18 @@ fn scale<const N: usize>(x: &mut Lanes<N>, by: f64) {
     x.iter_mut().for_each(|x| *x *= by);
 }
 
+/// Where four rows stand below an offset. (A closure that is not inlined is compiled without the wide registers, and
+/// what it returns goes through memory.)
+#[inline(always)]
+fn below_offset(ids: &[u32], offset: usize) -> [usize; 4] {
+    [
+        ids[0] as usize - offset,
+        ids[1] as usize - offset,
+        ids[2] as usize - offset,
+        ids[3] as usize - offset,
+    ]
+}
+
 impl Panels {
     /// Turns faer's factor, whose panels lie column after column, round in its place.
     pub fn new(nodes: &SymbolicSupernodalCholesky<usize>, mut values: Vec<f64>) -> Self {
@@ -122,8 +134,8 @@ impl Panels {
         let offset = panel.first + w;
         let mut quads = below.chunks_exact(4 * w).zip(rows.chunks_exact(4));
         for (l, ids) in &mut quads {
-            let at = [0, 1, 2, 3].map(|q| ids[q] as usize - offset);
-            let mut sums = at.map(|row| tail[row]);
+            let at = below_offset(ids, offset);
+            let mut sums = [tail[at[0]], tail[at[1]], tail[at[2]], tail[at[3]]];
             let ((l0, l1), (l2, l3)) = (l[..2 * w].split_at(w), l[2 * w..].split_at(w));
             for ((((y, &l0), &l1), &l2), &l3) in mine.iter().zip(l0).zip(l1).zip(l2).zip(l3) {
                 subtract::<N, FUSED>(&mut sums[0], l0, y);
@@ -153,7 +165,8 @@ impl Panels {
         let mine = &mut head[panel.first..];
         let offset = panel.first + w;
         for (l, ids) in below.chunks_exact(4 * w).zip(rows.chunks_exact(4)) {
-            let z = [0, 1, 2, 3].map(|q| tail[ids[q] as usize - offset]);
+            let at = below_offset(ids, offset);
+            let z = [tail[at[0]], tail[at[1]], tail[at[2]], tail[at[3]]];
             let ((l0, l1), (l2, l3)) = (l[..2 * w].split_at(w), l[2 * w..].split_at(w));
             for ((((sum, &l0), &l1), &l2), &l3) in mine.iter_mut().zip(l0).zip(l1).zip(l2).zip(l3) {
                 subtract::<N, FUSED>(sum, l0, &z[0]);
