@@ -240,12 +240,8 @@ def fit(arguments) -> None:
         without = left_out(records, [other for other in names if other != name])
         print(f"| {name} | {chosen.coef_[0][k]:.2f} | {alone:.3f} | {roc_auc_score(y[usual], without[usual]):.3f} |")
     print(f"| (constant) | {chosen.intercept_[0]:.2f} | | |")
-    print("\n| said | trials | mean said | held |")
-    print("|---|---|---|---|")
-    for low, high in ((0, 0.1), (0.1, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.01)):
-        chosen_bin = (p >= low) & (p < high)
-        if chosen_bin.any():
-            print(f"| {low}–{min(high, 1)} | {chosen_bin.sum()} | {p[chosen_bin].mean():.2f} | {y[chosen_bin].mean():.2f} |")
+    calibration("the fit, left-out objects", p, y)
+    calibration("the score, usual grip", own[usual], y[usual])
     turned = np.array([[r["said_turn"], r["closing_turn"]] for r in records if r["seed"] == 0])
     print(f"\nclosing turn, said and in the trial: rank correlation {rank_correlation(*turned.T):.2f}")
     table = [(f"{np.degrees(low):.0f}–{np.degrees(high):.0f}°", turned[(turned[:, 0] >= low) & (turned[:, 0] < high), 1])
@@ -253,6 +249,16 @@ def fit(arguments) -> None:
     for label, values in table:
         if len(values):
             print(f"said {label}: {len(values)} trials, median turn {np.degrees(np.median(values)):.1f}°")
+
+
+def calibration(what: str, said: np.ndarray, strict: np.ndarray) -> None:
+    """How often grasps hold of which so much is said."""
+    print(f"\n| said by {what} | trials | mean said | held, strict |")
+    print("|---|---|---|---|")
+    for low, high in ((0, 0.1), (0.1, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1)):
+        of = (said >= low) & ((said < high) | (high == 1))
+        if of.any():
+            print(f"| {low}–{high} | {of.sum()} | {said[of].mean():.2f} | {strict[of].mean():.2f} |")
 
 
 TURNS = np.radians([0, 0.1, 2, 5, 10, 60])
@@ -270,8 +276,11 @@ def judge(arguments) -> None:
     x, y = features(records, names), np.array([r["strict"] for r in records])
     objects = np.array([r["object"] for r in records])
     rows: dict[str, list] = {"refitted": [], "score": []}
+    chosen = np.unique(objects)[:: arguments.every]
     for case in cases(arguments):
         name, _, _, mass, hand = case
+        if name not in chosen:
+            continue
         answer = grasps_of(arguments, case, "--random", "--top", POOL, tag="random")
         if answer is None or len(answer["grasps"]) < 20:
             continue
@@ -339,7 +348,7 @@ def main() -> None:
     parser.add_argument("--semfm", default="semfm-cli")
     parser.add_argument("--random", type=int, default=6, help="random survivors to try, for each object and hand")
     parser.add_argument("--shares", type=float, nargs="+", default=[0.0, 0.05, 0.1, 0.3, 1.0])
-    parser.add_argument("--every", type=int, default=3, help="diversity: every how many-th object")
+    parser.add_argument("--every", type=int, default=1, help="judge and diversity: every how many-th object")
     parser.add_argument("--again", action="store_true", help="ask the program anew (its score has changed)")
     arguments = parser.parse_args()
     arguments.shared = Path(arguments.shared)

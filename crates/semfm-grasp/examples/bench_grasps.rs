@@ -1,8 +1,8 @@
 //! Times the search for grasps on mesh files: candidates and finished grasps per second and core.
 //!
-//! `bench_grasps [--samples N] [--threads N] [--small METRES] MESH…` reads meshes in metres and
+//! `bench_grasps [--samples N] [--threads N] [--small METRES] [--gripper NAME|URDF] MESH…` reads meshes in metres and
 //! prints one row for each: the whole surface as the region, and where `--small` is given also a
-//! patch of that radius around the vertex farthest from the centre of mass.
+//! patch of that radius around the vertex farthest from the centre of mass. Without `--gripper` it is three boxes.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -15,11 +15,13 @@ use semfm_geom::math::DVec3;
 use semfm_grasp::{
     BoxGripper, GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with,
 };
+use semfm_robot::Gripper;
 
 #[allow(clippy::print_stdout)] // The numbers are what this program is for.
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let mut settings = GraspSettings::default();
     let (mut threads, mut small, mut meshes) = (1, None, Vec::<PathBuf>::new());
+    let mut gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or("an option lacks its value");
@@ -27,18 +29,23 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
             "--samples" => settings.n_samples = value()?.parse()?,
             "--threads" => threads = value()?.parse()?,
             "--small" => small = Some(value()?.parse::<f64>()?),
+            "--gripper" => {
+                gripper = GripperGeometry::new(&Gripper::open(&value()?, &Default::default())?)?;
+            }
             mesh => meshes.push(mesh.into()),
         }
     }
     if meshes.is_empty() {
-        return Err("usage: bench_grasps [--samples N] [--threads N] [--small METRES] MESH…".into());
+        return Err("usage: bench_grasps [--samples N] [--threads N] [--small METRES] \
+                    [--gripper NAME|URDF] MESH…"
+            .into());
     }
     println!(
         "object              region prepare_s candidates survivors seconds cand/s/core grasps/s/core returned  refused"
     );
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     for path in &meshes {
-        pool.install(|| bench(path, small, threads, &settings))?;
+        pool.install(|| bench(path, &gripper, small, threads, &settings))?;
     }
     Ok(())
 }
@@ -46,6 +53,7 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
 #[allow(clippy::print_stdout)]
 fn bench(
     path: &Path,
+    gripper: &GripperGeometry,
     small: Option<f64>,
     threads: usize,
     settings: &GraspSettings,
@@ -54,21 +62,14 @@ fn bench(
     let start = Instant::now();
     let object = GraspObject::from_mesh(&mesh, 1.0)?;
     let prepared = start.elapsed().as_secs_f64();
-    let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
     let mut regions = vec![("whole", vec![1.0; mesh.n_vertices()])];
     if let Some(radius) = small {
         regions.push(("small", far_patch(mesh.vertices(), object.centre_of_mass(), radius)));
     }
     for (name, region) in regions {
         let start = (Instant::now(), ProcessTime::now());
-        let found = find_grasps_with(
-            &object,
-            &region,
-            &gripper,
-            &Scene::new(),
-            settings,
-            &Task::default(),
-        )?;
+        let found =
+            find_grasps_with(&object, &region, gripper, &Scene::new(), settings, &Task::default())?;
         // On one thread its own CPU time counts: a busy machine changes nothing then.
         let seconds = match threads {
             1 => start.1.elapsed().as_secs_f64(),
