@@ -25,7 +25,7 @@ use anyhow::{Result, bail};
 
 use crate::process::cargo;
 use crate::tally::Tally;
-use crate::workspace::Workspace;
+use crate::workspace::{Workspace, is_benchmark};
 
 const USAGE: &str = "\
 cargo xtask test [--full]   every test, Rust and Python; --full adds the encoders on PyTorch
@@ -136,7 +136,7 @@ fn bench(workspace: &Workspace) -> Result<()> {
     cargo(workspace, &["build", "--release", "--workspace", "--examples"]).succeed()?;
     println!("built, each says how it is called:");
     for program in workspace.examples("crates/*/examples")? {
-        if program.starts_with("bench_") {
+        if is_benchmark(&program) {
             println!("  {}", workspace.built("release/examples").join(program).display());
         }
     }

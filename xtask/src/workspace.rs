@@ -54,6 +54,11 @@ impl Workspace {
     }
 }
 
+/// Whether an example program measures: it is called with arguments, and says which.
+pub fn is_benchmark(name: &str) -> bool {
+    name.starts_with("bench_")
+}
+
 /// What a folder holds.
 pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     let read = || -> std::io::Result<Vec<PathBuf>> {
