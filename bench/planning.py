@@ -17,8 +17,8 @@ curves with toppra (the same velocity and acceleration limits, constraints at bo
 seidel). ``replay`` evaluates the cubics between samples at every millisecond by itself: limits, and contacts by coal on the
 robot's meshes as they are. All of it runs on one thread. Other planners: ``bench/planning_peers.py``.
 
-Some kernels count a thread's processor time in ticks of 4 ms, as long as many plans take. ``--repeats 12`` plans every
-problem so often, with the same seed and so the same work, and takes the mean of its milliseconds.
+On a busy machine, ``--repeats 12`` plans every problem so often, with the same seed and so the same work, and takes the mean of
+its milliseconds.
 """
 
 from __future__ import annotations
