@@ -126,7 +126,9 @@ impl Pytest {
             self.0.reasons.push(line.to_owned());
             return;
         }
-        if let Some(name) = line.strip_prefix("FAILED ").or_else(|| line.strip_prefix("ERROR ")) {
+        let failed = line.strip_prefix("FAILED ").or_else(|| line.strip_prefix("ERROR "));
+        // Captured lines of a log have more blanks.
+        if let Some(name) = failed.filter(|name| !name.starts_with(' ')) {
             self.0.failures.push(name.to_owned());
             return;
         }

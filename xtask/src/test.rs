@@ -19,12 +19,14 @@ pub fn run(workspace: &Workspace, full: bool) -> Tally {
     let mut step = |name: &str, work: &dyn Fn() -> Result<Tally>| {
         println!("== {name}");
         let start = Instant::now();
-        tally.add(work().unwrap_or_else(|error| {
+        let mut done = work().unwrap_or_else(|error| {
             eprintln!("error: {name}: {error:#}");
-            let mut tally = Tally::default();
-            tally.count(&format!("{name}: {error:#}"), false);
-            tally
-        }));
+            Tally::default().closed(false)
+        });
+        if done.failed > 0 && done.failures.is_empty() {
+            done.failures.push(format!("{name}: the runner itself"));
+        }
+        tally.add(done);
         println!("-- {name}: {} s", start.elapsed().as_secs());
     };
     let needs = if full { ALL_TESTS } else { TESTS };

@@ -77,7 +77,7 @@ impl Orders {
     }
 }
 
-/// \[spectral, scale · features\].
+/// Rows of \[spectral, scale · features\], the columns of both in turns.
 fn with_features<'a>(
     spectral: MatRef<'a, f64>,
     features: Option<MatRef<'a, f64>>,

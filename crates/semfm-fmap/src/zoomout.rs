@@ -31,6 +31,11 @@ impl<'a> MapSide<'a> {
     pub fn spectral(basis: &'a Eigenbasis) -> Self {
         Self { basis, features: None, samples: &[] }
     }
+
+    /// How many vertices stand for the shape.
+    fn n_chosen(&self) -> usize {
+        if self.samples.is_empty() { self.basis.n_vertices() } else { self.samples.len() }
+    }
 }
 
 /// Matches of both sides' samples.
@@ -128,8 +133,8 @@ pub fn zoomout_bidirectional(
 ) -> Result<FunctionalMap> {
     check(settings, source, target)?;
     let Matches { source_of, target_of } = matches;
-    Error::length("matches of the target's samples", target.samples.len(), source_of.len())?;
-    Error::length("matches of the source's samples", source.samples.len(), target_of.len())?;
+    Error::length("matches of the target's samples", target.n_chosen(), source_of.len())?;
+    Error::length("matches of the source's samples", source.n_chosen(), target_of.len())?;
     check_vertices("matches of the target's samples", &source_of, source.basis)?;
     check_vertices("matches of the source's samples", &target_of, target.basis)?;
     let (k_final, weight) = (settings.k_final, settings.feature_weight);
@@ -314,5 +319,19 @@ mod tests {
         assert!(matches!(grow(11, 1), Err(Error::BasisTooSmall { asked: 11, .. })));
         assert!(matches!(grow(10, 0), Err(Error::OutOfRange { .. })));
         assert!(matches!(grow(5, 1), Err(Error::OutOfRange { what: "the map to refine", .. })));
+    }
+
+    #[test]
+    fn without_samples_every_vertex_has_a_match() {
+        let shape = shape(&blob(1.0), 10);
+        let side = MapSide::spectral(shape.basis());
+        let settings = ZoomOutSettings { k_start: 6, k_final: 10, step: 2, feature_weight: 0.0 };
+        let grow = |matches: Vec<u32>| {
+            let matches = Matches { source_of: matches.clone(), target_of: matches };
+            zoomout_bidirectional(matches, &side, &side, &settings, &Task::default())
+        };
+        assert!(matches!(grow(Vec::new()), Err(Error::Length { found: 0, .. })));
+        let map = grow((0..shape.basis().n_vertices() as u32).collect()).unwrap();
+        assert!(right(&point_map(&map, &side, &side, 0.0).unwrap(), &shape) > 0.99);
     }
 }

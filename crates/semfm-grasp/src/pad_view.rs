@@ -30,15 +30,20 @@ pub(crate) struct PadView {
     pub(crate) half_pad: [f64; 2],
 }
 
+/// Side of a cell below a pad of that extent, metres.
+pub(crate) fn cell_side(object: &GraspObject, pad: [f64; 2]) -> f64 {
+    match object.surface() {
+        Surface::Mesh { .. } => pad[0] / CELLS,
+        // A cell below the spacing of the points would be empty.
+        Surface::Cloud { spacing, .. } => (pad[0] / CELLS).max(*spacing),
+    }
+}
+
 impl PadView {
     /// What pads see that have closed on `object`.
     pub(crate) fn new(object: &GraspObject, gripper: &GripperGeometry, closing: &Closing) -> Self {
         let half_pad = gripper.pad().map(|extent| extent / 2.0);
-        let cell = match object.surface() {
-            Surface::Mesh { .. } => 2.0 * half_pad[0] / CELLS,
-            // A cell below the spacing of the points would be empty.
-            Surface::Cloud { spacing, .. } => (2.0 * half_pad[0] / CELLS).max(*spacing),
-        };
+        let cell = cell_side(object, gripper.pad());
         let mut grid = Grid::new(half_pad.map(|half| half + BESIDE * cell), cell, closing.width);
         let half = DVec3::new(grid.half[0], closing.width / 2.0 + 1e-6, grid.half[1]);
         let Pose { rotation, translation } = closing.tcp;

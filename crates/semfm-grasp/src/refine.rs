@@ -41,7 +41,9 @@ impl Search<'_> {
             .map(|grasp| task.check().map(|()| self.climbed(grasp)))
             .collect::<std::result::Result<_, _>>()?;
         kept.splice(..climbed.len(), climbed);
-        let kept = suppress(kept, self.settings().separation);
+        // What climbed has merged others, so that grasps with only a bound may be returned after all.
+        let mut kept = self.scored(suppress(kept, self.settings().separation));
+        kept.retain(Grasp::is_scored);
         Ok(Found { kept, n_survivors, sampled })
     }
 

@@ -8,7 +8,7 @@ use crate::contact::{Closing, Patch};
 use crate::force_closure::{SoftContact, ferrari_canny};
 use crate::gripper_geometry::GripperGeometry;
 use crate::object::GraspObject;
-use crate::pad_view::PadView;
+use crate::pad_view::{PadView, cell_side};
 use crate::pressure::Pressure;
 use crate::settings::GraspSettings;
 
@@ -129,7 +129,10 @@ impl<'a> Scorer<'a> {
         let weights = &self.settings.weights;
         let best = |weight: f64, most: f64| if weight > 0.0 { most } else { 0.0 };
         // Points in a rectangle lie, in the mean, at most half its diagonal from their centre.
-        let most_held = self.pad[0].hypot(self.pad[1]);
+        // A pressure is spread over a cell at least.
+        let cell = cell_side(self.object, self.pad);
+        let least_held = Pressure::of_point(DVec3::ZERO, cell * cell).radius;
+        let most_held = self.pad[0].hypot(self.pad[1]).max(2.0 * least_held);
         let gravity = self.share_of_torque(most_held, self.turning_arm(closing));
         let examined = ExaminedTerms {
             epsilon: best(weights.epsilon, 1.0),

@@ -183,16 +183,16 @@ impl<'a> Search<'a> {
         of_last.map_or(f64::NEG_INFINITY, |grasp| (1.0 - diversity) * grasp.score)
     }
 
-    /// Without those whose score is not known because it cannot reach that of any returned.
-    fn scored(&self, kept: Vec<Grasp>) -> Vec<Grasp> {
+    /// With the scores of those that may be returned; the others keep their bounds.
+    pub(crate) fn scored(&self, kept: Vec<Grasp>) -> Vec<Grasp> {
         let least = self.least_returned(&kept);
         let mut scored: Vec<Grasp> = kept
-            .into_iter()
+            .into_par_iter()
             .filter_map(|grasp| match grasp.is_scored() {
                 true => Some(grasp),
                 // What was better has been merged since.
                 false if grasp.score >= least => self.examine(&Candidate::again(&grasp)).ok(),
-                false => None,
+                false => Some(grasp),
             })
             .collect();
         scored.sort_by(|a, b| b.score.total_cmp(&a.score));

@@ -11,7 +11,7 @@ const TOLERANCE: f64 = 1e-9;
 const JOGGLE: f64 = 1e-5;
 
 /// Stops after so many rounds for each point, where rounding would let the hull grow for ever: a round makes a point a
-/// corner, and without rounding no point twice.
+/// corner, and without rounding no point twice. The radius is then that of the hull so far, which may be too small.
 const MOST_ROUNDS: usize = 4;
 
 /// A plane between two others is taken from them unless it is shorter than this, that is unless they are nearly opposite.

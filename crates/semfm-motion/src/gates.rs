@@ -106,11 +106,12 @@ pub enum Obstruction {
     },
     /// The straight line cannot be followed at a place.
     Line {
-        /// Metres along the line to the place that could not be reached.
+        /// Metres along the line that could be followed.
         at: f64,
         /// Length of the line, metres.
         length: f64,
-        /// The joints that stand at a limit there, by name; none where the arm is stretched as far as it goes.
+        /// The joints that stand at a limit at the best try for what comes next, by name; none where the arm is
+        /// stretched, or would have to change its posture.
         at_limits: Vec<String>,
     },
     /// Something touches on the straight line.
@@ -196,7 +197,9 @@ impl fmt::Display for Obstruction {
                 let (length, at) = (1e3 * length, 1e3 * at);
                 write!(f, "the arm follows the line of {length:.0} mm for {at:.1} mm")?;
                 match at_limits.as_slice() {
-                    [] => f.write_str(" and is stretched as far as it goes in that posture"),
+                    [] => {
+                        f.write_str("; then it is stretched, or would have to change its posture")
+                    }
                     names => write_at_limits(f, names),
                 }
             }
@@ -325,7 +328,7 @@ mod tests {
         let text = far.to_string();
         assert!(text.contains("312.5 mm") && text.contains("elbow"), "{text}");
         let stretched = Obstruction::Line { at: 0.0434, length: 0.1, at_limits: Vec::new() };
-        assert!(stretched.to_string().contains("of 100 mm for 43.4 mm and is stretched"));
+        assert!(stretched.to_string().contains("of 100 mm for 43.4 mm; then it is stretched"));
         let line = Obstruction::ContactOnLine {
             at: 0.02,
             length: 0.1,

@@ -119,9 +119,9 @@ fn lens_of(path: &Path, value: &Value) -> Result<Option<Distortion>> {
     let named = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
     let coefficients: Vec<f64> = match listed.map(|list| list.get("data").unwrap_or(list)) {
         Some(list) => Vec::deserialize(list).map_err(|error| fault(error.to_string()))?,
-        None if is_fisheye => {
+        None if is_fisheye && named.contains(&field) && value.get(field).is_some() => {
             let others = ["p1", "p2", "k5", "k6"].into_iter().find_map(|name| {
-                let value = value.get(name).filter(|value| value.as_f64() != Some(0.0))?;
+                let value = value.get(name).and_then(not_zero)?;
                 Some(format!("{name} = {value}, which a fisheye lens does not have"))
             });
             if let Some(found) = others {
@@ -301,6 +301,7 @@ mod tests {
             r#""coeffs": [0.1, 0, 0, 0, 0], "model": "distortion.inverse_brown_conrady""#,
             r#""lens": {"radial": [0.1]}"#,
             r#""model": "fisheye", "k1": 0.1, "k2": 0.0, "p1": 0.01, "p2": 0.0"#,
+            r#""model": "fisheye", "lens": {"k1": 0.1}"#,
         ] {
             let error = read(&format!("{{{k}, {rest}}}")).unwrap_err().to_string();
             assert!(error.contains("undistort"), "{error}");

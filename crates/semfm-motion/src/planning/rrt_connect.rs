@@ -32,11 +32,11 @@ impl Default for PlanSettings {
 /// See [`PlanSettings::longest_edge`].
 const LONGEST_EDGE: f64 = 1.0;
 
-/// Radius of the domain of a node after its first edge that is not free, in longest edges.
+/// Radius of the domain of a node after its first edge that is not free, radians; in longest edges where these are longer.
 const FIRST_DOMAIN: f64 = 5.0;
 /// The domain is so much smaller after each further one, and larger again after one that is free.
 const SHRINKAGE: f64 = 0.9;
-/// Least radius of a domain, in longest edges. With half of it 5 of 97 problems of MotionBenchMaker are not solved.
+/// Least radius of a domain, in the same unit. With half of it 5 of 97 problems of MotionBenchMaker are not solved.
 const LEAST_DOMAIN: f64 = 2.0;
 /// Most samples drawn for one that lies in a domain, on average over a search.
 const DRAWS_AN_ITERATION: usize = 20;
@@ -188,8 +188,8 @@ impl<V: Validity> Search<'_, V> {
     fn domain_after(&self, domain: f64, is_free: bool) -> f64 {
         match is_free {
             true => domain / SHRINKAGE,
-            false if domain.is_infinite() => FIRST_DOMAIN * self.longest_edge,
-            false => (domain * SHRINKAGE).max(LEAST_DOMAIN * self.longest_edge),
+            false if domain.is_infinite() => FIRST_DOMAIN.max(FIRST_DOMAIN * self.longest_edge),
+            false => (domain * SHRINKAGE).max(LEAST_DOMAIN.max(LEAST_DOMAIN * self.longest_edge)),
         }
     }
 
