@@ -497,6 +497,30 @@ def test_settings_that_cannot_be_right_are_told_before_anything_is_done(
         assert not (tmp_path / "data/dataset.json").exists()
 
 
+@pytest.mark.parametrize("kind", ["json", "ply"])
+def test_a_label_that_no_run_made_is_kept(scenes, tmp_path, no_endpoint, capsys, kind):
+    photo = {"picture": scenes[0].picture}
+    value = {k: v for k, v in entry(scenes[0], "mug", **photo).items() if k != "reference"}
+    label = tmp_path / f"data/objects/containers/mug.{kind}"
+    label.parent.mkdir(parents=True)
+    label.write_text("by hand")
+    assert main([write_plan(tmp_path, value), "-o", str(tmp_path / "data")]) == 2
+    assert label.read_text() == "by hand" and str(label) in capsys.readouterr().err
+    assert not (tmp_path / "data/work").exists()
+
+
+def test_inputs_in_the_folders_that_are_written_are_refused(scenes, tmp_path, no_endpoint, capsys):
+    inside = tmp_path / "data/work/containers/mug/picture.png"
+    inside.parent.mkdir(parents=True)
+    shutil.copy(scenes[0].picture, inside)
+    before = inside.read_bytes()
+    photo = {"picture": str(inside)}
+    value = {k: v for k, v in entry(scenes[0], "mug", **photo).items() if k != "reference"}
+    assert main([write_plan(tmp_path, value), "-o", str(tmp_path / "data")]) == 2
+    assert "a file outside of" in capsys.readouterr().err and inside.read_bytes() == before
+    assert not (tmp_path / "data/dataset.json").exists()
+
+
 @pytest.mark.parametrize(
     "change, text",
     [

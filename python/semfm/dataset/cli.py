@@ -114,6 +114,7 @@ def _run(argv: Sequence[str] | None) -> int:
         raise SidecarError(f"{root}: {error.strerror or error}") from error
     inputs = [args.plan, *(str(path) for item in plan for path in item.files)]
     check_output(root / "dataset.json", inputs)
+    _check_inputs(root, inputs)
     stop = threading.Event()
     makers = _makers(args, stop)
     if any(item.reference for item in plan):
@@ -127,6 +128,15 @@ def _run(argv: Sequence[str] | None) -> int:
     for title in labels_beside(plan, root):
         _say(args, f"{title} is there and not in the plan; `semfm-cli eval` reads it all the same")
     return _report(args, rows)
+
+
+def _check_inputs(root: Path, inputs: Sequence[str]) -> None:
+    """Refuses inputs in the folders that are written; raises SidecarError."""
+    written = [(root / name).resolve() for name in ("work", "objects")]
+    for file in inputs:
+        for folder in written:
+            if folder in Path(file).resolve().parents:
+                raise expected(file, "input", f"a file outside of {folder}, which is written", "it")
 
 
 def _makers(args: argparse.Namespace, stop: threading.Event) -> Makers:

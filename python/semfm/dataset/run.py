@@ -68,8 +68,11 @@ def run_plan(
     ------
     SemfmError
         Where nothing can be expected of the next object either: an endpoint that denies access, or
-        a folder that cannot be written. What is done stays.
+        a folder that cannot be written. What is done stays. Before anything is done, where a label
+        is there that no run made.
     """
+    for item in plan:
+        ObjectWork(item, root, makers).check_label()
     rows = [Row(item.category, item.name, "waiting", []) for item in plan]
     for i, item in enumerate(plan):
         on_progress(i, len(plan))

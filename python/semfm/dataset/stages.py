@@ -100,6 +100,15 @@ class ObjectWork:
         """The mesh beside the label."""
         return self.label.with_suffix(".ply")
 
+    def check_label(self) -> None:
+        """Refuses a label that is there without a record of ours, which would be replaced; raises
+        SidecarError.
+        """
+        for path in (self.label, self.label_mesh):
+            if not self._records and path.exists():
+                wanted = "no label, or the records of the run that made it: move it elsewhere"
+                raise expected(path, self.item.title, wanted, f"none in {self.at('stages.json')}")
+
     def at(self, name: str) -> Path:
         """A file of the object's folder."""
         return self.folder / name
