@@ -194,6 +194,33 @@ def test_a_password_in_the_url_shows_nowhere(endpoint):
     assert "hunter2" not in repr(settings) and "abc" not in repr(settings)
 
 
+@pytest.mark.parametrize("name", ["SEMFM_VLM_API_KEY", "OPENAI_API_KEY"])
+def test_a_key_that_no_header_can_hold_is_refused_unseen(name):
+    about = {"OPENAI_MODEL": "m"}
+    assert from_environment(environment={**about, name: " sk-abc\r\n"}).key.reveal() == "sk-abc"
+    for bad in ("sk-a\rbc", "sk-a\nbc", "sk-a\x00bc", "sk-äbc"):
+        with pytest.raises(SidecarError) as error:
+            from_environment(environment={**about, name: bad})
+        assert f"${name}" in str(error.value) and "sk-" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "me:s3cret@host/v1",
+        "https:me:s3cret@host/v1",
+        "ftp://me:s3cret@host/v1",
+        "http://host:s3cret/v1",
+        "http://[s3cret/v1",
+        "https:///s3cret",
+    ],
+)
+def test_a_url_that_is_none_is_refused_unseen(url):
+    with pytest.raises(SidecarError, match="https://host/v1") as error:
+        from_environment("m", url, {})
+    assert "s3cret" not in str(error.value)
+
+
 def test_a_key_goes_only_where_it_belongs():
     openai = {"OPENAI_API_KEY": "sk-openai", "OPENAI_MODEL": "gpt-4o"}
     settings = from_environment(environment=openai)

@@ -72,8 +72,9 @@ class ClientSettings:
     max_wait_s: float = 120.0
 
     def __post_init__(self) -> None:
-        if urlsplit(self.base_url).scheme not in ("http", "https"):
-            raise expected("settings", "base URL", "http:// or https://", repr(self.public_url))
+        if not _is_base_url(self.base_url):  # not quoted: where it cannot be split, a password shows
+            wanted = "http:// or https:// with a host, as https://host/v1"
+            raise expected("settings", "base URL", wanted, "something else")
         if self.timeout_s <= 0 or self.max_wait_s < 0:
             raise expected("settings", "time-out", "a positive time", self.timeout_s)
         if self.max_attempts < 1:
@@ -85,6 +86,15 @@ class ClientSettings:
         parts = urlsplit(self.base_url)
         host = parts.netloc.rpartition("@")[2]
         return urlunsplit((parts.scheme, host, parts.path.rstrip("/"), "", ""))
+
+
+def _is_base_url(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        _ = parts.port  # raises for what is no port
+    except ValueError:
+        return False
+    return parts.scheme in ("http", "https") and bool(parts.hostname)
 
 
 @dataclass(frozen=True)
@@ -111,7 +121,7 @@ def address_from_environment(
     Raises
     ------
     SidecarError
-        If there is no model, or no key for OpenAI's own endpoint.
+        If there is no model, no key for OpenAI's own endpoint, or a key that no header can hold.
     """
     model = model or environment.get(f"{variables}_MODEL") or environment.get("OPENAI_MODEL")
     if not model:
@@ -119,12 +129,16 @@ def address_from_environment(
     own_url = base_url or environment.get(f"{variables}_BASE_URL")
     openai_url = environment.get("OPENAI_BASE_URL") or _OPENAI_URL
     url = own_url or openai_url
-    secret = environment.get(f"{variables}_API_KEY")
+    setting = f"{variables}_API_KEY"
+    secret = environment.get(setting, "").strip()
     if not secret and url.rstrip("/") in (openai_url.rstrip("/"), _OPENAI_URL):
-        secret = environment.get("OPENAI_API_KEY")
+        setting = "OPENAI_API_KEY"
+        secret = environment.get(setting, "").strip()
     if not secret and url.rstrip("/") == _OPENAI_URL:
         wanted = f"${variables}_API_KEY or $OPENAI_API_KEY, or another --base-url"
         raise expected("settings", "key", wanted, "none")
+    if not (secret.isascii() and secret.isprintable()):  # its sender would quote it, escaped
+        raise expected("settings", f"${setting}", "printable ASCII", "other characters in it")
     return Address(model, url, ApiKey(secret) if secret else None)
 
 
