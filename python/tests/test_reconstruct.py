@@ -419,6 +419,13 @@ def test_what_is_no_pose_is_refused(tmp_path, capsys, pose, text):
     assert said.out == "" and text in said.err and "pose.json" in said.err
 
 
+def test_a_refused_pose_is_not_in_metres(tmp_path):
+    value = {"camera_from_object": np.eye(4).tolist()}
+    for verdict in ("check", "refuse"):
+        path = pose_file(tmp_path, {**value, "verdict": verdict})
+        assert read_pose(path).is_metric == (verdict == "check")
+
+
 def test_bad_input_is_refused_by_name(scene, tmp_path, capsys):
     everything = tmp_path / "everything.png"
     Image.fromarray(np.full(SHAPE, 255, np.uint8)).save(everything)

@@ -51,7 +51,7 @@ class StoredPose:
     camera_from_mesh
         (4 × 4).
     is_metric
-        Whether the file's form says that lengths are metres.
+        Whether the file's form says that lengths are metres; not where its verdict is ``refuse``.
     mesh
         What the file says of the mesh (counts, hash), if anything.
     """
@@ -159,7 +159,9 @@ def read_pose(path: str | os.PathLike[str]) -> StoredPose:
         mesh = value.get("mesh") or {}
         if not isinstance(mesh, dict):
             raise expected(path, "mesh", "counts and hash of a mesh", _short(mesh))
-    return StoredPose(similarity(matrix, path, place), is_metric=True, mesh=mesh)
+    # `semfm-reconstruct` says `refuse` where lengths are in a unit that nobody knows.
+    is_metric = not (isinstance(value, dict) and value.get("verdict") == "refuse")
+    return StoredPose(similarity(matrix, path, place), is_metric, mesh)
 
 
 def check_mesh(pose: StoredPose, mesh: Mesh, where: object) -> None:
