@@ -334,6 +334,14 @@ def test_a_busy_endpoint_is_asked_again_and_a_picture_is_kept_by_content(endpoin
     assert cached.edit(white, "a hand").cached is False
 
 
+def test_a_transparent_reply_is_put_on_white(endpoint):
+    buffer = BytesIO()
+    Image.new("RGBA", (8, 8), (0, 0, 0, 0)).save(buffer, "PNG")
+    endpoint.acts = [edited(buffer.getvalue())]
+    reply = EditEndpoint(image_settings(None, None)).edit(Image.new("RGB", (8, 8)), "a hand")
+    assert reply.image().getpixel((0, 0)) == (255, 255, 255)
+
+
 def truth(scene: Scene) -> list[np.ndarray]:
     return [np.asarray(Image.open(scene.folder / name)) > 0 for name in ("mask.png", "hand.png")]
 
@@ -488,6 +496,7 @@ def test_settings_that_cannot_be_right_are_told_before_anything_is_done(
         (["--reconstruct-command", "make {picture} {everything}"], "{longest}"),
         (["--set", "size"], "NAME=VALUE"),
         (["--set", "model=other"], "NAME=VALUE"),
+        (["--set", "seed=7"], "--seed N"),
         (["--prompt", str(tmp_path / "words.txt")], "$region in it"),
         (["--prompt", str(tmp_path / "none.txt")], "none.txt"),
     ):

@@ -176,6 +176,8 @@ def _more(args: argparse.Namespace) -> dict[str, Any]:
         name, equals, value = word.partition("=")
         if not (equals and name.isidentifier() and value) or name in ("model", "prompt", "image"):
             raise expected("settings", "--set", "NAME=VALUE", repr(word))
+        if name == "seed":
+            raise expected("settings", "--set", "--seed N in place of a field `seed`", repr(word))
         more[name] = value
     return more
 

@@ -18,6 +18,7 @@ from .._identity import content_name, picture_identity
 from .._semfm import write_file
 from ..sidecar.errors import SidecarError
 from ..vlm.client import Answered, Client, ClientSettings, EndpointError, address_from_environment
+from .masks import on_white
 
 #: Names of the environment's variables begin so.
 VARIABLES = "SEMFM_IMAGE"
@@ -57,8 +58,8 @@ class ImageReply:
     cached: bool = False
 
     def image(self) -> Image.Image:
-        """The picture, as RGB."""
-        return Image.open(BytesIO(self.picture)).convert("RGB")
+        """The picture, as RGB; what is transparent is white, as in the reference."""
+        return on_white(Image.open(BytesIO(self.picture)))
 
 
 class ImageEndpoint(Protocol):
