@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ import semfm.zoo
 from PIL import Image
 from sam3d_stand_in import Scene, make_scene
 from semfm.reconstruct.cli import main
-from semfm.reconstruct.observation import read_seen
+from semfm.reconstruct.fit import metres_per_unit
+from semfm.reconstruct.observation import RETURNS_AT_LEAST, Seen, read_seen
 from semfm.reconstruct.poses import of_sam3d, read_pose
 
 pytest.importorskip("scipy")
@@ -417,6 +419,16 @@ def test_what_is_no_pose_is_refused(tmp_path, capsys, pose, text):
     assert main(words) == 2
     said = capsys.readouterr()
     assert said.out == "" and text in said.err and "pose.json" in said.err
+
+
+def test_few_pixels_tell_no_metres():
+    depth, mask = np.full(SHAPE, 2.0), np.zeros(SHAPE, dtype=bool)
+    seen = Seen(np.zeros((*SHAPE, 3), np.uint8), [mask], depth, None, [])
+    view = SimpleNamespace(depth=np.full(SHAPE, 4.0))
+    mask[0, : RETURNS_AT_LEAST - 1] = True
+    assert metres_per_unit(view, mask, seen) is None
+    mask[1, 0] = True
+    assert metres_per_unit(view, mask, seen) == 0.5
 
 
 def test_a_refused_pose_is_not_in_metres(tmp_path):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .._paint import MARKED
 from .._semfm import Pinhole, View, render
-from .observation import Seen
+from .observation import RETURNS_AT_LEAST, Seen
 from .placed_mesh import PlacedMesh
 
 #: Below this share of overlap the report says to look at the overlay; it is no verdict. Of 48
@@ -91,12 +91,14 @@ def measure(
 
 def metres_per_unit(view: View, mask: NDArray[np.bool_], seen: Seen) -> float | None:
     """By how much a drawn mesh must grow about the eye to stand where the depth is: the median over
-    the pixels of its mask that have both depths; None where none has.
+    the pixels of its mask that have both depths; None where fewer than :data:`RETURNS_AT_LEAST` do.
     """
     if seen.depth is None:
         return None
     both = np.isfinite(view.depth) & mask & np.isfinite(seen.depth)
-    return float(np.median(seen.depth[both] / view.depth[both])) if both.any() else None
+    if int(both.sum()) < RETURNS_AT_LEAST:
+        return None
+    return float(np.median(seen.depth[both] / view.depth[both]))
 
 
 def overlay(seen: Seen, object_view: View, hand_view: View | None) -> NDArray[np.uint8]:

@@ -46,7 +46,7 @@ _FILES = (
 _IS_A_GUESS = "the pose is a network's guess from one picture: a start value for `semfm-cli align`"
 _NO_METRES = (
     "lengths are in units of the point map that the tool guessed, not metres: give --depth with "
-    "--intrinsics and --mask, or --longest"
+    "--intrinsics and --mask (the drawn object must lie over its mask), or --longest"
 )
 
 
