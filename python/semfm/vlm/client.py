@@ -72,7 +72,7 @@ class ClientSettings:
     max_wait_s: float = 120.0
 
     def __post_init__(self) -> None:
-        if not _is_base_url(self.base_url):  # not quoted: where it cannot be split, a password shows
+        if not _is_base_url(self.base_url):  # not quoted: it may show a password
             wanted = "http:// or https:// with a host, as https://host/v1"
             raise expected("settings", "base URL", wanted, "something else")
         if self.timeout_s <= 0 or self.max_wait_s < 0:
