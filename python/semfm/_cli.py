@@ -40,7 +40,9 @@ def run_semfm_cli(words: Sequence[_Word]) -> CliAnswer:
         Where it ends with another code than 0; the message is its last line, without "error:".
     """
     command = [sys.executable, "-m", "semfm", *(os.fspath(word) for word in words)]
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace"
+    )
     lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
     if done.returncode != 0:
         raise SemfmError(_reason(lines) or f"semfm-cli {words[0]}: exit code {done.returncode}")

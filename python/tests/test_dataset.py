@@ -16,9 +16,11 @@ from fake_endpoint import edited, fake_endpoint, hang, raw, status
 from PIL import Image
 from sam3d_stand_in import Scene, make_scene
 from semfm.dataset.cli import main
+from semfm.dataset.commands import run_command
 from semfm.dataset.image_endpoint import CachedImages, EditEndpoint, image_settings
 from semfm.dataset.masks import MaskError, masks_of_change
 from semfm.dataset.plan import read_plan
+from semfm.dataset.stages import opened
 from semfm.errors import SemfmError
 from semfm.vlm.client import EndpointError
 from vlm_fixtures import KEY
@@ -569,3 +571,21 @@ def test_plans_of_another_form(scenes, tmp_path):
         with pytest.raises(SemfmError, match=r"plan\.json") as error:
             read_plan(tmp_path / "plan.json")
         assert found in str(error.value)
+
+
+def test_what_a_command_says_is_told_without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SEMFM_IMAGE_API_KEY", KEY)
+    code = "import os, sys; sys.exit('key ' + os.environ['SEMFM_IMAGE_API_KEY'])"
+    with pytest.raises(SemfmError) as failed:
+        run_command([sys.executable, "-c", code], "--mask-command")
+    assert KEY not in str(failed.value) and "[SEMFM_IMAGE_API_KEY]" in str(failed.value)
+
+
+def test_a_picture_is_read_as_viewers_show_it(tmp_path: Path) -> None:
+    upright = Image.new("RGB", (4, 2), "white")
+    upright.putpixel((0, 0), (200, 0, 0))
+    exif = Image.Exif()
+    exif[0x0112] = 6  # the camera was turned: viewers turn the picture by a quarter
+    upright.save(tmp_path / "turned.png", exif=exif)
+    read = opened(tmp_path / "turned.png")
+    assert read.size == (2, 4) and read.getpixel((1, 0)) == (200, 0, 0)

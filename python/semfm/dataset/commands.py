@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import string
 import subprocess
@@ -69,5 +70,13 @@ def run_command(words: list[str], name: str) -> None:
     except OSError as error:
         raise SidecarError(f"{name}: {words[0]}: {error.strerror or error}") from error
     if done.returncode != 0:
-        said = (done.stderr.strip() or done.stdout.strip())[-_SAID:]
+        said = _without_keys(done.stderr.strip() or done.stdout.strip())[-_SAID:]
         raise SidecarError(f"{name}: exit code {done.returncode}: {said or 'without a word'}")
+
+
+def _without_keys(said: str) -> str:
+    """What a command said, without the keys of endpoints that it finds in its environment."""
+    for name, value in os.environ.items():
+        if name.endswith("_API_KEY") and value.strip():
+            said = said.replace(value.strip(), f"[{name}]")
+    return said

@@ -22,7 +22,7 @@ from string import Template
 from typing import Any, Callable
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 
 from .. import __version__
 from .._cli import run_semfm_cli
@@ -192,16 +192,17 @@ def _prompt(work: ObjectWork) -> str:
 
 def _reference(work: ObjectWork) -> Image.Image:
     assert work.item.reference is not None, "a plan names a reference or a picture"
-    return _opened(work.item.reference)
+    return opened(work.item.reference)
 
 
-def _opened(path: Path) -> Image.Image:
+def opened(path: Path) -> Image.Image:
+    """A picture from a file; raises SidecarError where it is none."""
     try:
         image = Image.open(path)
-        image.load()
+        # As viewers show it, and as masks are drawn on it.
+        return ImageOps.exif_transpose(image)
     except (OSError, ValueError, Image.DecompressionBombError) as error:
         raise SidecarError(f"{path}: not a picture: {error}") from error
-    return image
 
 
 def _picture_decides(work: ObjectWork) -> dict[str, Any]:
@@ -215,7 +216,7 @@ def _picture_decides(work: ObjectWork) -> dict[str, Any]:
 
 def _make_picture(work: ObjectWork) -> dict[str, Any]:
     if work.item.picture:
-        on_white(_opened(work.item.picture)).save(work.at("picture.png"))
+        on_white(opened(work.item.picture)).save(work.at("picture.png"))
         return {"source": "given", **file_identity(work.item.picture)}
     assert work.item.reference is not None
     endpoint, prompt = work.makers.endpoint(), _prompt(work)
@@ -264,7 +265,7 @@ def _make_masks(work: ObjectWork) -> dict[str, Any]:
         if item.reference is None:
             wanted = "`mask` and `hand_mask` beside `picture`, or --mask-command"
             raise expected(item.title, "masks", wanted, "neither")
-        found = masks_of_change(_reference(work), _opened(work.at("picture.png")))
+        found = masks_of_change(_reference(work), opened(work.at("picture.png")))
         masks = [found.object, found.hand]
         about["changed_share"] = found.changed_share
     else:
