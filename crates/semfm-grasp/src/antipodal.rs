@@ -45,9 +45,7 @@ pub(crate) fn antipodal(
     rng: &mut impl Rng,
     out: &mut Vec<Candidate>,
 ) {
-    let Surface::Mesh { normals, .. } = object.surface() else {
-        return;
-    };
+    let Surface::Mesh { normals, .. } = object.surface() else { return };
     if seed.normal == DVec3::ZERO {
         return;
     }

@@ -23,12 +23,8 @@ impl Bounds {
 
     /// The least single-precision box around one in double precision.
     fn around(low: DVec3, high: DVec3) -> Self {
-        let down = |x: f64| {
-            if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 }
-        };
-        let up = |x: f64| {
-            if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 }
-        };
+        let down = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
+        let up = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
         Self {
             low: Vec3A::new(down(low.x), down(low.y), down(low.z)),
             high: Vec3A::new(up(high.x), up(high.y), up(high.z)),

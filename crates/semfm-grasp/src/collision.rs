@@ -238,9 +238,7 @@ impl<'a> Collision<'a> {
 
     /// How much deeper than allowed the gripper is in the table, at the grasp or behind it.
     fn below_table(&self, gripper: &PosedGripper<'_>, tcp: &Pose) -> f64 {
-        let Some(table) = self.scene.table() else {
-            return f64::NEG_INFINITY;
-        };
+        let Some(table) = self.scene.table() else { return f64::NEG_INFINITY };
         let lowest = gripper
             .pieces()
             .map(|(_, shape, pose)| shape.lowest(&(*tcp * *pose), table.normal))

@@ -380,9 +380,7 @@ impl Gathered {
             } else {
                 let seen = Triangle::new(flat(a), flat(b), flat(c));
                 let (_, place) = seen.project_local_point_and_get_location(flat(aim), true);
-                let Some(weights) = place.barycentric_coordinates() else {
-                    continue;
-                };
+                let Some(weights) = place.barycentric_coordinates() else { continue };
                 weights[0] * a + weights[1] * b + weights[2] * c
             };
             // Of two layers under the same spot the outer one touches.

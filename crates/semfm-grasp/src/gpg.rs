@@ -99,9 +99,7 @@ impl<'a> Gpg<'a> {
             coordinates.clear();
             coordinates.extend(self.points.iter().map(|(p, _)| p[axis] as f32));
         }
-        let Some((normal, axis)) = self.darboux(seed) else {
-            return 0;
-        };
+        let Some((normal, axis)) = self.darboux(seed) else { return 0 };
         let sides: &[f64] = if self.object.is_signed() { &[1.0] } else { &[1.0, -1.0] };
         for side in sides {
             let approach = -normal * side;
@@ -169,9 +167,7 @@ impl<'a> Gpg<'a> {
             let depths = [Some(tip), deeper.then_some(shallow), with_tips.then_some(tips)];
             for tip in depths.into_iter().flatten() {
                 let middle = tip - reach.tip;
-                let Some((held, opposed)) = self.held([left, right], middle) else {
-                    continue;
-                };
+                let Some((held, opposed)) = self.held([left, right], middle) else { continue };
                 let key = [held[0], held[1], middle.max(-span)].map(|y| self.bin(span, y));
                 if last.replace(key) == Some(key) {
                     continue;

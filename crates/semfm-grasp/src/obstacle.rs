@@ -123,9 +123,7 @@ impl Obstacle {
         near: f64,
         far: f64,
     ) -> Vec<(f64, u32)> {
-        let Items::Triangles(triangles) = &self.items else {
-            return Vec::new();
-        };
+        let Items::Triangles(triangles) = &self.items else { return Vec::new() };
         let mut hits: Vec<(f64, u32)> = self
             .tree
             .passing(|bounds| meets_box(bounds, origin, direction, [near, far]))

@@ -54,9 +54,7 @@ impl Search<'_> {
             let Separation { translation, rotation } = self.settings().separation;
             let moves = steps(share * translation, share * rotation);
             for _ in 0..MOVES {
-                let Some(better) = self.best_neighbour(&best, &moves) else {
-                    break;
-                };
+                let Some(better) = self.best_neighbour(&best, &moves) else { break };
                 best = better;
             }
         }

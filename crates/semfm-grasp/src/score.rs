@@ -128,11 +128,11 @@ impl<'a> Scorer<'a> {
     pub(crate) fn at_most(&self, closing: &Closing, fit: &Fit, angle: f64) -> f64 {
         let weights = &self.settings.weights;
         let best = |weight: f64, most: f64| if weight > 0.0 { most } else { 0.0 };
-        // Points in a rectangle lie, in the mean, at most half its diagonal from their centre.
-        // A pressure is spread over a cell at least.
+        // Points in a rectangle lie, in the mean, at most half its diagonal from their centre; and a pressure is spread
+        // over a cell at least.
         let cell = cell_side(self.object, self.pad);
-        let least_held = Pressure::of_point(DVec3::ZERO, cell * cell).radius;
-        let most_held = self.pad[0].hypot(self.pad[1]).max(2.0 * least_held);
+        let of_cell = Pressure::of_point(DVec3::ZERO, cell * cell).radius;
+        let most_held = self.pad[0].hypot(self.pad[1]).max(2.0 * of_cell);
         let gravity = self.share_of_torque(most_held, self.turning_arm(closing));
         let examined = ExaminedTerms {
             epsilon: best(weights.epsilon, 1.0),

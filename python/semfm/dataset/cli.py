@@ -11,13 +11,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from .._command import complain, finish
 from .._files import read_text
 from .._semfm import check_output, printable
 from ..sidecar.errors import SidecarError, expected
-from ..sidecar.progress import MODES as PROGRESS_MODES
-from ..sidecar.progress import open_progress
+from ..sidecar.progress import add_message_options, open_progress
 from ..vlm.client_options import add_client_options, patience
 from .commands import CommandTemplate
 from .image_endpoint import (
@@ -90,13 +88,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME=VALUE",
         help="a further field of the request, as size=1024x1024",
     )
-    messages = p.add_argument_group("messages")
-    messages.add_argument("--json", action="store_true", help="the summary as JSON on stdout")
-    messages.add_argument(
-        "--progress", choices=PROGRESS_MODES, default="auto", help="on stderr (%(default)s)"
-    )
-    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
-    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    add_message_options(p, "the summary as JSON on stdout")
     return p
 
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import base64
 import binascii
-import json
 import os
 import threading
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from io import BytesIO
-from pathlib import Path
 from typing import Any, Protocol
 
 from PIL import Image
 
-from .._identity import content_name, picture_identity
-from .._semfm import write_file
-from ..sidecar.errors import SidecarError
+from .._identity import picture_identity
+from .._pictures import png_bytes
+from ..vlm.cache import ReplyFolder
 from ..vlm.client import Answered, Client, ClientSettings, EndpointError, address_from_environment
 from .masks import on_white
 
@@ -115,7 +113,7 @@ class EditEndpoint:
 
     def edit(self, picture: Image.Image, prompt: str, attempt: int = 1) -> ImageReply:
         """Ask until there is a picture, with growing pauses or those the endpoint asks for."""
-        file = ("reference.png", _png(picture), "image/png")
+        file = ("reference.png", png_bytes(picture), "image/png")
         more = dict(self.settings.more)
         if isinstance(more.get("seed"), int):
             more["seed"] += attempt - 1
@@ -172,11 +170,7 @@ class CachedImages:
     """
 
     def __init__(self, endpoint: ImageEndpoint, folder: str | os.PathLike[str]) -> None:
-        self._endpoint, self._folder = endpoint, Path(folder)
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise SidecarError(f"{self._folder}: {error.strerror or error}") from error
+        self._endpoint, self._kept = endpoint, ReplyFolder(folder, _FORMAT, ImageReply)
 
     def describe(self) -> dict[str, Any]:
         """As the endpoint behind the cache."""
@@ -187,31 +181,22 @@ class CachedImages:
         pixels = picture_identity(picture)
         asked = {"picture": pixels, "prompt": prompt, "attempt": attempt}
         decides = {**asked, "endpoint": self.describe()}
-        path = self._folder / f"{content_name(decides)}.json"
-        if (kept := _read(path)) is not None:
+        if (kept := _reply(self._kept.read(decides))) is not None:
             return kept
         reply = self._endpoint.edit(picture, prompt, attempt)
-        entry = {"format": _FORMAT, **asdict(reply)}
-        entry["picture"] = base64.b64encode(reply.picture).decode()
-        write_file(path, (json.dumps(entry, indent=1) + "\n").encode())
+        encoded = base64.b64encode(reply.picture).decode()
+        self._kept.write(decides, {**asdict(reply), "picture": encoded})
         return reply
 
 
-def _read(path: Path) -> ImageReply | None:
-    """A kept picture; None where there is none or the file is broken, which asks anew."""
+def _reply(kept: dict[str, Any] | None) -> ImageReply | None:
+    """A kept picture; None where there is none or it is broken, which asks anew."""
+    if kept is None:
+        return None
     try:
-        entry = json.loads(path.read_text("utf-8"))
-        if entry.pop("format") != _FORMAT or set(entry) != {f.name for f in fields(ImageReply)}:
-            return None
-        entry["picture"] = base64.b64decode(entry["picture"], validate=True)
-        reply = replace(ImageReply(**entry), cached=True)
+        picture = base64.b64decode(kept["picture"], validate=True)
+        reply = replace(ImageReply(**{**kept, "picture": picture}), cached=True)
         reply.image()
         return reply
     except (OSError, ValueError, AttributeError, KeyError, TypeError):
         return None
-
-
-def _png(picture: Image.Image) -> bytes:
-    buffer = BytesIO()
-    picture.save(buffer, "PNG")
-    return buffer.getvalue()

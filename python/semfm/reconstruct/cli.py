@@ -10,13 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from .._command import complain, finish
 from .._identity import file_identity
 from .._semfm import printable, read_mesh
 from ..sidecar.errors import expected
-from ..sidecar.progress import MODES as PROGRESS_MODES
-from ..sidecar.progress import Progress, open_progress
+from ..sidecar.progress import Progress, add_message_options, open_progress
 from .fit import draw, measure, metres_per_unit, overlay
 from .observation import Seen, read_seen
 from .output import Reconstruction, SeenFiles, check_folder, next_commands, write_folder
@@ -99,13 +97,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="SAM 3D Objects had a point map in metres",
     )
-    messages = p.add_argument_group("messages")
-    messages.add_argument("--json", action="store_true", help="the report as JSON on stdout")
-    messages.add_argument(
-        "--progress", choices=PROGRESS_MODES, default="auto", help="on stderr (%(default)s)"
-    )
-    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
-    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    add_message_options(p, "the report as JSON on stdout")
     return p
 
 

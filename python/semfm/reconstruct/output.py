@@ -16,7 +16,6 @@ import json
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from .._identity import mesh_identity
+from .._pictures import png_bytes
 from .._semfm import check_output, write_file
 from ..sidecar.errors import SidecarError
 from .fit import COVERS_AT_LEAST, Fit
@@ -134,9 +134,7 @@ def write_folder(folder: Path, made: Reconstruction, report: dict[str, Any]) -> 
         made.hand.in_camera().write(folder / "hand.ply", colors=made.hand.colors)
     _write_json(folder / "camera_from_object.json", made.pose_file())
     if made.overlay is not None:
-        buffer = BytesIO()
-        Image.fromarray(made.overlay).save(buffer, "PNG")
-        write_file(folder / "overlay.png", buffer.getvalue())
+        write_file(folder / "overlay.png", png_bytes(Image.fromarray(made.overlay)))
     report = {"format": REPORT_FORMAT, **report, **_measures(made, centred)}
     _write_json(folder / "report.json", report)
     return report

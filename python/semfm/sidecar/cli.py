@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Sequence
 
-from .. import __version__
 from .._command import finish
 from .._semfm import check_output, printable
 from .embed import DTYPES, EmbedSettings, embed_file
@@ -17,7 +16,7 @@ from .errors import SidecarError, expected
 from .inputs import encoder_inputs
 from .models import DEVICES, open_encoder
 from .patches import ROLLS
-from .progress import MODES, open_progress
+from .progress import add_message_options, open_progress
 
 _VIEWS = ".views.mcap"
 
@@ -81,12 +80,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--dtype", choices=list(DTYPES), default=settings.dtype, help="in the file (%(default)s)"
     )
-    messages = p.add_argument_group("messages")
-    messages.add_argument(
-        "--progress", choices=MODES, default="auto", help="on stderr (%(default)s)"
-    )
-    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
-    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    add_message_options(p)
     return p
 
 

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from typing import Protocol
 
+from .. import __version__
+
 #: Values of ``--progress``. ``auto`` draws a bar when stderr is a terminal.
 MODES = ("auto", "json", "none")
+
+
+def add_message_options(p: argparse.ArgumentParser, json_help: str | None = None) -> None:
+    """Adds ``--json`` where a command has a result to print, then progress, silence and version."""
+    messages = p.add_argument_group("messages")
+    if json_help is not None:
+        messages.add_argument("--json", action="store_true", help=json_help)
+    messages.add_argument(
+        "--progress", choices=MODES, default="auto", help="on stderr (%(default)s)"
+    )
+    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
+    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
 
 
 class Progress(Protocol):

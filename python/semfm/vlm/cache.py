@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,46 @@ from .question import Question
 _FORMAT = "semfm.vlm-reply/1"
 
 
+class ReplyFolder:
+    """JSON files of replies in one folder, each named by what decides the reply.
+
+    Parameters
+    ----------
+    folder
+        Made where it is not there.
+    form
+        The files' format.
+    kind
+        The dataclass whose fields a file has.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], form: str, kind: type) -> None:
+        self._folder, self._form = Path(folder), form
+        self._fields = {f.name for f in fields(kind)}
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SidecarError(f"{self._folder}: {error.strerror or error}") from error
+
+    def read(self, decides: Any) -> dict[str, Any] | None:
+        """The fields of a kept reply; None where there is none or the file is broken."""
+        try:
+            entry = json.loads(self._path(decides).read_text("utf-8"))
+            if entry.pop("format") != self._form or set(entry) != self._fields:
+                return None
+        except (OSError, ValueError, AttributeError, KeyError, TypeError):
+            return None
+        return dict(entry)
+
+    def write(self, decides: Any, reply: Mapping[str, Any]) -> None:
+        """Keeps the fields of a reply; raises FileError."""
+        entry = {"format": self._form, **reply}
+        write_file(self._path(decides), (json.dumps(entry, indent=1) + "\n").encode())
+
+    def _path(self, decides: Any) -> Path:
+        return self._folder / f"{content_name(decides)}.json"
+
+
 class CachedEndpoint:
     """An endpoint that looks into a folder first: an :class:`.endpoint.Endpoint`.
 
@@ -26,11 +67,7 @@ class CachedEndpoint:
     """
 
     def __init__(self, endpoint: Endpoint, folder: str | os.PathLike[str]) -> None:
-        self._endpoint, self._folder = endpoint, Path(folder)
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise SidecarError(f"{self._folder}: {error.strerror or error}") from error
+        self._endpoint, self._kept = endpoint, ReplyFolder(folder, _FORMAT, Reply)
 
     def describe(self) -> dict[str, Any]:
         """As the endpoint behind the cache."""
@@ -38,25 +75,9 @@ class CachedEndpoint:
 
     def ask(self, question: Question) -> Reply:
         """The kept reply, or a new one, which is then kept."""
-        path = self._folder / f"{self._name(question)}.json"
-        if (kept := _read(path)) is not None:
-            return kept
-        reply = self._endpoint.ask(question)
-        entry = {"format": _FORMAT, **asdict(reply)}
-        write_file(path, (json.dumps(entry, indent=1) + "\n").encode())
-        return reply
-
-    def _name(self, question: Question) -> str:
         decides = {"question": question.content(), "endpoint": self.describe()}
-        return content_name(decides)
-
-
-def _read(path: Path) -> Reply | None:
-    """A kept reply; None where there is none or the file is broken, which asks anew."""
-    try:
-        entry = json.loads(path.read_text("utf-8"))
-        if entry.pop("format") != _FORMAT or set(entry) != {f.name for f in fields(Reply)}:
-            return None
-        return replace(Reply(**entry), cached=True)
-    except (OSError, ValueError, AttributeError, KeyError, TypeError):
-        return None
+        if (kept := self._kept.read(decides)) is not None:
+            return replace(Reply(**kept), cached=True)
+        reply = self._endpoint.ask(question)
+        self._kept.write(decides, asdict(reply))
+        return reply

@@ -8,12 +8,10 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from .. import __version__
 from .._command import complain, finish
 from .._semfm import check_output, printable, write_file
 from ..sidecar.errors import expected
-from ..sidecar.progress import MODES as PROGRESS_MODES
-from ..sidecar.progress import open_progress
+from ..sidecar.progress import add_message_options, open_progress
 from .baseline import BaselineSettings, outcome_row, total_tokens, transfer
 from .cache import CachedEndpoint
 from .client_options import add_client_options, patience
@@ -72,15 +70,7 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_question(p)
     _add_endpoint(p)
-    messages = p.add_argument_group("messages")
-    messages.add_argument(
-        "--json", action="store_true", help="the row, or totals, as JSON on stdout"
-    )
-    messages.add_argument(
-        "--progress", choices=PROGRESS_MODES, default="auto", help="on stderr (%(default)s)"
-    )
-    messages.add_argument("--quiet", action="store_true", help="nothing but errors")
-    p.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    add_message_options(p, "the row, or totals, as JSON on stdout")
     return p
 
 

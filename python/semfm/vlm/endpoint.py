@@ -7,11 +7,11 @@ import os
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from typing import Any, Protocol
 
 from PIL import Image
 
+from .._pictures import png_bytes
 from ..sidecar.errors import expected
 from .client import Answered, Client, ClientSettings, EndpointError, address_from_environment
 from .question import Question
@@ -188,7 +188,5 @@ def _text(value: object) -> str | None:
 def _part(part: str | Image.Image) -> dict[str, Any]:
     if isinstance(part, str):
         return {"type": "text", "text": part}
-    buffer = BytesIO()
-    part.save(buffer, "PNG")
-    url = "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+    url = "data:image/png;base64," + base64.b64encode(png_bytes(part)).decode()
     return {"type": "image_url", "image_url": {"url": url, "detail": "high"}}

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-from io import BytesIO
 from pathlib import Path
 
-from PIL import Image
-
+from .._pictures import png_bytes
 from .._semfm import write_file
 from ..sidecar.errors import SidecarError
 from .baseline import Outcome
@@ -33,19 +31,13 @@ def write_pictures(folder: str | os.PathLike[str], outcome: Outcome, drawing: Dr
             name = part.rstrip(":")
         else:
             lines.append(f"![{name}]({name}.png)")
-            write_file(folder / f"{name}.png", _png(part))
+            write_file(folder / f"{name}.png", png_bytes(part))
     write_file(folder / "question.md", _text("\n\n".join(lines) + "\n"))
     if outcome.reply:
         write_file(folder / "reply.txt", _text(outcome.reply.refusal or outcome.reply.text))
     for name, view, mask in zip(question.names, question.views, outcome.masks or []):
         answered = answer_picture(view, mask & view.on_object, drawing.side)
-        write_file(folder / f"answer-{name}.png", _png(answered))
-
-
-def _png(picture: Image.Image) -> bytes:
-    buffer = BytesIO()
-    picture.save(buffer, "PNG")
-    return buffer.getvalue()
+        write_file(folder / f"answer-{name}.png", png_bytes(answered))
 
 
 def _text(text: str) -> bytes:

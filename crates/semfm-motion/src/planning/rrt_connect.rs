@@ -32,7 +32,8 @@ impl Default for PlanSettings {
 /// See [`PlanSettings::longest_edge`].
 const LONGEST_EDGE: f64 = 1.0;
 
-/// Radius of the domain of a node after its first edge that is not free, radians; in longest edges where these are longer.
+/// Radius of the domain of a node after its first edge that is not free, in longest edges (in those of the default where they are
+/// longer: shorter edges reach as far, in more steps).
 const FIRST_DOMAIN: f64 = 5.0;
 /// The domain is so much smaller after each further one, and larger again after one that is free.
 const SHRINKAGE: f64 = 0.9;
@@ -186,10 +187,11 @@ impl<V: Validity> Search<'_, V> {
 
     /// The domain of a node after an edge from it was found to be free, or not.
     fn domain_after(&self, domain: f64, is_free: bool) -> f64 {
+        let edge = self.longest_edge.max(LONGEST_EDGE);
         match is_free {
             true => domain / SHRINKAGE,
-            false if domain.is_infinite() => FIRST_DOMAIN.max(FIRST_DOMAIN * self.longest_edge),
-            false => (domain * SHRINKAGE).max(LEAST_DOMAIN.max(LEAST_DOMAIN * self.longest_edge)),
+            false if domain.is_infinite() => FIRST_DOMAIN * edge,
+            false => (domain * SHRINKAGE).max(LEAST_DOMAIN * edge),
         }
     }
 
