@@ -107,6 +107,28 @@ const BEFORE_TESTS: [&str; 6] = ["fmt", "deny", "lint", "doc", "features", "pack
 
 /// All jobs, the tests last so that their summary is the last line; a failed job stops no other.
 fn ci(workspace: &Workspace) -> bool {
+    let failed = std::thread::scope(|scope| {
+        // Gigabytes to fetch, which the network can do while cargo builds.
+        let packages = scope.spawn(|| python::groups(workspace, python::ALL_TESTS));
+        let failed = before_tests(workspace);
+        match packages.join() {
+            Ok(Ok(())) => {}
+            // The tests' first step tries once more, and counts.
+            Ok(Err(error)) => eprintln!("Python's packages: {error:#}"),
+            Err(_) => eprintln!("Python's packages: the installing thread stopped"),
+        }
+        failed
+    });
+    println!("== test --full");
+    let tally = test::run(workspace, true);
+    if !failed.is_empty() {
+        println!("failed before the tests: {}", failed.join(", "));
+    }
+    end_with(&tally) && failed.is_empty()
+}
+
+/// Names of the jobs before the tests that failed.
+fn before_tests(workspace: &Workspace) -> Vec<&'static str> {
     let mut failed = Vec::new();
     let jobs = BEFORE_TESTS.iter().filter_map(|name| JOBS.iter().find(|(job, _)| job == name));
     for (name, work) in jobs {
@@ -118,12 +140,7 @@ fn ci(workspace: &Workspace) -> bool {
         }
         println!("-- {name}: {} s", start.elapsed().as_secs());
     }
-    println!("== test --full");
-    let tally = test::run(workspace, true);
-    if !failed.is_empty() {
-        println!("failed before the tests: {}", failed.join(", "));
-    }
-    end_with(&tally) && failed.is_empty()
+    failed
 }
 
 /// Prints the summary, last of all, and says whether everything passed.

@@ -31,8 +31,33 @@ pub const ALL_TESTS: Needs = Needs {
 /// maturin compiles it with the profile and the target folder of the other jobs, and with features
 /// that are those of the whole workspace, so that only PyO3 and the extension itself are new.
 pub fn environment(workspace: &Workspace, needs: Needs) -> Result<PathBuf> {
-    let folder = workspace.root.join(".venv");
-    let programs = folder.join("bin");
+    let programs = virtual_environment(workspace)?;
+    let (stamp, installed) = (programs.with_file_name("installed"), stamp_of(workspace, needs)?);
+    if std::fs::read_to_string(&stamp).is_ok_and(|found| found == installed) {
+        return Ok(programs);
+    }
+    let package = format!(".[{}]", needs.extras.join(","));
+    let mut arguments = PIP_INSTALL.to_vec();
+    arguments.extend(["--config-settings", "build-args=--profile dev"]);
+    arguments.extend(group_options(needs));
+    arguments.push(&package);
+    println!("pip install --group {} '{package}'", needs.groups.join(" --group "));
+    program(workspace, &programs.join("python"), &arguments).succeed()?;
+    std::fs::write(&stamp, installed).with_context(|| stamp.display().to_string())?;
+    Ok(programs)
+}
+
+/// Installs the packages of the groups that are needed into `.venv`: most of what [`environment`] downloads, and
+/// nothing that asks for a compiler, so that it may go on beside builds.
+pub fn groups(workspace: &Workspace, needs: Needs) -> Result<()> {
+    let python = virtual_environment(workspace)?.join("python");
+    let arguments = [&PIP_INSTALL[..], &group_options(needs)].concat();
+    program(workspace, &python, &arguments).succeed()
+}
+
+/// Makes `.venv` where it is not there, with a pip that knows groups; the folder of its programs.
+fn virtual_environment(workspace: &Workspace) -> Result<PathBuf> {
+    let programs = workspace.root.join(".venv/bin");
     let python = programs.join("python");
     let system = Path::new("python3");
     if !program(workspace, &python, &["-c", "import pip"]).works() {
@@ -45,24 +70,16 @@ pub fn environment(workspace: &Workspace, needs: Needs) -> Result<PathBuf> {
             bail!("Python's venv is missing: apt-get install python3-venv");
         }
         program(workspace, system, &["-m", "venv", "--clear", ".venv"]).succeed()?;
+        // Debian 12 comes with pip 23, which knows no dependency groups.
+        let arguments = [&PIP_INSTALL[..], &["--upgrade", PIP]].concat();
+        program(workspace, &python, &arguments).succeed()?;
     }
-    let (stamp, installed) = (folder.join("installed"), stamp_of(workspace, needs)?);
-    if std::fs::read_to_string(&stamp).is_ok_and(|found| found == installed) {
-        return Ok(programs);
-    }
-    // Debian 12 comes with pip 23, which knows no dependency groups.
-    program(workspace, &python, &[&PIP_INSTALL[..], &["--upgrade", PIP][..]].concat()).succeed()?;
-    let package = format!(".[{}]", needs.extras.join(","));
-    let mut arguments = PIP_INSTALL.to_vec();
-    arguments.extend(["--config-settings", "build-args=--profile dev"]);
-    for &group in needs.groups {
-        arguments.extend(["--group", group]);
-    }
-    arguments.push(&package);
-    println!("pip install --group {} '{package}'", needs.groups.join(" --group "));
-    program(workspace, &python, &arguments).succeed()?;
-    std::fs::write(&stamp, installed).with_context(|| stamp.display().to_string())?;
     Ok(programs)
+}
+
+/// pip's options for the groups that are needed.
+fn group_options(needs: Needs) -> Vec<&'static str> {
+    needs.groups.iter().flat_map(|&group| ["--group", group]).collect()
 }
 
 const PIP_INSTALL: [&str; 5] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
