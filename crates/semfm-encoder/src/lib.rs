@@ -22,6 +22,7 @@ mod layer;
 mod net_encoder;
 mod net_file;
 mod network;
+mod observed_picture;
 mod open;
 #[cfg(any(feature = "onnx", feature = "siglip"))]
 mod pretrained;
@@ -37,6 +38,7 @@ pub use error::{Error, Result};
 pub use layer::{ConvLayer, Layer};
 pub use net_encoder::NetEncoder;
 pub use net_file::{Background, NetHeader, write_net};
+pub use observed_picture::{Brightness, ObservedPicture, camera_before_mesh};
 pub use open::{OpenSettings, encoder_names, open_encoder};
 #[cfg(any(feature = "onnx", feature = "siglip"))]
 pub use pretrained::PretrainedEncoder;
