@@ -50,6 +50,7 @@ pub use depth_image::{DepthImage, DepthPoints};
 pub use error::{Error, Result};
 pub use model::AlignModel;
 pub use observed_cloud::ObservedCloud;
+pub use rotations::super_fibonacci;
 pub use semfm_geom::Verdict;
 pub use settings::AlignSettings;
 pub use sim3::Sim3;

@@ -11,7 +11,7 @@ const AROUND_GUESS: [f64; 2] = [22.0, 38.0];
 ///
 /// With s = i + ½, r = √(s/n), R = √(1 − s/n), α = 2π s/√2 and β = 2π s/ψ, the i-th unit quaternion
 /// is (x, y, z, w) = (r sin α, r cos α, R sin β, R cos β).
-pub(crate) fn super_fibonacci(n: usize) -> impl Iterator<Item = DQuat> {
+pub fn super_fibonacci(n: usize) -> impl Iterator<Item = DQuat> {
     use std::f64::consts::{SQRT_2, TAU};
     /// The positive root of ψ⁴ = ψ + 4.
     const PSI: f64 = 1.533_751_168_755_204_3;
