@@ -10,6 +10,7 @@ use semfm_align::Sim3;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
 use semfm_grasp::{GraspObject, GraspSettings, Grasps, Scene, SurfaceSettings, find_grasps};
+use semfm_observe::{UnseenSettings, unseen_side};
 use semfm_robot::Gripper;
 
 use crate::files::AlignedPose;
@@ -23,6 +24,10 @@ pub const POINT_MARGIN: f64 = 0.005;
 /// Metres that an uncertain pose keeps the gripper away at most: beyond, hardly a hand gets around a handle, and
 /// [`GraspProblem::shares_of_poses`] tells more.
 pub const MOST_POSE_MARGIN: f64 = 0.01;
+
+/// Metres behind an observed surface, and from its outline, at which the unknown begins: the noise of a depth camera at arm's
+/// length, and the lean of a pad that closes on the outline (2 cm of it at 8° reach 3 mm behind).
+const UNSEEN_GAP: f64 = 0.003;
 
 /// What grasps are wanted, and what stands around the object.
 #[derive(Clone, Debug)]
@@ -89,6 +94,21 @@ impl GraspRequest {
         request.alternatives.clone_from(&pose.alternatives);
         request.settings.pose_margin = pose.uncertainty(mesh).min(MOST_POSE_MARGIN);
         request
+    }
+
+    /// What is hidden behind the surface that a camera at `eye` saw, up to `depth` metres or down to the table of this request,
+    /// as an obstacle: nobody knows what is there. `mesh` is that surface, in its own frame and unit, `eye` in its frame and
+    /// metres; the answer's frame is the same ([`unseen_side`]). `None` where nothing is hidden.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid) for a depth of 3 mm or less, numbers that are not finite, and a mesh that is
+    /// known all around.
+    pub fn hidden_behind(&self, mesh: &Mesh, eye: DVec3, depth: f64) -> Result<Option<Obstacle>> {
+        let ends_at = self.table.map(|table| [table.point, table.normal.normalize_or_zero()]);
+        let settings = UnseenSettings { depth, gap: UNSEEN_GAP, ends_at };
+        let vertices = mesh.vertices().iter().map(|&p| p * self.object_scale).collect();
+        let surface = Mesh::new(vertices, mesh.faces().to_vec())?;
+        Ok(unseen_side(&surface, eye, &settings)?.map(Obstacle::Mesh))
     }
 
     /// Everything turned into the frame of `mesh` and made ready for the search.

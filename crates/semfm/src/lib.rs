@@ -68,6 +68,7 @@ mod motion_scene;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
 mod object_size;
+pub mod observed_object;
 mod pipeline;
 mod planned_motion;
 mod pose_dependence;

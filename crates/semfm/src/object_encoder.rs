@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use half::f16;
-use semfm_encoder::Encoder;
 use semfm_encoder::rendered_views::{Coloring, Drawable, ViewSettings};
+use semfm_encoder::{Encoder, EncoderIdentity, OpenSettings, open_encoder};
 use semfm_geom::io::{read_json, write_json};
 use semfm_geom::{Mesh, MeshHash, ShapeCache, Task};
 use semfm_views::EmbeddedView;
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::encoded_objects::EncodedObjects;
 use crate::files::read_embeddings;
-use crate::{FeatureSource, PipelineSettings, Prepared, Result, prepare};
+use crate::{Error, FeatureSource, PipelineSettings, Prepared, Result, prepare};
 
 /// An encoder with the folder in which its embeddings are kept.
 #[derive(Clone, Debug)]
@@ -176,6 +176,52 @@ impl ObjectEncoder {
         })
     }
 
+    /// The encoder that made a file, as far as its name tells, at that file's rotations: for the other object of a pair.
+    ///
+    /// # Errors
+    /// As [`open_encoder`]; [`Error::Invalid`](crate::Error::Invalid) for embeddings that no network made.
+    pub fn of_file(
+        file: &EmbeddingsFile,
+        settings: &OpenSettings,
+        cache: &ShapeCache,
+    ) -> Result<Self> {
+        if file.metadata.simulated {
+            let expected = "those of both objects, since no encoder made these";
+            return Err(Error::invalid("embeddings", expected, file.path.display().to_string()));
+        }
+        let encoder = open_encoder(&file.metadata.encoder, settings)?;
+        Ok(Self::new(encoder, cache).with_rolls(file.metadata.rolls))
+    }
+
+    /// The embeddings of an object beside those of another that are there already: in its own colours where the other was
+    /// shown in its own.
+    ///
+    /// # Errors
+    /// As [`ObjectEncoder::embed`]; [`Error::Invalid`](crate::Error::Invalid) where this is another encoder, or another
+    /// version of it, than made the file.
+    pub fn embed_beside<'a>(
+        &self,
+        file: &EmbeddingsFile,
+        object: impl Into<Drawable<'a>>,
+        task: &Task,
+    ) -> Result<EncodedObject> {
+        let is_colored = file.metadata.views.more.get("colors").is_some_and(|name| name == "own");
+        let coloring = if is_colored { Coloring::Own } else { Coloring::Grey };
+        let made = self.embed(object, coloring, task)?;
+        let identity = |file: &EmbeddingsFile| EncoderIdentity {
+            name: file.metadata.encoder.clone(),
+            version: file.metadata.revision.clone(),
+        };
+        let (expected, found) = (identity(file), identity(&made.embeddings));
+        if expected != found || file.dim() != made.embeddings.dim() {
+            let what = format!("encoder beside {}", file.path.display());
+            let expected = format!("{expected}, which made it, with {} dimensions", file.dim());
+            let found = format!("{found} with {}", made.embeddings.dim());
+            return Err(Error::invalid(what, expected, found));
+        }
+        Ok(made)
+    }
+
     /// What is kept of an object. Whatever is wrong with a kept file, a new one is the cure.
     fn kept(&self, object: Drawable<'_>, coloring: Coloring) -> Result<Option<EncodedObject>> {
         let Some(folder) = &self.folder else { return Ok(None) };
@@ -264,4 +310,32 @@ fn keep(folder: &Path, path: &Path, embeddings: &EmbeddingsFile, times: &Encodin
 fn exact_dtype(views: &[EmbeddedView]) -> Dtype {
     let mut numbers = views.iter().flat_map(|view| view.patches.data());
     if numbers.all(|&x| f16::from_f32(x).to_f32() == x) { Dtype::F16 } else { Dtype::F32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use semfm_geom::zoo;
+
+    #[test]
+    fn the_other_object_is_encoded_by_who_made_the_file() {
+        let (cup, kettle) = (zoo::icosphere(3), zoo::icosphere(2));
+        let settings = OpenSettings::default();
+        let builtin = open_encoder("builtin", &settings).unwrap();
+        let encoder = ObjectEncoder::new(builtin, &ShapeCache::off()).with_rolls(2);
+        let task = Task::default();
+        let mut file = encoder.embed(&cup, Coloring::Grey, &task).unwrap().embeddings;
+        let beside = ObjectEncoder::of_file(&file, &settings, &ShapeCache::off()).unwrap();
+        assert_eq!(beside.rolls(), 2);
+        let made = beside.embed_beside(&file, &kettle, &task).unwrap();
+        assert_eq!(
+            made.embeddings,
+            encoder.embed(&kettle, Coloring::Grey, &task).unwrap().embeddings
+        );
+        file.metadata.revision = "0+ffffffffffff".into();
+        let error = beside.embed_beside(&file, &kettle, &task).unwrap_err().to_string();
+        assert!(error.contains("builtin 0+ffffffffffff, which made it"), "{error}");
+        file.metadata.simulated = true;
+        assert!(ObjectEncoder::of_file(&file, &settings, &ShapeCache::off()).is_err());
+    }
 }

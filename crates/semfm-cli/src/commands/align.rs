@@ -9,9 +9,12 @@ use semfm::align::{AlignSettings, Alignment, ObservedCloud, Verdict, align};
 use semfm::files::{AlignedFile, read_pose};
 use semfm::geom::io::{read_mesh, read_points};
 use semfm::geom::math::DVec3;
-use semfm::observe::{MaskFile, ObservationFiles};
+use semfm::observe::{
+    Mask, MaskFile, Observation, ObservationFiles, read_intrinsics, registration_doubt,
+};
 
 use super::Outcome;
+use super::frame_options::{BagOptions, SourceFrame, chosen_mask, parse_source, read_source_frame};
 use super::size::size_in_metres;
 use crate::console;
 use crate::options::{Common, numbers};
@@ -19,9 +22,10 @@ use crate::output::OutputFile;
 
 /// Find a mesh of unknown scale in a depth image or a point cloud
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("observed").required(true).args(["cloud", "depth"]))]
+#[command(group = ArgGroup::new("observed").required(true).args(["cloud", "depth", "frame"]))]
 #[command(after_help = "Examples:\n  \
     semfm-cli align mug.obj --depth depth.png --intrinsics K.json --mask mask.png -o aligned.json\n  \
+    semfm-cli align mug.obj --frame bop/000001#3 --object obj5 -o aligned.json\n  \
     semfm-cli align mug.obj --cloud seen.ply -o aligned.json\n\n\
     Without a mask the cloud should hold little but the object: what else it holds counts as clutter.\n\
     Exit code 0: a pose to use or to check. 1: verdict `refuse` (the file is written all the same). 2: bad input.")]
@@ -33,6 +37,8 @@ pub struct AlignCommand {
     output: PathBuf,
     #[command(flatten)]
     observed: ObservedOptions,
+    #[command(flatten)]
+    bag: BagOptions,
     /// A guess: aligned.json or a 4 × 4 matrix, scale included; the search stays near its rotation
     #[arg(long, value_name = "FILE", help_heading = "Search")]
     init: Option<PathBuf>,
@@ -72,6 +78,22 @@ struct ObservedOptions {
     /// (.json); or one label of a picture of labels
     #[arg(long, value_name = "MASK[#LABEL]", requires = "depth")]
     mask: Option<String>,
+    /// The colour camera, where the mask was drawn in its picture and --intrinsics are another camera's: says on whose pixels
+    /// the depth lies
+    #[arg(long, value_name = "K.json", requires = "mask")]
+    color_intrinsics: Option<PathBuf>,
+    /// A frame of a BOP scene or of a bag in place of files; `#N` is its frame N [default: #0]
+    #[arg(long, value_name = "SOURCE[#N]")]
+    frame: Option<String>,
+    /// The object's mask in that frame, by name, where it has several (`obj5` in a BOP scene)
+    #[arg(long, value_name = "NAME", requires = "frame")]
+    object: Option<String>,
+}
+
+/// What is searched, and what is doubtful about it.
+struct Observed {
+    cloud: ObservedCloud,
+    notes: Vec<String>,
 }
 
 impl AlignCommand {
@@ -83,7 +105,10 @@ impl AlignCommand {
         let output = OutputFile::new(&self.output, &inputs, common)?;
         let file = read_mesh(&self.mesh)?;
         let start = Instant::now();
-        let observed = self.observed.read()?;
+        let Observed { cloud, notes } = self.observed.read(&self.bag)?;
+        if !common.quiet {
+            notes.iter().for_each(console::message);
+        }
         let read = start.elapsed().as_secs_f64() * 1e3;
         let settings = AlignSettings {
             init: self.init.as_deref().map(read_pose).transpose()?,
@@ -94,7 +119,7 @@ impl AlignCommand {
         };
         output.check_again()?;
         let task = console::progress(common.quiet);
-        let mut found = align(&file.mesh, &observed, &settings, &task)
+        let mut found = align(&file.mesh, &cloud, &settings, &task)
             .with_context(|| self.mesh.display().to_string())?;
         found.stages_ms.insert(0, ("observe", read));
         let aligned = AlignedFile::new(&found, &file.mesh, &settings);
@@ -118,7 +143,9 @@ impl ObservedOptions {
     fn files(&self) -> Vec<PathBuf> {
         let depth = self.depth_files().map(|files| files.paths().map(Path::to_owned).collect());
         let depth: Vec<PathBuf> = depth.unwrap_or_default();
-        depth.into_iter().chain(self.cloud.clone()).collect()
+        let source = self.frame.as_deref().map(|frame| parse_source(frame).0);
+        let further = [self.cloud.clone(), self.color_intrinsics.clone(), source];
+        depth.into_iter().chain(further.into_iter().flatten()).collect()
     }
 
     /// A depth image with its camera and mask.
@@ -132,14 +159,27 @@ impl ObservedOptions {
         })
     }
 
-    fn read(&self) -> Result<ObservedCloud> {
+    fn read(&self, bag: &BagOptions) -> Result<Observed> {
         if let Some(files) = self.depth_files() {
             let seen = files.read()?;
+            let mask = seen.masks().first();
             let named = || files.paths().last().unwrap_or(Path::new("")).display().to_string();
-            return seen.observed_cloud(seen.masks().first()).with_context(named);
+            let notes = self.doubts(&seen, mask)?;
+            return Ok(Observed { cloud: seen.observed_cloud(mask).with_context(named)?, notes });
         }
-        let cloud = self.cloud.as_deref().context("--cloud or --depth is needed")?;
-        let points = read_points(cloud)?.points;
+        if let Some(frame) = &self.frame {
+            let (path, number) = parse_source(frame);
+            let SourceFrame { observation: seen, report } = read_source_frame(&path, number, bag)?;
+            let mask = chosen_mask(&seen, self.object.as_deref())?;
+            let mut notes = report.notes;
+            notes.extend(self.doubts(&seen, mask)?);
+            return Ok(Observed {
+                cloud: seen.observed_cloud(mask).with_context(|| frame.clone())?,
+                notes,
+            });
+        }
+        let path = self.cloud.as_deref().context("--cloud, --depth or --frame is needed")?;
+        let points = read_points(path)?.points;
         let viewpoint = match self.viewpoint.as_deref().map(numbers) {
             Some(numbers) => {
                 DVec3::from_array(numbers.context("--viewpoint: expected three numbers, X,Y,Z")?)
@@ -151,7 +191,17 @@ impl ObservedOptions {
         } else {
             ObservedCloud::from_view(&points, viewpoint)
         };
-        observed.with_context(|| cloud.display().to_string())
+        let cloud = observed.with_context(|| path.display().to_string())?;
+        Ok(Observed { cloud, notes: Vec::new() })
+    }
+
+    /// What speaks against the mask or the camera: depth that does not jump where the mask ends.
+    fn doubts(&self, seen: &Observation, mask: Option<&Mask>) -> Result<Vec<String>> {
+        let (Some(depth), Some(mask)) = (seen.depth(), mask) else { return Ok(Vec::new()) };
+        let color = self.color_intrinsics.as_deref().map(|path| read_intrinsics(path, depth));
+        let color = color.transpose()?;
+        let doubt = registration_doubt(depth, &mask.marked, seen.camera(), color.as_ref());
+        Ok(doubt.map(|doubt| format!("warning: {doubt}")).into_iter().collect())
     }
 }
 

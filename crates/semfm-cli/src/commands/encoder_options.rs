@@ -5,6 +5,7 @@ use clap::Args;
 use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, encoder_names, open_encoder};
 use semfm::geom::ShapeCache;
 use semfm::object_encoder::ObjectEncoder;
+use semfm::views::mcap::EmbeddingsFile;
 
 use crate::options::Common;
 
@@ -33,6 +34,22 @@ impl EncoderOptions {
         let encoder = open_encoder(name, &settings).context("--encoder")?;
         let rolls = self.rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(rolls));
         Ok(ObjectEncoder::new(encoder, cache).with_rolls(rolls))
+    }
+
+    /// The encoder for the other object of a pair: the named one, else the one that made the file, at the file's rotations.
+    pub fn open_beside(
+        &self,
+        file: &EmbeddingsFile,
+        cache: &ShapeCache,
+        common: &Common,
+    ) -> Result<ObjectEncoder> {
+        if self.encoder.is_some() {
+            return Ok(self
+                .open(file.metadata.rolls, cache, common)?
+                .with_rolls(file.metadata.rolls));
+        }
+        let settings = OpenSettings { threads: common.threads, quiet: common.quiet };
+        Ok(ObjectEncoder::of_file(file, &settings, cache)?)
     }
 }
 

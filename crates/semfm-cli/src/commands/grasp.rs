@@ -92,6 +92,19 @@ pub struct GraspOptions {
     /// A table: a point of it and its normal, away from the table
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse_table, allow_hyphen_values = true, help_heading = "Scene")]
     table: Option<Table>,
+    /// Keep out of what lies behind a surface that one camera saw (`semfm-cli surface`), up to so many metres or down to the
+    /// table: nobody knows what is there
+    #[arg(
+        long,
+        value_name = "METRES",
+        conflicts_with = "aligned",
+        allow_negative_numbers = true,
+        help_heading = "Scene"
+    )]
+    unseen: Option<f64>,
+    /// Where that camera stood [default: in the origin of the mesh, as for the surface of one frame]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "unseen", allow_hyphen_values = true, help_heading = "Scene")]
+    seen_from: Option<DVec3>,
     /// Grasps to return
     #[arg(long, default_value_t = GraspSettings::default().top, value_name = "N", help_heading = "Grasps")]
     top: usize,
@@ -238,6 +251,8 @@ impl GraspOptions {
             scene: Vec::new(),
             scene_margin: POINT_MARGIN,
             table: None,
+            unseen: None,
+            seen_from: None,
             top,
             diversity,
             random: false,
@@ -281,6 +296,11 @@ impl GraspOptions {
         request.point_margin = self.scene_margin;
         for path in &self.scene {
             request.obstacles.push(read_obstacle(path)?);
+        }
+        if let Some(depth) = self.unseen {
+            let eye = self.seen_from.unwrap_or(DVec3::ZERO);
+            let hidden = request.hidden_behind(&mesh, eye, depth).context("--unseen")?;
+            request.obstacles.extend(hidden);
         }
         Ok(request.prepare(Arc::new(mesh), gripper)?)
     }

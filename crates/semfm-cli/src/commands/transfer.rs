@@ -114,12 +114,11 @@ struct MemoryOptions {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Features")]
 struct FeatureOptions {
-    /// Embeddings of the source's views
-    #[arg(long, value_name = "A.emb.mcap", requires = "target_embeddings",
-        conflicts_with_all = ["encoder", "rolls", "source_features"])]
+    /// Embeddings of the source's views; where only one object has them, the other is shown to the encoder that made them
+    #[arg(long, value_name = "A.emb.mcap", conflicts_with_all = ["rolls", "source_features"])]
     source_embeddings: Option<PathBuf>,
     /// Embeddings of the target's views
-    #[arg(long, value_name = "B.emb.mcap", conflicts_with_all = ["encoder", "rolls"])]
+    #[arg(long, value_name = "B.emb.mcap", conflicts_with_all = ["rolls", "target_features"])]
     target_embeddings: Option<PathBuf>,
     #[command(flatten)]
     encoder: EncoderOptions,
@@ -133,6 +132,17 @@ struct FeatureOptions {
     /// Lift with the settings of this method instead of the method's own
     #[arg(long, value_name = "METHOD")]
     features: Option<Method>,
+}
+
+impl FeatureOptions {
+    /// The embeddings of the one object that has them, and whether it is the source.
+    fn one_sided(&self) -> Option<(&Path, bool)> {
+        match (&self.source_embeddings, &self.target_embeddings) {
+            (Some(path), None) => Some((path, true)),
+            (None, Some(path)) => Some((path, false)),
+            _ => None,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -196,12 +206,13 @@ struct Pair<T> {
 impl TransferCommand {
     pub fn run(self, common: &Common) -> Result<Outcome> {
         check_folder(&self.output, TRANSFER_FILES, &self.inputs())?;
+        let given = &self.features;
+        let is_complete = given.source_embeddings.is_some() || self.memory.memory.is_some();
+        if given.target_embeddings.is_some() && is_complete && given.encoder.encoder.is_some() {
+            bail!("--encoder: expected none, since there are embeddings of all objects, found one");
+        }
         if let Some(memory) = &self.memory.memory {
             return self.question(memory).answer(&self.output, common);
-        }
-        let given = &self.features;
-        if given.target_embeddings.is_some() && given.source_embeddings.is_none() {
-            bail!("--target-embeddings: expected --source-embeddings beside it, or --memory");
         }
         if self.robot.is_some() {
             check_folder(&self.output.join(PLAN), PLAN_FILES, &self.inputs())?;
@@ -371,6 +382,18 @@ impl TransferCommand {
             let [a, b] = self.read_both(a, b, &files)?;
             let features =
                 Pair { source: FeatureSource::from(&a), target: FeatureSource::from(&b) };
+            return self.prepare_both(files, features, settings, task);
+        }
+        if let Some((path, is_source)) = options.one_sided() {
+            let (with, without) = match is_source {
+                true => (&files.source, &files.target),
+                false => (&files.target, &files.source),
+            };
+            let there = read_embeddings(path, &with.mesh)?;
+            let made = options.encoder.open_beside(&there, &settings.cache, common)?;
+            let made = made.embed_beside(&there, without, task)?.embeddings;
+            let (a, b) = if is_source { (&there, &made) } else { (&made, &there) };
+            let features = Pair { source: FeatureSource::from(a), target: FeatureSource::from(b) };
             return self.prepare_both(files, features, settings, task);
         }
         let method = self.matching.method.info();

@@ -43,6 +43,8 @@ mod ros2_hand;
 mod ros2_trajectory;
 mod scene;
 mod stored_transfer;
+#[cfg(feature = "mcap")]
+mod surface;
 mod trajectory;
 mod trajectory_check;
 mod transfer_folder;
@@ -89,6 +91,11 @@ pub use scene::{
     SphereRecord, TablePlaneRecord, read_scene,
 };
 pub use stored_transfer::StoredTransfer;
+#[cfg(feature = "mcap")]
+pub use surface::{
+    CameraRecord, FILES as SURFACE_FILES, FORMAT as SURFACE_FORMAT, PixelsRecord, SurfaceFile,
+    SurfaceResult, write_surface,
+};
 pub use trajectory::{
     FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
     MountedHandRecord, OBJECT_FILE, ObstacleRecord, ShapeRecord, TrajectoryFile, read_motion,
