@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::{FormatError, contents, input_files};
@@ -60,19 +60,44 @@ pub fn read_file(path: impl AsRef<Path>) -> Result<Vec<u8>> {
 /// [`Error::Io`]; [`Error::Format`] for what is no regular file.
 pub fn read_at_most(path: impl AsRef<Path>, most: u64) -> Result<Vec<u8>> {
     let path = path.as_ref();
+    let (file, about) = open_regular(path)?;
+    let size = about.len().min(most);
+    let mut bytes = Vec::new();
+    let room = usize::try_from(size).unwrap_or(usize::MAX);
+    bytes.try_reserve_exact(room).map_err(|_| out_of_memory(path, size))?;
+    file.take(most).read_to_end(&mut bytes).map_err(Error::io(path))?;
+    input_files::remember_read(path, &about);
+    Ok(bytes)
+}
+
+/// Opens a regular file for a reader that takes it piece by piece, with its size in bytes: what is refused is what
+/// [`read_file`] refuses.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn open_file(path: impl AsRef<Path>) -> Result<(fs::File, u64)> {
+    /// Bytes that show what only stands for a file.
+    const FIRST: u64 = 4096;
+    let path = path.as_ref();
+    let (mut file, about) = open_regular(path)?;
+    let mut first = Vec::new();
+    (&mut file).take(FIRST).read_to_end(&mut first).map_err(Error::io(path))?;
+    if let Some(kind) = contents::stand_in(&first) {
+        return Err(FormatError::new(path, "first bytes", "the file itself", kind).into());
+    }
+    file.rewind().map_err(Error::io(path))?;
+    input_files::remember_read(path, &about);
+    Ok((file, about.len()))
+}
+
+fn open_regular(path: &Path) -> Result<(fs::File, fs::Metadata)> {
     let io = Error::io(path);
     check_regular(path, &fs::metadata(path).map_err(&io)?)?;
     let file = fs::File::open(path).map_err(&io)?;
     // Another thing may have taken its place in between.
     let about = file.metadata().map_err(&io)?;
     check_regular(path, &about)?;
-    let size = about.len().min(most);
-    let mut bytes = Vec::new();
-    let room = usize::try_from(size).unwrap_or(usize::MAX);
-    bytes.try_reserve_exact(room).map_err(|_| out_of_memory(path, size))?;
-    file.take(most).read_to_end(&mut bytes).map_err(&io)?;
-    input_files::remember_read(path, &about);
-    Ok(bytes)
+    Ok((file, about))
 }
 
 fn out_of_memory(path: &Path, size: u64) -> Error {

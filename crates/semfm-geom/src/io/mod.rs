@@ -45,7 +45,7 @@ pub use self::format_error::FormatError;
 pub use self::gltf::{GlbNode, write_glb};
 pub use self::image::{Texture, Wrap};
 use self::input::Input;
-pub use self::input::{read_at_most, read_file};
+pub use self::input::{open_file, read_at_most, read_file};
 pub use self::input_files::{is_same_file, refuse_input, refuse_to_overwrite};
 pub use self::json::{json_of, read_json, write_json, write_json_pretty};
 pub use self::mesh_format::MeshFormat;

@@ -22,6 +22,7 @@ mod metadata;
 mod pose_array;
 mod reader;
 mod record;
+mod record_stream;
 mod ros2_messages;
 mod summary;
 mod topics;

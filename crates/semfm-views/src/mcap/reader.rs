@@ -18,15 +18,17 @@
 //! work, at the price of errors without a byte offset.
 
 use std::collections::BTreeMap;
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-use semfm_geom::io::{foreign_kind, read_file};
+use semfm_geom::io::open_file;
 
 use super::contents::{Attachment, Channel, Contents, MetadataRecord, TimeRange};
 use super::decompress::decompress;
 use super::layout::{Layout, StoredAttachment, StoredChunk, StoredMetadata};
 use super::message_index::ChunkMessages;
 use super::record::{MAGIC, Place, Record, Records, check_crc, opcode};
+use super::record_stream::RecordStream;
 use super::summary;
 use crate::{Fault, Result};
 
@@ -47,11 +49,11 @@ pub struct Message<'a> {
     pub data: &'a [u8],
 }
 
-/// Reads a file whole and hands every message to `visit`, in file order.
+/// Reads a file from its first record to its last and hands every message to `visit`, in file order.
 ///
-/// Lengths, checksums, ids, the messages' index and the summary are all checked; memory stays under
-/// 64 MB plus 40 times the file. The summary stands at the end: what `visit` collected is sound
-/// only when this returns `Ok`.
+/// Lengths, checksums, ids, the messages' index and the summary are all checked. One record is in memory at a time, and
+/// a chunk as it is decompressed: 256 MB at most, however large the file. The summary stands at the end: what `visit`
+/// collected is sound only when this returns `Ok`. A file that was cut is refused before its first message.
 ///
 /// # Errors
 /// [`Error::Geom`](crate::Error::Geom) where the file cannot be read or is no regular file, [`Error::Container`](crate::Error::Container) with the
@@ -60,8 +62,8 @@ pub fn read_messages(
     path: &Path,
     visit: impl FnMut(Message<'_>) -> Result<()>,
 ) -> Result<Contents> {
-    let bytes = read_file(path)?;
-    read_bytes(path, &bytes, visit)
+    let (file, size) = open_file(path)?;
+    read_source(path, BufReader::with_capacity(1 << 16, file), size, visit)
 }
 
 /// As [`read_messages`], for the bytes of a file that are in memory already; `path` is for messages.
@@ -71,13 +73,21 @@ pub fn read_messages(
 pub fn read_bytes(
     path: &Path,
     bytes: &[u8],
+    visit: impl FnMut(Message<'_>) -> Result<()>,
+) -> Result<Contents> {
+    read_source(path, Cursor::new(bytes), bytes.len() as u64, visit)
+}
+
+fn read_source(
+    path: &Path,
+    source: impl Read + Seek,
+    size: u64,
     mut visit: impl FnMut(Message<'_>) -> Result<()>,
 ) -> Result<Contents> {
-    let body = between_magics(path, bytes)?;
-    let mut records = Records { path, bytes: body, at: MAGIC.len(), chunk: None };
+    let mut records = RecordStream::new(path, source, size)?;
     let mut pass = Pass {
         path,
-        file_bytes: bytes.len(),
+        file_bytes: usize::try_from(size).unwrap_or(usize::MAX),
         contents: Contents::default(),
         layout: Layout::default(),
         kept: 0,
@@ -87,37 +97,11 @@ pub fn read_bytes(
     };
     pass.header(&mut records)?;
     let data_end = pass.data_section(&mut records)?;
-    summary::check(&mut pass.contents, &pass.layout, &mut records, data_end)?;
+    let bytes = records.rest()?;
+    let mut summary = Records { path, bytes: &bytes, base: data_end, at: data_end, chunk: None };
+    summary::check(&mut pass.contents, &pass.layout, &mut summary, data_end)?;
     Ok(pass.contents)
 }
-
-/// The file without the magic at its end; offsets keep counting from its start.
-fn between_magics<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
-    let start = Place { path, opcode: None, offset: 0, chunk: None };
-    if bytes.is_empty() {
-        return Err(start.error(Fault::Truncated, MAGIC_BYTES, "an empty file"));
-    }
-    if !bytes.starts_with(MAGIC) {
-        return Err(match MAGIC.starts_with(bytes) {
-            true => start.error(Fault::Truncated, MAGIC_BYTES, "only the first of them"),
-            false => {
-                let found = foreign_kind(bytes).unwrap_or("other bytes: this is no MCAP file");
-                start.error(Fault::Magic, MAGIC_BYTES, found)
-            }
-        });
-    }
-    match bytes[MAGIC.len()..].strip_suffix(MAGIC) {
-        Some(rest) => Ok(&bytes[..MAGIC.len() + rest.len()]),
-        None => {
-            let end = Place { offset: bytes.len().saturating_sub(MAGIC.len()), ..start };
-            let found = "other bytes at the end of the file: it was cut or never finished";
-            Err(end.error(Fault::Truncated, MAGIC_BYTES, found))
-        }
-    }
-}
-
-/// What stands at both ends of a file, for messages.
-const MAGIC_BYTES: &str = "the magic bytes of MCAP version 0 (89 4d 43 41 50 30 0d 0a)";
 
 /// Schemas and channels out of chunks may take this much memory whatever the size of the file,
 const KEPT_BYTES: usize = 16 << 20;
@@ -139,8 +123,8 @@ struct Pass<'a, 'v> {
     visit: &'v mut dyn FnMut(Message<'_>) -> Result<()>,
 }
 
-impl<'a> Pass<'a, '_> {
-    fn header(&mut self, records: &mut Records<'a>) -> Result<()> {
+impl Pass<'_, '_> {
+    fn header<R: Read + Seek>(&mut self, records: &mut RecordStream<'_, R>) -> Result<()> {
         let start = Place { path: self.path, opcode: None, offset: MAGIC.len(), chunk: None };
         let record = records
             .next()?
@@ -155,7 +139,7 @@ impl<'a> Pass<'a, '_> {
     }
 
     /// Reads up to the Data End record and returns the byte behind it.
-    fn data_section(&mut self, records: &mut Records<'a>) -> Result<usize> {
+    fn data_section<R: Read + Seek>(&mut self, records: &mut RecordStream<'_, R>) -> Result<usize> {
         while let Some(record) = records.next()? {
             match record.opcode {
                 opcode::MESSAGE_INDEX => {
@@ -164,9 +148,12 @@ impl<'a> Pass<'a, '_> {
                 }
                 opcode::DATA_END => {
                     self.finish_chunk()?;
-                    let crc = record.fields().u32()?;
-                    check_crc(crc, &records.bytes[..record.place.offset], record.place)?;
-                    return Ok(record.end());
+                    let (crc, offset, end) =
+                        (record.fields().u32()?, record.place.offset, record.end());
+                    let opcode = Some(opcode::DATA_END);
+                    let place = Place { path: self.path, opcode, offset, chunk: None };
+                    records.check_crc_up_to(crc, offset, place)?;
+                    return Ok(end);
                 }
                 _ => self.finish_chunk()?,
             }
@@ -180,8 +167,8 @@ impl<'a> Pass<'a, '_> {
                 _ => return Err(record.misplaced("a record of the data section, or Data End")),
             }
         }
-        let place = Place { path: self.path, opcode: None, offset: records.at, chunk: None };
-        Err(place.error(Fault::Truncated, "a Data End record", "the end of the file"))
+        let expected = "a Data End record";
+        Err(records.place().error(Fault::Truncated, expected, "the end of the file"))
     }
 
     /// Takes a Schema or Channel record; false for every other one.
@@ -229,7 +216,7 @@ impl<'a> Pass<'a, '_> {
         check_crc(crc, bytes, place)?;
         self.chunk_messages = Some(ChunkMessages::default());
         let chunk = Some(place.offset);
-        let mut records = Records { path: self.path, bytes, at: 0, chunk };
+        let mut records = Records { path: self.path, bytes, base: 0, at: 0, chunk };
         while let Some(record) = records.next()? {
             match record.opcode {
                 _ if self.declaration(&record)? => {}

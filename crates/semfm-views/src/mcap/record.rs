@@ -138,16 +138,28 @@ impl<'a> Record<'a> {
 pub(super) struct Records<'a> {
     pub path: &'a Path,
     pub bytes: &'a [u8],
-    /// Byte of the next record.
+    /// Place of the first of `bytes` in the file, or in the chunk.
+    pub base: usize,
+    /// Byte of the next record, counted as `base` is.
     pub at: usize,
     /// Byte of the chunk that the bytes were taken from.
     pub chunk: Option<usize>,
 }
 
 impl<'a> Records<'a> {
+    /// Byte behind the last record.
+    pub fn end(&self) -> usize {
+        self.base + self.bytes.len()
+    }
+
+    /// The bytes from a place on.
+    pub fn from(&self, at: usize) -> &'a [u8] {
+        &self.bytes[at - self.base..]
+    }
+
     /// The next record, `None` where the bytes end with the record before.
     pub fn next(&mut self) -> Result<Option<Record<'a>>> {
-        let rest = &self.bytes[self.at..];
+        let rest = self.from(self.at);
         let mut place = Place { path: self.path, opcode: None, offset: self.at, chunk: self.chunk };
         // Within a chunk the lengths must fit; in the file, missing bytes mean that it was cut.
         let fault = if self.chunk.is_some() { Fault::Length } else { Fault::Truncated };
@@ -309,7 +321,7 @@ mod tests {
     use super::*;
 
     fn records(bytes: &[u8]) -> Records<'_> {
-        Records { path: Path::new("a.mcap"), bytes, at: 0, chunk: None }
+        Records { path: Path::new("a.mcap"), bytes, base: 0, at: 0, chunk: None }
     }
 
     #[test]

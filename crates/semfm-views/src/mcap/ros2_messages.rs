@@ -25,6 +25,8 @@ pub enum Ros2Message {
     CameraInfo,
     /// Shapes for RViz, in frames.
     MarkerArray,
+    /// A pose in a frame and how sure it is.
+    PoseWithCovarianceStamped,
 }
 
 /// A definition: its name, its fields, and the messages among them.
@@ -68,6 +70,16 @@ static POSE: Definition = Definition {
     name: "geometry_msgs/Pose",
     fields: "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
     parts: &[&POINT, &QUATERNION],
+};
+static POSE_WITH_COVARIANCE: Definition = Definition {
+    name: "geometry_msgs/PoseWithCovariance",
+    fields: "geometry_msgs/Pose pose\nfloat64[36] covariance\n",
+    parts: &[&POSE],
+};
+static POSE_WITH_COVARIANCE_STAMPED: Definition = Definition {
+    name: "geometry_msgs/msg/PoseWithCovarianceStamped",
+    fields: "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n",
+    parts: &[&HEADER, &POSE_WITH_COVARIANCE],
 };
 static TRANSFORM: Definition = Definition {
     name: "geometry_msgs/Transform",
@@ -206,6 +218,7 @@ impl Ros2Message {
             Self::Image => &IMAGE,
             Self::CameraInfo => &CAMERA_INFO,
             Self::MarkerArray => &MARKER_ARRAY,
+            Self::PoseWithCovarianceStamped => &POSE_WITH_COVARIANCE_STAMPED,
         }
     }
 
@@ -247,6 +260,7 @@ mod tests {
             Ros2Message::String,
             Ros2Message::TfMessage,
             Ros2Message::MarkerArray,
+            Ros2Message::PoseWithCovarianceStamped,
         ] {
             let text = String::from_utf8(message.schema().data.to_vec()).unwrap();
             let defined: Vec<&str> =

@@ -38,7 +38,7 @@ pub(super) fn check<'a>(
             _ => summary.record(contents, &record)?,
         }
     };
-    let n_behind = records.bytes.len() - footer.end();
+    let n_behind = records.end() - footer.end();
     if n_behind > 0 {
         let expected = "the magic bytes and the end of the file behind it";
         return Err(footer.place.error(Fault::Length, expected, format!("{n_behind} bytes more")));
@@ -301,13 +301,13 @@ fn check_footer(
 /// read: a flipped bit should be called that. The footer has the same length in every file, so its
 /// place is known; whether it really stands there is seen later.
 fn check_summary_crc(records: &Records<'_>, data_end: usize) -> Result<()> {
-    let footer_start = records.bytes.len().saturating_sub(HEAD + FOOTER_BYTES).max(data_end);
+    let footer_start = records.end().saturating_sub(HEAD + FOOTER_BYTES).max(data_end);
     let mut tail = Records { at: footer_start, ..*records };
     let Ok(Some(footer)) = tail.next() else { return Ok(()) };
     if footer.opcode != opcode::FOOTER || footer.body.len() != FOOTER_BYTES {
         return Ok(());
     }
-    let (covered, crc) = records.bytes[data_end..].split_at(records.bytes.len() - 4 - data_end);
+    let (covered, crc) = records.from(data_end).split_at(records.end() - 4 - data_end);
     let mut crc = Fields { bytes: crc, place: footer.place };
     check_crc(crc.u32()?, covered, footer.place)
 }
