@@ -120,6 +120,18 @@ pub fn progress(quiet: bool) -> Task {
     })
 }
 
+/// A task that shows how much is done where nobody knows how much there is, on a terminal only.
+pub fn count(quiet: bool) -> Task {
+    let Some(bar) = bar(quiet, "{msg:>12} {pos}") else { return Task::default() };
+    Task::with_progress(move |progress| {
+        bar.set_message(progress.stage.to_owned());
+        bar.set_position(progress.done as u64);
+        if progress.total > 0 {
+            bar.finish_and_clear();
+        }
+    })
+}
+
 /// As [`progress`], for long runs of one stage: with the time that is left, and off a terminal a line
 /// now and then. The time is estimated from the first report on, so that what an interrupted run had
 /// done does not count as speed.

@@ -89,7 +89,7 @@ fn main() -> Result<()> {
             let run = follow(&scene, *script, rotation)?;
             if let Some(file) = &mut records {
                 for frame in &run {
-                    let line = line_of(&frame.record.evidence, frame.right);
+                    let line = line_of(&frame.record.evidence, scene.diameter(), frame.right);
                     let state = frame.record.state.name();
                     let name = path.display().to_string();
                     writeln!(
@@ -174,14 +174,14 @@ fn examine(
                 };
                 let Some(found) = tracker.examine(&frame, &start)? else { continue };
                 let right = scene.is_right(&found.camera_from_object, moment.pose.as_ref());
-                writeln!(file, "{}", line_of(&found.evidence, Some(right)))?;
+                writeln!(file, "{}", line_of(&found.evidence, scene.diameter(), Some(right)))?;
             }
         }
     }
     Ok(())
 }
 
-fn line_of(evidence: &PoseEvidence, right: Option<bool>) -> Value {
+fn line_of(evidence: &PoseEvidence, diameter: f64, right: Option<bool>) -> Value {
     json!({
         "visible": evidence.visible_share,
         "hidden": evidence.hidden_share,
@@ -189,7 +189,7 @@ fn line_of(evidence: &PoseEvidence, right: Option<bool>) -> Value {
         "outline": evidence.outline_share,
         "residual": evidence.residual,
         "probability": evidence.probability,
-        "diameter": 1.0,
+        "diameter": diameter,
         "right": right,
     })
 }

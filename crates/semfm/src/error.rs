@@ -33,6 +33,9 @@ pub enum Error {
     /// Motions: collisions, planning, timing.
     #[error(transparent)]
     Motion(#[from] semfm_motion::Error),
+    /// An object followed through frames.
+    #[error(transparent)]
+    Track(#[from] semfm_track::Error),
     /// An argument outside what it may be.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
@@ -83,6 +86,7 @@ impl Error {
             Self::Robot(cause) => cause.code(),
             Self::Grasp(cause) => cause.code(),
             Self::Align(cause) => cause.code(),
+            Self::Track(cause) => cause.code(),
             Self::Motion(semfm_motion::Error::Robot(cause)) => cause.code(),
             Self::Motion(semfm_motion::Error::Geom(cause)) => cause.code(),
             Self::Motion(_) => "invalid",
@@ -101,6 +105,7 @@ impl Error {
             Self::Robot(cause) => cause.place(),
             Self::Grasp(cause) => cause.place(),
             Self::Align(cause) => cause.place(),
+            Self::Track(cause) => cause.place(),
             Self::Motion(semfm_motion::Error::Robot(cause)) => cause.place(),
             Self::Motion(semfm_motion::Error::Geom(cause)) => cause.place(),
             Self::Motion(semfm_motion::Error::Invalid { what, .. }) => Some(what.clone()),

@@ -52,6 +52,7 @@ pub use semfm_grasp as grasp;
 pub use semfm_motion as motion;
 pub use semfm_observe as observe;
 pub use semfm_robot as robot;
+pub use semfm_track as track;
 pub use semfm_views as views;
 
 pub mod demonstration;

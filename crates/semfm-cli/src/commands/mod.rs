@@ -23,6 +23,7 @@ mod report_options;
 pub mod show;
 mod size;
 pub mod surface;
+pub mod track;
 pub mod transfer;
 mod transfer_output;
 pub mod views;

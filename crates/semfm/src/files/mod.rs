@@ -12,10 +12,11 @@
 //! | `grasps.json` | `semfm.grasps/1` | [`GraspsFile`] |
 //! | `plan.json` | `semfm.plan/1` | [`PlanFile`] |
 //! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
+//! | lines of `track` | `semfm.track/1` | [`TrackLine`] |
 //!
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
-//! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`), a motion as another
-//! (`write_ros2_trajectory`). From other
+//! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`), a motion and a track as others
+//! (`write_ros2_trajectory`, `write_ros2_track`). From other
 //! programs come per-vertex features ([`read_vertex_features`]) and obstacles ([`read_obstacle`]); what cameras
 //! leave behind is read in [`observe`](crate::observe).
 //!
@@ -40,11 +41,14 @@ mod ros2_grasps;
 #[cfg(feature = "mcap")]
 mod ros2_hand;
 #[cfg(feature = "mcap")]
+mod ros2_track;
+#[cfg(feature = "mcap")]
 mod ros2_trajectory;
 mod scene;
 mod stored_transfer;
 #[cfg(feature = "mcap")]
 mod surface;
+mod track;
 mod trajectory;
 mod trajectory_check;
 mod transfer_folder;
@@ -85,6 +89,11 @@ pub use rigid_pose::{read_rigid_pose, rigid_pose};
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]
+pub use ros2_track::{
+    Ros2Track, TRACK_OBJECT_FRAME, TRACK_POSE_TOPIC, TRACK_REGION_TOPIC, TRACK_STATE_TOPIC,
+    write_ros2_track,
+};
+#[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
 pub use scene::{
     BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord, SceneFile,
@@ -96,6 +105,7 @@ pub use surface::{
     CameraRecord, FILES as SURFACE_FILES, FORMAT as SURFACE_FORMAT, PixelsRecord, SurfaceFile,
     SurfaceResult, write_surface,
 };
+pub use track::{FORMAT as TRACK_FORMAT, PoseEvidenceRecord, TrackLine, TrackedRegionRecord};
 pub use trajectory::{
     FORMAT as TRAJECTORY_FORMAT, FingerRecord, MotionObjectRecord, MotionRobotRecord,
     MountedHandRecord, OBJECT_FILE, ObstacleRecord, ShapeRecord, TrajectoryFile, read_motion,
