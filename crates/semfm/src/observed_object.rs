@@ -31,8 +31,9 @@ impl ObservedViews {
     const ALL: [(Self, &'static str); 3] =
         [(Self::Pictures, "pictures"), (Self::Surface, "surface"), (Self::Both, "both")];
 
-    /// What suits an encoder: one that reads colours is shown both, one of grey views the surface, which looks like what it
-    /// was trained on whatever the light and the paint (`bench/README.md`).
+    /// What is shown where nobody says: an encoder that reads colours gets both, one of grey views the surface, which looks
+    /// like what it was trained on whatever the light and the paint. On three pairs (`bench/README.md`) pictures alone were
+    /// better from one side and far worse from four.
     pub fn for_encoder(wants: &WantedViews) -> Self {
         if wants.reads_colors { Self::Both } else { Self::Surface }
     }
