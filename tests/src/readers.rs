@@ -18,6 +18,7 @@ use semfm::robot::{
 use semfm::views::mcap::{EmbeddingsFile, ViewsFile, inspect, read_view};
 use semfm::{Mesh, Task};
 use semfm_eval::{AnnotatedMesh, MapResults, Results};
+use semfm_run::Recipe;
 use semfm_synth::{Category, ObjectSettings, make_object};
 
 /// Memory that reading one file may take.
@@ -40,7 +41,7 @@ pub struct Reader {
 }
 
 /// All of them.
-pub const READERS: [Reader; 16] = [
+pub const READERS: [Reader; 17] = [
     Reader { name: "obj", extension: "obj", read: mesh },
     Reader { name: "off", extension: "off", read: mesh },
     Reader { name: "ply", extension: "ply", read: mesh },
@@ -54,6 +55,7 @@ pub const READERS: [Reader; 16] = [
     Reader { name: "urdf", extension: "urdf", read: robot },
     Reader { name: "srdf", extension: "srdf", read: srdf },
     Reader { name: "joint_limits", extension: "yaml", read: joint_limits },
+    Reader { name: "recipe", extension: "toml", read: recipe },
     Reader { name: "npy", extension: "npy", read: npy },
     Reader { name: "npz", extension: "npz", read: npz },
     Reader { name: "png", extension: "png", read: picture },
@@ -174,6 +176,13 @@ fn srdf(path: &Path) -> bool {
 
 fn joint_limits(path: &Path) -> bool {
     JointLimitsFile::read(path).is_ok()
+}
+
+/// A recipe of `run`. The files that it names are not there, so what is checked of its text is asked for beside.
+fn recipe(path: &Path) -> bool {
+    let whole = Recipe::read(path).is_ok();
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    whole | Recipe::parse(path, &text).is_ok()
 }
 
 fn npy(path: &Path) -> bool {

@@ -68,6 +68,7 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
         "urdf" => robots(folder.path()),
         "srdf" => vec![SRDF.into()],
         "joint_limits" => vec![JOINT_LIMITS.into(), JOINT_LIMITS_OF_ROS.into()],
+        "recipe" => vec![semfm_run::TEMPLATE.into()],
         "npy" => vec![
             npy("<f4", seed_mesh().n_vertices(), 2, 4),
             npy("<f8", seed_mesh().n_vertices(), 1, 8),

@@ -16,7 +16,7 @@ use clap::{Parser, Subcommand};
 
 use commands::{
     NoAnswer, Outcome, align, completions, demo, embed, eval, eval_maps, frames, grasp, ik, info,
-    plan, region, remember, show, surface, track, transfer, views,
+    plan, region, remember, run, show, surface, track, transfer, views,
 };
 use options::Common;
 pub use process::own_process;
@@ -41,6 +41,7 @@ enum Command {
     Embed(embed::EmbedCommand),
     Region(Box<region::RegionCommand>),
     Frames(Box<frames::FramesCommand>),
+    Run(run::RunCommand),
     Surface(Box<surface::SurfaceCommand>),
     Track(Box<track::TrackCommand>),
     Transfer(Box<transfer::TransferCommand>),
@@ -98,6 +99,7 @@ fn run_words(words: Vec<OsString>) -> u8 {
         Command::Embed(command) => command.run(&common),
         Command::Region(command) => command.run(&common),
         Command::Frames(command) => command.run(&common),
+        Command::Run(command) => command.run(&common),
         Command::Surface(command) => command.run(&common),
         Command::Track(command) => command.run(&common),
         Command::Transfer(command) => command.run(&common),

@@ -4,6 +4,7 @@
 //!   [`semfm::files`]), the pictures and the scene for Foxglove.
 //! - [`TransferFigure`], [`write_grasp_picture`] and [`write_sheet`] draw pictures (PNG).
 //! - [`write_plan_folder`] writes a motion for programs, for ROS 2, for viewers and for people.
+//! - [`Photo`] and [`contact_picture`] draw what was found over what a camera saw, and what a hand touched.
 //! - [`groups_of_paths`] and [`write_page`] make one HTML page with an interactive viewer.
 //! - `foxglove` (feature `mcap`) holds scenes for Foxglove.
 //! - [`colors`] is the one table of colours, [`html`] the pieces that every page is made of.
@@ -31,13 +32,13 @@ pub use motion::{
     PLAN_FILES, write_animated_glb, write_plan, write_plan_folder, write_plan_picture,
 };
 pub use page::{
-    Fact, Group, Hands, Layer, LegendEntry, Motion, Panel, Picture, VertexColors, groups_of_paths,
-    write_page,
+    Fact, Figure, Group, Hands, Layer, LegendEntry, Motion, Panel, Picture, Section, Table,
+    VertexColors, groups_of_paths, write_page, write_page_with,
 };
 #[cfg(feature = "mcap")]
 pub use pictures::write_memory_picture;
 pub use pictures::{
-    NearMiss, TransferFigure, Viewpoints, viewpoints, write_grasp_picture, write_miss_picture,
-    write_motion_picture, write_sheet,
+    NearMiss, Photo, RgbPicture, TintedMask, TransferFigure, Viewpoints, contact_picture,
+    viewpoints, write_grasp_picture, write_miss_picture, write_motion_picture, write_sheet,
 };
 pub use transfer_files::{TRANSFER_FILES, TransferFiles, write_transfer};

@@ -4,14 +4,18 @@
 //! a demonstration, the tests and the synthetic evaluation need no download: `object` builds a
 //! closed mesh with part labels and its true grip region from signed distances, `encoder` stands
 //! in for a vision transformer and gives ordinary patch embeddings, `files` writes both as an
-//! evaluation reads them, `arm` is a robot arm as URDF text. Nothing here knows how the
+//! evaluation reads them, `arm` is a robot arm as URDF text, `hand` a hand that holds an object, `rgbd` what a depth
+//! camera sees, `demonstration` pictures of such a hand. Nothing here knows how the
 //! matching works, and whatever it writes says that it is simulated.
 
 mod arm;
+mod demonstration;
 mod encoder;
 mod error;
 mod files;
+mod hand;
 mod object;
+mod rgbd;
 mod sdf;
 mod seed;
 mod shapes;
@@ -22,10 +26,13 @@ use std::str::FromStr;
 use semfm_geom::suggestion::unknown_name;
 
 pub use arm::{ARM_FLANGE, ARM_HOME, ARM_NAME, arm_urdf};
+pub use demonstration::{DemonstrationPictures, StandingObject, write_demonstration_pictures};
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};
 pub use files::{ObjectFiles, render_views, write_labelled_mesh, write_object};
+pub use hand::{CapsuleHand, close_hand};
 pub use object::{ObjectSettings, SynthObject, make_object};
+pub use rgbd::{Body, RgbdPicture};
 
 /// The six categories of the paper (section V-A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

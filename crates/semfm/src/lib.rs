@@ -59,6 +59,7 @@ pub mod demonstration;
 mod encoded_objects;
 mod error;
 pub mod files;
+mod grasp_file;
 mod grasp_plan;
 mod grasp_request;
 mod grasp_result;
@@ -68,11 +69,14 @@ pub mod memory;
 mod motion_scene;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
+mod object_place;
 mod object_size;
 pub mod observed_object;
 mod pipeline;
 mod planned_motion;
 mod pose_dependence;
+#[cfg(feature = "mcap")]
+mod prepared_pair;
 mod robot_arm;
 mod scene_contents;
 pub mod upright;
@@ -93,6 +97,7 @@ pub use motion_scene::{
     FingerJoint, FrameOwner, MotionFrame, MotionObject, MotionObstacle, MotionRobot, MotionScene,
     MountedHand, ObstacleShape, SceneState,
 };
+pub use object_place::{ObjectPlace, pose_of_numbers};
 pub use object_size::ObjectSize;
 pub use pipeline::{
     EncoderRecord, FeatureSource, LiftedCloud, PipelineSettings, PreparationReport, Prepared,
@@ -100,5 +105,7 @@ pub use pipeline::{
 };
 pub use planned_motion::PlannedMotion;
 pub use pose_dependence::shares_of_poses;
+#[cfg(feature = "mcap")]
+pub use prepared_pair::{NamedMesh, PairFeatures, PairFiles, PreparedPair, prepare_pair};
 pub use robot_arm::RobotArm;
 pub use scene_contents::SceneContents;

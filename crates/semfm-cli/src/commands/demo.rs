@@ -10,15 +10,17 @@ use semfm::files::{Provenance, SceneFile, TablePlaneRecord, read_embeddings, rea
 use semfm::fmap::metrics::iou;
 use semfm::fmap::transfer_with_anchors;
 use semfm::geom::io::{read_mesh, write_atomically};
-use semfm::geom::math::{DQuat, DVec3, bounds};
+use semfm::geom::math::{DAffine3, DQuat, DVec3, bounds};
+use semfm::motion::Pose;
 use semfm::object_encoder::ObjectEncoder;
 use semfm::upright::upright;
 use semfm::views::mcap::Dtype;
-use semfm::{FeatureSource, Mesh, PipelineSettings, Prepared, Task, prepare};
+use semfm::{FeatureSource, Mesh, PipelineSettings, Prepared, Task, pose_of_numbers, prepare};
 use semfm_show::{TransferFiles, groups_of_paths, write_page};
 use semfm_synth::{
-    ARM_FLANGE, ARM_HOME, Category, Level, ObjectFiles, ObjectSettings, arm_urdf, make_object,
-    write_labelled_mesh, write_object,
+    ARM_FLANGE, ARM_HOME, Category, Level, ObjectFiles, ObjectSettings, StandingObject,
+    SynthObject, arm_urdf, make_object, write_demonstration_pictures, write_labelled_mesh,
+    write_object,
 };
 
 use super::Outcome;
@@ -35,6 +37,10 @@ const LONGEST: f64 = 0.25;
 const ARM_FILE: &str = "arm.urdf";
 const SCENE_FILE: &str = "scene.json";
 const PAGE_FILE: &str = "page.html";
+/// The folder of pictures for `semfm-cli run`, and how large the object in the hand is: from corner to corner of its box, in
+/// metres.
+const PICTURES: &str = "pictures";
+const HELD: f64 = 0.25;
 /// Where the middle of the object stands before the arm, metres.
 const DISTANCE: f64 = 0.5;
 /// How the upright object is turned on the table, radians. Of eight turns tried with the kettle this is one of four in
@@ -70,8 +76,9 @@ impl DemoCommand {
         let settings = PipelineSettings::default();
         check_folder(&self.output, &[], &[])?;
         std::fs::create_dir_all(&self.output).with_context(|| self.output.display().to_string())?;
-        let source = self.make(0, &task, common)?;
-        let target = self.make(1, &task, common)?;
+        let (source_object, target_object) = (self.object(0, common)?, self.object(1, common)?);
+        let source = self.write_object(&source_object, &task)?;
+        let target = self.write_object(&target_object, &task)?;
         let (source_mesh, target_mesh) = (read_mesh(&source.mesh)?, read_mesh(&target.mesh)?);
         let encoded = match self.level {
             Some(_) => None,
@@ -89,6 +96,8 @@ impl DemoCommand {
         let arm = DemoArm::write(&self.output, &target_mesh.mesh, scale)?;
         let gripper = arm.urdf.display().to_string();
         let grasps = GraspOptions::at_scale(scale).prepare(&gripper, self.seed, for_grasps)?;
+        let objects = [&source_object, &target_object];
+        let recipe = self.write_pictures(objects, [&source, &target], &arm, &task)?;
         let motion =
             arm.options().prepare(&arm.urdf, &[], std::slice::from_ref(&arm.scene), self.seed)?;
 
@@ -148,6 +157,16 @@ impl DemoCommand {
             console::data(format_args!("page        {}: open it in a browser", page.display()));
             if !common.quiet {
                 self.print_commands(&source, &target, &arm, &folder);
+                if let Some(recipe) = &recipe {
+                    console::data(
+                        "from pictures (a hand on the first object, both before a depth camera)",
+                    );
+                    console::data(format_args!(
+                        "  semfm-cli run {} -o {}",
+                        quoted(recipe),
+                        quoted(&self.output.join("run"))
+                    ));
+                }
             }
         }
         Ok(outcome)
@@ -183,7 +202,7 @@ impl DemoCommand {
             arm.start(),
             quoted(&folder.join("grasps.json")),
             quoted(&target.mesh),
-            arm.base_from_object,
+            arm.place(),
             quoted(&arm.scene),
             quoted(&self.output.join(PLAN)),
         ));
@@ -194,19 +213,81 @@ impl DemoCommand {
         ));
     }
 
-    /// Makes an object and writes its files.
-    fn make(&self, instance: usize, task: &Task, common: &Common) -> Result<ObjectFiles> {
+    /// Makes an object.
+    fn object(&self, instance: usize, common: &Common) -> Result<SynthObject> {
         let settings = ObjectSettings { seed: self.seed, ..Default::default() };
         let object = make_object(self.category, instance, &settings)?;
         if !common.quiet && !common.json {
             let (n, category) = (object.mesh.n_vertices(), self.category);
             console::data(format_args!("made        a {} ({category}, {n} vertices)", object.kind));
         }
+        Ok(object)
+    }
+
+    /// Writes the files of an object.
+    fn write_object(&self, object: &SynthObject, task: &Task) -> Result<ObjectFiles> {
         Ok(match self.level {
-            Some(level) => write_object(&self.output, &object, level, task)?,
-            None => write_labelled_mesh(&self.output, &object)?,
+            Some(level) => write_object(&self.output, object, level, task)?,
+            None => write_labelled_mesh(&self.output, object)?,
         })
     }
+
+    /// Writes what a depth camera sees of a hand on the first object and of the second one where the arm finds it, and the
+    /// recipe for `semfm-cli run`; `None` where no hand gets hold of the first object.
+    fn write_pictures(
+        &self,
+        [source, target]: [&SynthObject; 2],
+        files: [&ObjectFiles; 2],
+        arm: &DemoArm,
+        task: &Task,
+    ) -> Result<Option<PathBuf>> {
+        let folder = self.output.join(PICTURES);
+        let source_scale = HELD / source.mesh.diagonal();
+        let at = |object, scale, numbers: [f64; 7]| -> Result<StandingObject<'_>> {
+            let Pose { rotation, translation } = pose_of_numbers(&numbers)?;
+            let world_from_object = DAffine3::from_rotation_translation(rotation, translation);
+            Ok(StandingObject { object, scale, world_from_object })
+        };
+        let source_place = standing(&source.mesh, source_scale)?;
+        let source = at(source, source_scale, source_place)?;
+        let target = at(target, arm.scale, arm.base_from_object)?;
+        if write_demonstration_pictures(&folder, &source, &target, task)?.is_none() {
+            return Ok(None);
+        }
+        let recipe = folder.join("demo.toml");
+        let text = recipe_of_pictures(files.map(|files| &files.mesh), arm);
+        write_atomically(&recipe, |out| out.write_all(text.as_bytes()))?;
+        Ok(Some(recipe))
+    }
+}
+
+/// The recipe of the pictures; the files of the demo lie in the folder above.
+fn recipe_of_pictures(meshes: [&PathBuf; 2], arm: &DemoArm) -> String {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let [source, target] = meshes.map(|mesh| name(mesh));
+    let (urdf, scene, start) = (name(&arm.urdf), name(&arm.scene), arm.start());
+    format!(
+        "# A hand on one object, and another object of its kind before an arm: semfm-cli run demo.toml -o run\n\
+         # All keys: semfm-cli run --template\n\n\
+         title = \"From a hand on one object to a grasp on another\"\n\n\
+         [demonstration]\nmesh = \"../{source}\"\n\n\
+         [[demonstration.frames]]\n\
+         color = \"demonstration/color.png\"\n\
+         depth = \"demonstration/depth.png\"        # millimetres\n\
+         intrinsics = \"demonstration/K.json\"\n\
+         mask = \"demonstration/object.png\"\n\
+         hand_mask = \"demonstration/hand.png\"\n\
+         hand = \"demonstration/hand.obj\"          # without it, the hand is what its mask shows of the depth\n\n\
+         [target]\nmesh = \"../{target}\"\n\n\
+         [target.frame]\n\
+         color = \"target/color.png\"\n\
+         depth = \"target/depth.png\"\n\
+         intrinsics = \"target/K.json\"\n\
+         mask = \"target/object.png\"\n\n\
+         [grasp]\ngripper = \"../{urdf}\"\n\n\
+         [robot]\nurdf = \"../{urdf}\"\ntip = \"{ARM_FLANGE}\"\nstart = [{start}]\n\
+         base_from_camera = \"target/base_from_camera.json\"\nscene = [\"../{scene}\"]\n"
+    )
 }
 
 /// The arm of the demonstration with what stands around it, in files.
@@ -215,8 +296,8 @@ struct DemoArm {
     scene: PathBuf,
     /// Metres per unit of the object's mesh.
     scale: f64,
-    /// As `--base-from-object` takes it.
-    base_from_object: String,
+    /// As `--base-from-object` takes it: X, Y, Z, QX, QY, QZ, QW.
+    base_from_object: [f64; 7],
 }
 
 impl DemoArm {
@@ -232,7 +313,11 @@ impl DemoArm {
     }
 
     fn options(&self) -> MotionOptions {
-        MotionOptions::told(ARM_FLANGE, &self.base_from_object, &self.start())
+        MotionOptions::told(ARM_FLANGE, &self.place(), &self.start())
+    }
+
+    fn place(&self) -> String {
+        self.base_from_object.map(|x| x.to_string()).join(",")
     }
 
     fn start(&self) -> String {
@@ -240,8 +325,8 @@ impl DemoArm {
     }
 }
 
-/// Where an object stands upright on z = 0 before the arm: X,Y,Z,QX,QY,QZ,QW.
-fn standing(object: &Mesh, scale: f64) -> Result<String> {
+/// Where an object stands upright on z = 0 before the arm: X, Y, Z, QX, QY, QZ, QW.
+fn standing(object: &Mesh, scale: f64) -> Result<[f64; 7]> {
     let upright_from_object = DQuat::from_rotation_arc(upright(object)?.up, DVec3::Z);
     let turn = DQuat::from_rotation_z(TURN) * upright_from_object;
     let points: Vec<DVec3> = object.vertices().iter().map(|&p| turn * p * scale).collect();
@@ -249,7 +334,7 @@ fn standing(object: &Mesh, scale: f64) -> Result<String> {
     let middle = (low + high) / 2.0;
     let numbers = [DISTANCE - middle.x, -middle.y, -low.z, turn.x, turn.y, turn.z, turn.w];
     // Rounded, so that the command says exactly what was done; `+ 0.0` leaves no minus before zero.
-    Ok(numbers.map(|x| ((1e5 * x).round() / 1e5 + 0.0).to_string()).join(","))
+    Ok(numbers.map(|x| (1e5 * x).round() / 1e5 + 0.0))
 }
 
 fn prepare_files(

@@ -8,8 +8,7 @@ use clap::{Args, ValueEnum};
 use semfm::align::Verdict;
 use semfm::demonstration::is_one_sided;
 use semfm::files::{
-    AlignedPose, GraspSettingsRecord, GraspsFile, read_aligned, read_obstacle, read_region,
-    write_isaac_grasps, write_ros2_grasps,
+    AlignedPose, read_aligned, read_obstacle, read_region, write_isaac_grasps, write_ros2_grasps,
 };
 use semfm::geom::io::{read_mesh, refuse_input};
 use semfm::geom::math::DVec3;
@@ -198,7 +197,7 @@ impl GraspCommand {
         let path = output.path();
         match self.format {
             Format::Json => {
-                grasps_file_in_region(&problem, region.weights(), &found)?.write(path)?;
+                problem.file(region.weights(), &found)?.write(path)?;
             }
             Format::Ros2 => write_ros2_grasps(path, &result)?,
             Format::Isaac => write_isaac_grasps(path, &result)?,
@@ -413,31 +412,6 @@ pub fn warn_of_dependent_grasps(
     Ok(())
 }
 
-/// The content of `grasps.json`, with what each grasp owes to an uncertain pose.
-pub fn grasps_file_in_region(
-    problem: &GraspProblem,
-    weights: &[f64],
-    found: &Grasps,
-) -> Result<GraspsFile> {
-    let shares = problem.shares_of_poses(weights, found)?.unwrap_or_default();
-    Ok(grasps_file(problem, found).with_pose_shares(&shares))
-}
-
-/// The content of `grasps.json`, with the table and the settings of the search.
-pub fn grasps_file(problem: &GraspProblem, found: &Grasps) -> GraspsFile {
-    let settings = problem.settings();
-    let settings = GraspSettingsRecord {
-        seed: settings.seed,
-        friction: settings.friction,
-        grip_force: settings.grip_force,
-        mass: settings.mass,
-        n_samples: settings.n_samples,
-        version: env!("CARGO_PKG_VERSION").into(),
-    };
-    let file = GraspsFile::new(&problem.result(found)).with_table(problem.table());
-    GraspsFile { settings: Some(settings), ..file }
-}
-
 /// Draws the best grasps in a region, one weight per vertex.
 pub fn draw_grasps(
     path: &Path,
@@ -446,7 +420,7 @@ pub fn draw_grasps(
     found: &Grasps,
     task: &Task,
 ) -> Result<()> {
-    let file = grasps_file(problem, found);
+    let file = problem.file(weights, found)?;
     Ok(write_grasp_picture(path, problem.mesh(), weights, &file, task)?)
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use semfm::files::read_rigid_pose;
-use semfm::geom::math::{DQuat, DVec3};
+use semfm::pose_of_numbers;
 use semfm::robot::{
     Arm, ArmFiles, ArmJoint, IkAnswer, IkSettings, IkSolution, InverseKinematics, OpenedArm, Pose,
     Preference,
@@ -156,37 +156,13 @@ pub fn pose_option(name: &str, text: &str) -> Result<Pose> {
     let path = Path::new(text);
     let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     match numbers {
-        Some(numbers) if !path.exists() => pose_of(text, &numbers).with_context(option),
+        Some(numbers) if !path.exists() => pose_of_numbers(&numbers).with_context(option),
         None if text.contains(',') && !path.exists() => {
             let expected = "6 or 7 numbers between commas or a file";
             bail!("{}: expected {expected}, found `{text}`", option())
         }
         _ => read_rigid_pose(path, name).with_context(option),
     }
-}
-
-/// Position and quaternion, or position and angles.
-fn pose_of(text: &str, numbers: &[f64]) -> Result<Pose> {
-    let rotation = match numbers[3.min(numbers.len())..] {
-        [roll, pitch, yaw] => {
-            DQuat::from_rotation_z(yaw)
-                * DQuat::from_rotation_y(pitch)
-                * DQuat::from_rotation_x(roll)
-        }
-        [x, y, z, w] => {
-            let quaternion = DQuat::from_xyzw(x, y, z, w);
-            // Written with four digits, a unit quaternion is this close to one.
-            if (quaternion.length() - 1.0).abs() > 1e-3 {
-                bail!("expected a quaternion of length 1, found {}", quaternion.length());
-            }
-            quaternion.normalize()
-        }
-        _ => bail!("expected 6 or 7 numbers between commas or a file, found {}", numbers.len()),
-    };
-    if numbers.iter().any(|x| !x.is_finite()) {
-        bail!("expected finite numbers, found `{text}`");
-    }
-    Ok(Pose::from_parts(DVec3::new(numbers[0], numbers[1], numbers[2]), rotation))
 }
 
 /// Why there is no solution: what is left of the best try, and which joints it stopped at.
@@ -243,6 +219,8 @@ fn joined(positions: &[f64]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use semfm::geom::math::DVec3;
+
     use super::*;
 
     #[test]

@@ -20,6 +20,7 @@ pub mod plan;
 pub mod region;
 pub mod remember;
 mod report_options;
+pub mod run;
 pub mod show;
 mod size;
 pub mod surface;

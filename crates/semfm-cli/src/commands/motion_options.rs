@@ -7,7 +7,7 @@ use clap::Args;
 use semfm::files::{GraspsFile, PlanFile};
 use semfm::geom::math::DVec3;
 use semfm::motion::{CollisionSettings, MotionSettings, Pose};
-use semfm::{GraspPlan, PlanObject, PlanRequest, RobotArm, SceneContents, Task, plan};
+use semfm::{GraspPlan, ObjectPlace, PlanObject, PlanRequest, RobotArm, SceneContents, Task, plan};
 use serde_json::{Value, json};
 
 use super::ik::{ArmOptions, near, pose_option};
@@ -80,15 +80,6 @@ impl MotionOptions {
             searches: defaults.searches,
         }
     }
-}
-
-/// Where the object stands.
-#[derive(Clone, Copy, Debug)]
-enum ObjectPlace {
-    /// In the frame of the arm's base.
-    Object(Pose),
-    /// Before a camera that stands there.
-    Camera(Pose),
 }
 
 /// Options that were read, with the files that they name.
@@ -169,14 +160,10 @@ impl PreparedMotion {
         object: Option<PlanObject>,
         task: &Task,
     ) -> Result<GraspPlan> {
-        let base_from_object = match self.place {
-            ObjectPlace::Object(base_from_object) => base_from_object,
-            ObjectPlace::Camera(base_from_camera) => base_from_camera * grasps.camera_pose()?,
-        };
         let request = PlanRequest {
+            base_from_object: self.place.base_from_object(&grasps)?,
             grasps,
             object,
-            base_from_object,
             tip_from_tcp: self.tip_from_tcp,
             start: self.start.clone(),
             scene: self.scene.clone(),

@@ -16,8 +16,7 @@ use serde_json::{Value, json};
 
 use super::Outcome;
 use super::grasp::{
-    draw_grasps, grasps_file_in_region, print_grasps, summary as grasps_summary,
-    warn_of_dependent_grasps,
+    draw_grasps, print_grasps, summary as grasps_summary, warn_of_dependent_grasps,
 };
 use super::motion_options::{PreparedMotion, print_plan, summary as plan_summary};
 use crate::console;
@@ -65,7 +64,7 @@ impl TransferOutput<'_> {
             let weights = self.transfer.weights();
             let found = problem.find(weights, task)?;
             let [file, picture] = GRASPS.map(|name| staged.path().join(name));
-            let grasps_file = grasps_file_in_region(problem, weights, &found)?;
+            let grasps_file = problem.file(weights, &found)?;
             grasps_file.write(&file)?;
             if let Some(arm) = self.motion.as_ref().filter(|_| !found.grasps.is_empty()) {
                 plan = Some((arm, self.plan(arm, grasps_file, task)?));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::SystemTime;
 
-use super::FormatError;
+use super::{FormatError, read_files};
 use crate::Result;
 
 /// A file by what the system knows it by: the same for every link and every spelling of a path.
@@ -51,6 +51,7 @@ static KNOWN: LazyLock<Mutex<HashMap<FileId, Known>>> = LazyLock::new(Mutex::def
 
 /// Remembers that the process has read a file, unless it wrote that file itself.
 pub(super) fn remember_read(path: &Path, about: &Metadata) {
+    read_files::note(path);
     note(path, about, Use::Read);
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use semfm::files::{OBJECT_FILE, PlanFile, TrajectoryFile};
-use semfm::geom::io::{StagedFolder, write_mesh};
+use semfm::geom::io::{StagedFolder, shown_path, write_mesh};
 use semfm::motion::NearestMiss;
 use semfm::{GraspPlan, MotionScene, PlannedMotion, RobotArm, Task};
 
@@ -69,7 +69,8 @@ pub fn write_plan(
     match (plan.motion(), &plan.answer.nearest_miss) {
         (Some(motion), _) => {
             let drawn = Drawn::new(&motion)?;
-            drawn.write(staged.path(), folder, task)?;
+            // The folder may itself be on its way to another place, and the trajectory names files from there.
+            drawn.write(staged.path(), &shown_path(folder), task)?;
             file.notes = drawn.motion.notes;
         }
         (None, Some(miss)) => {

@@ -7,6 +7,7 @@ use semfm::geom::io::{refuse_input, write_atomically};
 
 use super::data::PageData;
 use super::group::Group;
+use super::section::Section;
 use crate::Result;
 use crate::colors::{MARKED, NamedColor, PLAIN, color_bytes, css_properties, verdict_color};
 use crate::html::{Field, escape, fill, policy};
@@ -30,6 +31,19 @@ const VIEWER: [&str; 9] = [
 /// [`Error::Invalid`](crate::Error::Invalid) for groups whose parts do not fit each other,
 /// [`Error::Semfm`](crate::Error::Semfm) where the file cannot be written.
 pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
+    write_page_with(path, title, &[], groups)
+}
+
+/// As [`write_page`], with sections of figures and words above the viewer; without groups there is no viewer.
+///
+/// # Errors
+/// As [`write_page`].
+pub fn write_page_with(
+    path: &Path,
+    title: &str,
+    sections: &[Section],
+    groups: &[Group],
+) -> Result<()> {
     groups.iter().try_for_each(Group::check)?;
     refuse_input(path)?;
     let script = format!("\"use strict\";\n{}", VIEWER.concat());
@@ -41,6 +55,10 @@ pub fn write_page(path: &Path, title: &str, groups: &[Group]) -> Result<()> {
             Field { name: "title", html: &escape(title) },
             Field { name: "version", html: env!("CARGO_PKG_VERSION") },
             Field { name: "style", html: &style },
+            Field {
+                name: "sections",
+                html: &sections.iter().map(Section::html).collect::<String>(),
+            },
             Field { name: "script", html: &script },
             Field { name: "data", html: &script_json(&PageData::new(groups)) },
         ],

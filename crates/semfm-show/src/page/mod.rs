@@ -12,12 +12,14 @@ mod group;
 mod mesh;
 mod motion;
 mod paths;
+mod section;
 mod transfer_folder;
 #[cfg(feature = "mcap")]
 mod views;
 
-pub use document::write_page;
+pub use document::{write_page, write_page_with};
 pub use grasps::Hands;
 pub use group::{Fact, Group, Layer, LegendEntry, Panel, Picture, VertexColors};
 pub use motion::Motion;
 pub use paths::groups_of_paths;
+pub use section::{Figure, Section, Table};

@@ -44,7 +44,9 @@ mod ros2_hand;
 mod ros2_track;
 #[cfg(feature = "mcap")]
 mod ros2_trajectory;
+mod run;
 mod scene;
+mod stage;
 mod stored_transfer;
 #[cfg(feature = "mcap")]
 mod surface;
@@ -95,10 +97,12 @@ pub use ros2_track::{
 };
 #[cfg(feature = "mcap")]
 pub use ros2_trajectory::{BAG_FILE, BAG_METADATA, write_ros2_trajectory};
+pub use run::{FORMAT as RUN_FORMAT, RUN_FILE, RunFile, RunStageRecord, StageState};
 pub use scene::{
     BoxRecord, CloudObstacleRecord, CylinderRecord, FORMAT as SCENE_FORMAT, MeshRecord, SceneFile,
     SphereRecord, TablePlaneRecord, read_scene,
 };
+pub use stage::{FORMAT as STAGE_FORMAT, FileHash, NoAnswerRecord, STAGE_FILE, StageFile};
 pub use stored_transfer::StoredTransfer;
 #[cfg(feature = "mcap")]
 pub use surface::{

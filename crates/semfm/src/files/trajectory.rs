@@ -479,7 +479,7 @@ fn hash_of(bytes: &[u8]) -> MeshHash {
 }
 
 /// A path as a file in `folder` names it: relative, with `/`; absolute where there is no way from one to the other.
-fn relative(path: &Path, folder: &Path) -> String {
+pub(super) fn relative(path: &Path, folder: &Path) -> String {
     let absolute = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path));
     let (Ok(file), Ok(from)) = (absolute(path), absolute(folder)) else {
         return path.to_string_lossy().into_owned();

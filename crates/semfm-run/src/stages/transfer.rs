@@ -1,0 +1,124 @@
+//! The region on the target: what `transfer` does.
+
+use std::path::{Path, PathBuf};
+
+use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, open_encoder};
+use semfm::files::{Provenance, Seeds, TransferInputs, TransferResult, read_region};
+use semfm::fmap::transfer_with_anchors;
+use semfm::geom::ShapeCache;
+use semfm::geom::io::read_mesh;
+use semfm::object_encoder::ObjectEncoder;
+use semfm::{
+    NamedMesh, PairFeatures, PairFiles, PipelineSettings, PreparedPair, Task, Verdict, prepare_pair,
+};
+use semfm_show::{TransferFiles, write_transfer};
+
+use super::region::REGION_FILE;
+use super::{Bench, StageEnd, no_answer};
+use crate::fingerprint::files_under;
+use crate::recipe::TransferTable;
+use crate::{Result, Stage};
+
+/// Carries the region over.
+pub fn transfer(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let recipe = bench.recipe;
+    let (source_path, target_path) = (&recipe.demonstration.mesh, &recipe.target.mesh);
+    let source = NamedMesh { path: source_path, file: read_mesh(source_path)? };
+    let target = NamedMesh { path: target_path, file: read_mesh(target_path)? };
+    let region_path = bench.file(Stage::Region, REGION_FILE);
+    let region = read_region(&region_path, &source.file.mesh)?;
+    let settings = settings(&recipe.transfer, recipe.seed, bench.cache);
+    let features = features(bench, &settings)?;
+    let PreparedPair { source, target, notes } =
+        prepare_pair(source, target, &features, &settings, task)?;
+    let found =
+        transfer_with_anchors(&source.object, &target.object, &region, &settings.transfer, task)
+            .map_err(semfm::Error::from)?;
+    let provenance = Provenance {
+        files: Some(TransferInputs {
+            source: source_path.display().to_string(),
+            target: target_path.display().to_string(),
+            region: region_path.display().to_string(),
+        }),
+        lift: Some(settings.lift.clone()),
+        seeds: Some(Seeds { lift: settings.lift.seed, clusters: recipe.seed }),
+        version: Some(env!("CARGO_PKG_VERSION").into()),
+        ..Provenance::default()
+    };
+    let result = TransferResult {
+        source: &source,
+        target: &target,
+        region: &region,
+        transfer: &found,
+        provenance: &provenance,
+    };
+    write_transfer(folder, &result, TransferFiles::All, task)?;
+    let (n, of) = (found.region.vertices().len(), found.region.n_vertices());
+    let mut end = StageEnd {
+        summary: vec![format!(
+            "{} (confidence {:.2}): {n} of {of} vertices of the target",
+            found.verdict, found.confidence
+        )],
+        more_inputs: encoder_files(&recipe.transfer),
+        ..StageEnd::default()
+    };
+    end.summary.extend(found.why().map(str::to_owned));
+    end.summary.extend(notes);
+    if found.verdict == Verdict::Refuse {
+        let why = found.why().map_or_else(String::new, |why| format!(" ({why})"));
+        end.no_answer = no_answer(
+            format!(
+                "the region was not found on the target: confidence {:.2}{why}",
+                found.confidence
+            ),
+            "look at transfer/transfer.png. Are the two objects of one kind? Mark more of the part (demonstration.grow, \
+             further frames), or name an encoder that knows such objects (transfer.encoder, docs/encoders.md)",
+        );
+    }
+    Ok(end)
+}
+
+fn settings(table: &TransferTable, seed: u64, cache: bool) -> PipelineSettings {
+    let mut settings = PipelineSettings::of(table.method);
+    settings.transfer.rule = table.rule;
+    if let Some(n) = table.working_vertices {
+        settings.shape.working_vertices = n;
+    }
+    if let Some(k) = table.k {
+        (settings.shape.k, settings.shape.clip_k) = (k, false);
+    }
+    if table.cache && cache {
+        settings.cache = ShapeCache::of_user();
+    }
+    settings.with_seed(seed)
+}
+
+/// Where the features come from.
+fn features(bench: &Bench<'_>, settings: &PipelineSettings) -> Result<PairFeatures> {
+    let table = &bench.recipe.transfer;
+    let pair = |source: &Option<PathBuf>, target: &Option<PathBuf>| {
+        let (source, target) = (source.clone()?, target.clone()?);
+        Some(PairFiles { source, target })
+    };
+    if let Some(files) = pair(&table.source_features, &table.target_features) {
+        return Ok(PairFeatures::PerVertex(files));
+    }
+    if let Some(files) = pair(&table.source_embeddings, &table.target_embeddings) {
+        return Ok(PairFeatures::Embeddings(files));
+    }
+    let method = table.method.info();
+    if !method.reads_features && table.encoder.is_none() && table.rolls.is_none() {
+        return Ok(PairFeatures::Geometry);
+    }
+    let name = table.encoder.as_deref().unwrap_or(BUILTIN_ENCODERS[0].name);
+    let open = OpenSettings { threads: bench.threads, quiet: bench.quiet };
+    let encoder = open_encoder(name, &open).map_err(semfm::Error::from)?;
+    let rolls = table.rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(method.features.rolls));
+    Ok(PairFeatures::Encoder(ObjectEncoder::new(encoder, &settings.cache).with_rolls(rolls)))
+}
+
+/// The files of an encoder that is named by a path.
+fn encoder_files(table: &TransferTable) -> Vec<PathBuf> {
+    let named = table.encoder.as_deref().map(Path::new).filter(|path| path.exists());
+    named.map_or_else(Vec::new, files_under)
+}
