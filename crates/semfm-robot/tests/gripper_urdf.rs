@@ -176,6 +176,33 @@ fn what_is_no_gripper_says_so() {
     }
 }
 
+/// A thumb `a` that meets `b`, and another finger 4 cm beside that, which the thumb meets where it is `wide`.
+fn thumb_and_two(mimics: [&str; 2], wide: bool) -> String {
+    let beside = finger("c", 1.0).replace("xyz=\"0 ", "xyz=\"0.04 ");
+    let third = beside + &slide("jc", "c", 1.0, mimics[1]);
+    let text = two_fingers(mimics[0]).replace("</robot>", &(third + "</robot>"));
+    let across = if wide { "0.12 0.01 0.04" } else { "0.02 0.01 0.04" };
+    text.replacen("0.02 0.01 0.04", across, 1)
+}
+
+#[test]
+fn a_hand_with_a_third_finger_is_refused_in_words() {
+    let coupled = r#"<mimic joint="ja"/>"#;
+    for mimics in [[coupled, coupled], [coupled, ""], ["", ""]] {
+        for wide in [false, true] {
+            let file = file(&thumb_and_two(mimics, wide));
+            let error = Gripper::from_urdf(&file.path, &GripperSettings::default()).unwrap_err();
+            assert_eq!(error.code(), "no-gripper");
+            let text = error.to_string();
+            assert!(text.contains("three or more") && text.contains("`a`"), "{text}");
+            assert!(text.contains("`b`") && text.contains("`c`"), "{text}");
+            let fingers = Some(["a".into(), "b".into()]);
+            let settings = GripperSettings { fingers, ..Default::default() };
+            assert!(Gripper::from_urdf(&file.path, &settings).is_ok(), "told which two");
+        }
+    }
+}
+
 /// The gripper of two fingers, its names led by a letter, as a piece of a larger robot.
 fn prefixed_gripper(k: &str) -> String {
     two_fingers("")

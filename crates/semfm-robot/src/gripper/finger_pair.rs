@@ -183,6 +183,38 @@ impl FingerPair {
         self.pad[0] * self.pad[1]
     }
 
+    /// A link in neither finger that closes beside them, of those that the drive moves or of others alike on the same
+    /// palm: the hand has three fingers or more.
+    pub fn third_finger(&self, robot: &Robot, shapes: &[LinkShape]) -> Option<usize> {
+        let tree = Tree::new(robot, shapes);
+        let sampled = SampledDrive::new(&tree, self.drive.clone())?;
+        let own = self.fingers.map(|finger| self.branches[finger]);
+        let coupled = sampled
+            .bodies(None)
+            .into_iter()
+            .find(|&body| !own.contains(&self.branches[body]) && sampled.closes_beside(body, self));
+        coupled.or_else(|| self.uncoupled_finger(&tree))
+    }
+
+    /// A link on the palm whose joint is like one of the drive's and not coupled to it.
+    fn uncoupled_finger(&self, tree: &Tree<'_>) -> Option<usize> {
+        let joints = &tree.robot.joints;
+        let range = |joint: usize| joints[joint].limits.position.map(|[low, high]| high - low);
+        let is_alike = |a: usize, b: usize| match (range(a), range(b)) {
+            (Some(a_range), Some(b_range)) => {
+                joints[a].kind == joints[b].kind && (a_range - b_range).abs() < SAME_RANGE * a_range
+            }
+            _ => false,
+        };
+        let other = (0..joints.len()).find(|&i| {
+            tree.bodies[joints[i].parent] == tree.bodies[self.palm]
+                && !self.drive.moves(tree.leaders[i])
+                && tree.has_surface[tree.bodies[joints[i].child]]
+                && self.drive.joints.iter().any(|driven| is_alike(driven.joint, i))
+        });
+        other.map(|joint| joints[joint].child)
+    }
+
     /// The pads where links have these poses in the palm's frame.
     pub fn pads_at(&self, robot: &Robot, poses: &[Pose]) -> PadGap {
         let start = self.drive.poses(robot, self.palm, 0.0);
@@ -353,6 +385,19 @@ impl<'a> SampledDrive<'a> {
             pads: PadGap { width, middle },
             pad: [x.length, z.length],
         })
+    }
+
+    /// Whether a body moves along the closing axis of two fingers, beside their pads.
+    fn closes_beside(&self, body: usize, pair: &FingerPair) -> bool {
+        let [first, last] = [self.samples.first(), self.samples.last()]
+            .map(|poses| poses.map_or(DVec3::ZERO, |poses| poses[body].translation));
+        let x_axis = pair.closing.cross(pair.approach);
+        let from_middle = self.surface(body).into_iter().flatten();
+        let from_middle = from_middle.map(|p| (p - pair.pads.middle).dot(x_axis));
+        let (low, high) = from_middle
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let rim = pair.pad[0] / 2.0 - MIN_PAD;
+        (last - first).dot(pair.closing).abs() >= MIN_STROKE && (low > rim || high < -rim)
     }
 
     /// The triangles of a body at share 0, in the palm's frame.

@@ -83,7 +83,7 @@ impl Gripper {
     /// # Errors
     /// [`Error::Io`] and [`Error::Urdf`] for a file that is no sound description or no tree, see
     /// [`RobotDescription::read`]; [`Error::NoGripper`] where no such pair of fingers is found, or
-    /// several; [`Error::Geom`] for a mesh file that is broken.
+    /// several, or a third finger beside it; [`Error::Geom`] for a mesh file that is broken.
     pub fn from_urdf(path: impl AsRef<Path>, settings: &GripperSettings) -> Result<Self> {
         let path = path.as_ref();
         let description = RobotDescription::read(path)?;
@@ -197,6 +197,14 @@ impl Loader<'_> {
             let [c, d] = other.fingers.map(|link| self.name_of(link));
             let found = format!("`{a}` and `{b}`; `{c}` and `{d}`");
             return Err(self.no_gripper("one pair of fingers, or to be told which", found));
+        }
+        let third = best.third_finger(self.robot, shapes).filter(|_| only.is_none());
+        if let Some(third) = third.map(|link| self.name_of(link)) {
+            let [a, b] = best.fingers.map(|link| self.name_of(link));
+            let expected =
+                "two fingers (hands of three or more are not covered), or to be told which two";
+            let found = format!("`{a}` and `{b}`, and beside them `{third}`");
+            return Err(self.no_gripper(expected, found));
         }
         Ok(best.clone())
     }
