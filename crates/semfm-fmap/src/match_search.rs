@@ -127,7 +127,7 @@ impl<'a> MatchSearch<'a> {
     }
 
     /// Finds the nearest row of the one side to each of the other, where the source's delta functions are sent through C.
-    pub fn turn(&mut self, map: &FunctionalMap) -> Result<()> {
+    pub fn find_nearest(&mut self, map: &FunctionalMap) -> Result<()> {
         let mapped = map.mapped_deltas(self.source.basis.subcols(0, map.k_source()));
         let scale = self.feature_weight * (map.k_target() as f64).sqrt();
         let on_source = self.source.rows(mapped.as_ref(), scale);

@@ -105,7 +105,7 @@ pub fn zoomout(
     let mass: Vec<f64> = vertices.map(|v| target.basis.mass[v as usize]).collect();
     while k < k_final {
         task.step("zoomout", k, k_final)?;
-        search.turn(&map)?;
+        search.find_nearest(&map)?;
         k = (k + settings.step).min(k_final);
         let matched = search.matched(k);
         map = match &sampled {
@@ -162,7 +162,8 @@ pub fn zoomout_bidirectional(
         if k >= k_final {
             return Ok(map);
         }
-        let (of_target, of_source) = rayon::join(|| forth.turn(&map), || back.turn(&map));
+        let (of_target, of_source) =
+            rayon::join(|| forth.find_nearest(&map), || back.find_nearest(&map));
         of_target.and(of_source)?;
         k = (k + settings.step).min(k_final);
     }

@@ -30,7 +30,7 @@ impl Default for LineSettings {
 
 impl LineSettings {
     /// Whether a frame is as close to where it should be as the tolerances ask.
-    fn are_kept(&self, wanted: &Pose, found: &Pose) -> bool {
+    fn is_within_tolerance(&self, wanted: &Pose, found: &Pose) -> bool {
         wanted.translation.distance(found.translation) <= self.tolerance
             && wanted.rotation.angle_between(found.rotation) <= self.rotation_tolerance
     }
@@ -119,7 +119,7 @@ fn step_along(
     let next = arm.reach(&line.at(to), q)?;
     for share in [0.5, 0.25, 0.75] {
         let on_the_way = arm.tip(&between(q, &next, share));
-        if !settings.are_kept(&line.at(from + share * (to - from)), &on_the_way) {
+        if !settings.is_within_tolerance(&line.at(from + share * (to - from)), &on_the_way) {
             return Err(next);
         }
     }
