@@ -1,7 +1,7 @@
 //! How far the best grasp moves with the seed, and how many grasps noise and density leave.
 //!
-//! `bench_steady [--samples N] [--seeds N] [--noise SHARE] [--dense N] MESH…` reads meshes in metres; the whole surface is
-//! the region. Noise is normal, on each coordinate, with a deviation of a share of the diagonal; `--dense N` cuts each
+//! `bench_steady [--samples N] [--seeds N] [--noise SHARE] [--dense N] [--gripper NAME|URDF] MESH…` reads meshes in
+//! metres; the whole surface is the region. Without `--gripper` it is three boxes. Noise is normal, on each coordinate, with a deviation of a share of the diagonal; `--dense N` cuts each
 //! triangle into four, N times. One line for each seed, then the greatest distance between the middles of the best
 //! grasps' contacts. Times are CPU seconds of one thread.
 
@@ -18,6 +18,7 @@ use semfm_geom::{Mesh, Task};
 use semfm_grasp::{
     BoxGripper, GraspObject, GraspSettings, GripperGeometry, Scene, find_grasps_with,
 };
+use semfm_robot::Gripper;
 
 /// What is varied.
 struct Variation {
@@ -25,11 +26,13 @@ struct Variation {
     noise: f64,
     n_cuts: usize,
     settings: GraspSettings,
+    gripper: GripperGeometry,
 }
 
 fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     let settings = GraspSettings::default();
-    let mut variation = Variation { n_seeds: 5, noise: 0.0, n_cuts: 0, settings };
+    let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
+    let mut variation = Variation { n_seeds: 5, noise: 0.0, n_cuts: 0, settings, gripper };
     let mut meshes = Vec::<PathBuf>::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -39,6 +42,10 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
             "--seeds" => variation.n_seeds = value()?.parse()?,
             "--noise" => variation.noise = value()?.parse()?,
             "--dense" => variation.n_cuts = value()?.parse()?,
+            "--gripper" => {
+                let hand = Gripper::open(&value()?, &Default::default())?;
+                variation.gripper = GripperGeometry::new(&hand)?;
+            }
             mesh => meshes.push(mesh.into()),
         }
     }
@@ -66,14 +73,14 @@ fn bench(mesh: &Mesh, variation: &Variation) -> Result<(), Box<dyn Error + Send 
         surface.n_triangles,
         1e3 * surface.noise
     );
-    let gripper = GripperGeometry::from_boxes(&BoxGripper::default())?;
+    let gripper = &variation.gripper;
     let region = vec![1.0; mesh.n_vertices()];
     let mut middles = Vec::new();
     for seed in 0..variation.n_seeds {
         let settings = GraspSettings { seed, ..variation.settings.clone() };
         let start = ProcessTime::now();
         let (scene, task) = (Scene::new(), Task::default());
-        let found = find_grasps_with(&object, &region, &gripper, &scene, &settings, &task)?;
+        let found = find_grasps_with(&object, &region, gripper, &scene, &settings, &task)?;
         let seconds = start.elapsed().as_secs_f64();
         let (n, survivors) = (found.n_candidates, found.n_survivors);
         let best = found.grasps.first().map_or(f64::NAN, |grasp| grasp.score);

@@ -16,7 +16,7 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     /// The pose of a grasp, to be examined once more or moved.
-    pub(crate) fn again(grasp: &Grasp) -> Self {
+    pub(crate) fn from_grasp(grasp: &Grasp) -> Self {
         Self { tcp: grasp.object_from_tcp, seed: [-grasp.width / 2.0, grasp.width / 2.0] }
     }
 }

@@ -9,7 +9,7 @@ use crate::object::GraspObject;
 use crate::rejection::{Reason, Refusal};
 use crate::scene::Scene;
 use crate::settings::GraspSettings;
-use crate::solid::Solid;
+use crate::solid::{Convex, Solid};
 use semfm_robot::Role;
 
 /// The gripper keeps at least this away from everything but at its pads, metres.
@@ -152,22 +152,39 @@ impl<'a> Collision<'a> {
         } else {
             ((opening - width) / CLOSING_STEP).ceil().max(1.0) as usize
         };
-        let mut before = open;
-        for step in 1..=steps {
-            let share = step as f64 / steps as f64;
-            let after = self.open(opening + share * (width - opening), &closed);
-            for ((role, shape, from), (_, _, to)) in before.pieces().zip(after.pieces()) {
-                if role == Role::Palm {
-                    continue;
-                }
-                let path = shape.swept(&(*tcp * *from), &(*tcp * *to));
-                if self.object.obstacle().meets(&path, MARGIN) || self.meets_scene(&path) {
-                    return false;
-                }
-            }
-            before = after;
+        if steps == 1 {
+            return open.pieces().zip(closed.pieces()).all(|((role, shape, from), (_, _, to))| {
+                role == Role::Palm || self.is_free(&shape.swept(&(*tcp * *from), &(*tcp * *to)))
+            });
         }
-        true
+        let places: Vec<PosedGripper<'_>> = (0..=steps)
+            .map(|step| opening + step as f64 / steps as f64 * (width - opening))
+            .map(|width| self.open(width, &closed))
+            .collect();
+        open.pieces().enumerate().all(|(piece, (role, shape, _))| {
+            let way = || places.iter().map(|place| *tcp * *place.pose(piece));
+            role == Role::Palm || self.is_way_free(shape, &way().collect::<Vec<_>>())
+        })
+    }
+
+    /// Whether nothing stands in the way of a shape from each pose to the next.
+    fn is_way_free(&self, shape: &Convex, way: &[Pose]) -> bool {
+        let around = shape.around(way);
+        let obstacle = self.object.obstacle();
+        let near: Vec<u32> = obstacle.near(&around, MARGIN).collect();
+        let is_scene_near = self.meets_scene(&around);
+        // From the closed end: most of what is in the way is beside the pads.
+        let mut steps = way.windows(2).rev().map(|ends| shape.swept(&ends[0], &ends[1]));
+        let is_met = |step: &Solid| {
+            obstacle.meets_any(near.iter().copied(), step, MARGIN)
+                || is_scene_near && self.meets_scene(step)
+        };
+        near.is_empty() && !is_scene_near || !steps.any(|step| is_met(&step))
+    }
+
+    /// Whether a body touches neither object nor scene.
+    fn is_free(&self, body: &Solid) -> bool {
+        !self.object.obstacle().meets(body, MARGIN) && !self.meets_scene(body)
     }
 
     /// Nothing was touched, so each piece is wholly inside or wholly outside of anything closed.
@@ -212,17 +229,14 @@ impl<'a> Collision<'a> {
         let first_free = (1..most).find(|&k| {
             let tcp = closing.tcp * Pose::from_translation(-DVec3::Z * step * k as f64);
             self.openings(closing.width)
-                .any(|opening| self.is_free(&self.open(opening, &closed), &tcp))
+                .any(|opening| self.is_free_at(&self.open(opening, &closed), &tcp))
         });
         step * first_free.unwrap_or(most) as f64
     }
 
     /// Whether the gripper at rest touches neither object nor scene.
-    fn is_free(&self, gripper: &PosedGripper<'_>, tcp: &Pose) -> bool {
-        gripper.pieces().all(|(_, shape, pose)| {
-            let solid = shape.at(&(*tcp * *pose));
-            !self.object.obstacle().meets(&solid, MARGIN) && !self.meets_scene(&solid)
-        })
+    fn is_free_at(&self, gripper: &PosedGripper<'_>, tcp: &Pose) -> bool {
+        gripper.pieces().all(|(_, shape, pose)| self.is_free(&shape.at(&(*tcp * *pose))))
     }
 
     /// Distances between the pads on the way in: fully open, and as little as is safe.

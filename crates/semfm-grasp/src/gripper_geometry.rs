@@ -235,6 +235,11 @@ impl PosedGripper<'_> {
             .map(|(piece, pose)| (piece.role, &piece.shape, pose))
     }
 
+    /// Pose of the piece with this number.
+    pub(crate) fn pose(&self, piece: usize) -> &Pose {
+        &self.poses[piece]
+    }
+
     /// The same gripper seen from the TCP of `other`, both having their palm in one place: where a
     /// linkage carries the pads along z as it closes, the robot holds the flange still.
     pub(crate) fn with_palm_of(mut self, other: &Self) -> Self {

@@ -20,6 +20,7 @@ mod gpg;
 mod grasp;
 mod grasp_distance;
 mod gripper_geometry;
+mod likely_symmetry;
 mod neighbours;
 mod object;
 mod obstacle;

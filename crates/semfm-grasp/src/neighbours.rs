@@ -24,7 +24,7 @@ pub(crate) fn neighbours(
     kept.iter().for_each(|grasp| grid.insert(&grasp.object_from_tcp));
     let mut proposed = Vec::new();
     for grasp in frontier {
-        let Candidate { tcp: here, seed } = Candidate::again(grasp);
+        let Candidate { tcp: here, seed } = Candidate::from_grasp(grasp);
         for motion in &moves {
             let tcp = here * *motion;
             if !grid.has_near(&tcp) {
@@ -52,7 +52,8 @@ pub(crate) fn steps(step: f64, turn: f64) -> Vec<Pose> {
         .collect()
 }
 
-fn turned(angle: f64, axis: DVec3) -> Pose {
+/// A turn (radians) about an axis through the TCP.
+pub(crate) fn turned(angle: f64, axis: DVec3) -> Pose {
     let rotation: Rotation = DQuat::from_axis_angle(axis, angle);
     Pose::from_parts(DVec3::ZERO, rotation)
 }

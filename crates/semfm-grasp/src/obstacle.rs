@@ -48,13 +48,23 @@ impl Obstacle {
 
     /// Whether `solid`, grown by `margin`, touches anything.
     pub(crate) fn meets(&self, solid: &Solid, margin: f64) -> bool {
+        self.meets_any(self.near(solid, margin), solid, margin)
+    }
+
+    /// Whether `solid`, grown by `margin`, touches one of these items.
+    pub(crate) fn meets_any(
+        &self,
+        mut items: impl Iterator<Item = u32>,
+        solid: &Solid,
+        margin: f64,
+    ) -> bool {
         match &self.items {
-            Items::Triangles(triangles) => self
-                .near(solid, margin)
-                .any(|i| solid.meets_triangle(&triangles[i as usize], margin)),
-            Items::Points { points, radius } => self
-                .near(solid, margin + radius)
-                .any(|i| solid.meets_point(points[i as usize], margin + radius)),
+            Items::Triangles(triangles) => {
+                items.any(|i| solid.meets_triangle(&triangles[i as usize], margin))
+            }
+            Items::Points { points, radius } => {
+                items.any(|i| solid.meets_point(points[i as usize], margin + radius))
+            }
         }
     }
 
@@ -71,7 +81,7 @@ impl Obstacle {
                 }
             }
             Items::Points { points, radius } => {
-                for i in self.near(solid, cap + radius) {
+                for i in self.near(solid, cap) {
                     let p = points[i as usize];
                     least = least.min((solid.distance(&[p; 3], least + radius) - radius).max(0.0));
                 }
@@ -80,13 +90,17 @@ impl Obstacle {
         least
     }
 
-    /// Ids of the items whose boxes come near the box of `solid` grown by `margin`.
+    /// Ids of the items whose boxes come near the box of `solid` grown by `margin`, points with their radius.
     pub(crate) fn near<'a>(
         &'a self,
         solid: &Solid,
         margin: f64,
     ) -> impl Iterator<Item = u32> + use<'a> {
-        let grown = solid.grown(margin);
+        let radius = match self.items {
+            Items::Triangles(_) => 0.0,
+            Items::Points { radius, .. } => radius,
+        };
+        let grown = solid.grown(margin + radius);
         self.tree.passing(move |bounds| grown.overlaps(bounds))
     }
 

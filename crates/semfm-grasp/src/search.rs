@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
                 kept.iter().filter(|grasp| !before.contains(&pose_bits(grasp))).cloned().collect();
             sampled.absorb(part);
         }
-        Ok(Found { kept: self.scored(kept), n_survivors, sampled })
+        Ok(Found { kept: self.merged(kept), n_survivors, sampled })
     }
 
     /// The score that a grasp must reach to be returned, as far as is known: of `kept` (best first) so many reach it
@@ -183,20 +183,25 @@ impl<'a> Search<'a> {
         of_last.map_or(f64::NEG_INFINITY, |grasp| (1.0 - diversity) * grasp.score)
     }
 
-    /// With the scores of those that may be returned; the others keep their bounds.
-    pub(crate) fn scored(&self, kept: Vec<Grasp>) -> Vec<Grasp> {
-        let least = self.least_returned(&kept);
-        let mut scored: Vec<Grasp> = kept
-            .into_par_iter()
-            .filter_map(|grasp| match grasp.is_scored() {
-                true => Some(grasp),
-                // What was better has been merged since.
-                false if grasp.score >= least => self.examine(&Candidate::again(&grasp)).ok(),
-                false => Some(grasp),
-            })
-            .collect();
-        scored.sort_by(|a, b| b.score.total_cmp(&a.score));
-        scored
+    /// Near ones merged, with the scores of those that may be returned; the others keep their bounds. Best first.
+    pub(crate) fn merged(&self, mut grasps: Vec<Grasp>) -> Vec<Grasp> {
+        loop {
+            grasps = suppress(grasps, self.settings.separation);
+            let least = self.least_returned(&grasps);
+            let may_be_returned = |grasp: &Grasp| !grasp.is_scored() && grasp.score >= least;
+            if !grasps.iter().any(may_be_returned) {
+                return grasps;
+            }
+            // What is scored may hide others, or be less than was thought: then more may be returned.
+            let examined = grasps.into_par_iter().filter_map(|grasp| {
+                if may_be_returned(&grasp) {
+                    self.examine(&Candidate::from_grasp(&grasp)).ok()
+                } else {
+                    Some(grasp)
+                }
+            });
+            grasps = examined.collect();
+        }
     }
 
     /// The stages, cheap ones first.

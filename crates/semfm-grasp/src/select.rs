@@ -11,17 +11,31 @@ use crate::settings::Separation;
 
 /// Keeps a grasp where no better one is within the separation in both translation and rotation;
 /// best first, ties in the given order.
+///
+/// A grasp of which only a bound is known is hidden by what is surely as good, and hides only other bounds: its score,
+/// once it is known, may be less than that of a near one.
 pub(crate) fn suppress(mut grasps: Vec<Grasp>, separation: Separation) -> Vec<Grasp> {
     grasps.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut grid = PoseGrid::new(separation);
+    let mut scored = PoseGrid::new(separation);
+    let mut bounded = PoseGrid::new(separation);
     grasps.retain(|grasp| {
-        let apart = !grid.has_near(&grasp.object_from_tcp);
+        let pose = &grasp.object_from_tcp;
+        let apart = !scored.has_near(pose) && (grasp.is_scored() || !bounded.has_near(pose));
         if apart {
-            grid.insert(&grasp.object_from_tcp);
+            let grid = if grasp.is_scored() { &mut scored } else { &mut bounded };
+            grid.insert(pose);
         }
         apart
     });
     grasps
+}
+
+/// The best `n` of the scored grasps (best first) that lie apart from each other.
+pub(crate) fn best_apart(grasps: &[Grasp], separation: Separation, n: usize) -> Vec<Grasp> {
+    let scored = grasps.iter().filter(|grasp| grasp.is_scored()).cloned().collect();
+    let mut best = suppress(scored, separation);
+    best.truncate(n);
+    best
 }
 
 /// `top` of the grasps (best first), different from each other among the good ones only.
@@ -84,8 +98,12 @@ mod tests {
             closing_turn: 0.0,
             score,
             hold: None,
-            terms: Vec::new(),
+            terms: vec![("contact", 1.0)],
         }
+    }
+
+    fn bound(x: f64, bound: f64) -> Grasp {
+        Grasp { terms: Vec::new(), ..grasp(x, 0.0, bound) }
     }
 
     #[test]
@@ -98,6 +116,22 @@ mod tests {
         ];
         let kept = suppress(all, Separation { translation: 0.01, rotation: 0.26 });
         assert_eq!(kept.iter().map(|g| g.score).collect::<Vec<_>>(), [0.9, 0.3, 0.2]);
+    }
+
+    #[test]
+    fn a_bound_hides_no_score_and_a_better_score_hides_a_bound() {
+        let separation = Separation { translation: 0.01, rotation: 0.26 };
+        let scores = |all: Vec<Grasp>| -> Vec<f64> {
+            suppress(all, separation).iter().map(|grasp| grasp.score).collect()
+        };
+        assert_eq!(scores(vec![bound(0.0, 0.9), grasp(0.004, 0.0, 0.5)]), [0.9, 0.5]);
+        assert_eq!(scores(vec![bound(0.0, 0.4), grasp(0.004, 0.0, 0.5)]), [0.5]);
+        assert_eq!(scores(vec![bound(0.0, 0.9), bound(0.004, 0.8)]), [0.9]);
+        let all =
+            [bound(0.0, 0.9), grasp(0.0, 0.0, 0.5), grasp(0.004, 0.0, 0.6), grasp(0.03, 0.0, 0.1)];
+        let best = best_apart(&all, separation, 9);
+        assert_eq!(best.iter().map(|grasp| grasp.score).collect::<Vec<_>>(), [0.6, 0.1]);
+        assert_eq!(best_apart(&all, separation, 1).len(), 1);
     }
 
     #[test]

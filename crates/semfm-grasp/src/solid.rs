@@ -174,6 +174,19 @@ impl Convex {
         Solid::new(frame, (high - low) / 2.0, Some(hull))
     }
 
+    /// A box around the shape at each of the poses (at least one) and on straight ways between them.
+    pub(crate) fn around(&self, poses: &[Pose]) -> Solid {
+        let (first, corners) = (poses[0], self.corners());
+        let all: Vec<DVec3> = poses
+            .iter()
+            .map(|pose| first.inv_mul(pose))
+            .flat_map(|motion| corners.iter().map(move |&p| motion * p))
+            .collect();
+        let (low, high) = bounds(&all).unwrap_or_default();
+        let frame = first * Pose::from_translation(low.midpoint(high));
+        Solid::oriented_box(frame, (high - low) / 2.0)
+    }
+
     fn corners_around_centre(&self) -> Vec<DVec3> {
         (0..8).map(|i| self.half * corner_signs(i)).collect()
     }
@@ -416,6 +429,24 @@ mod tests {
             assert!(!solid.meets_triangle(&tile(1.5 * way), 0.0));
             assert!(solid.meets_point(way / 2.0, 0.0) && !solid.meets_point(-0.3 * way, 0.0));
         }
+    }
+
+    #[test]
+    fn the_box_around_a_way_holds_all_that_is_swept() {
+        let cube = Convex::cuboid(DVec3::X, DVec3::splat(0.5));
+        let pose = |t: f64| Pose::new(DVec3::new(t, t * t, 0.3), DVec3::new(0.4 * t, 0.2, t));
+        let way: Vec<Pose> = (0..6).map(|i| pose(f64::from(i) / 3.0)).collect();
+        let around = cube.around(&way);
+        let mut hits = 0;
+        for i in 0..300 {
+            let t = f64::from(i);
+            let from_centre = 0.8 * DVec3::new((7.1 * t).sin(), (3.3 * t).cos(), t.sin());
+            let p = way[i as usize % way.len()] * (DVec3::X + from_centre);
+            let hit = way.windows(2).any(|w| cube.swept(&w[0], &w[1]).meets_point(p, 0.0));
+            assert!(!hit || around.meets_point(p, 1e-9), "{p}");
+            hits += u32::from(hit);
+        }
+        assert!((10..290).contains(&hits), "{hits} of 300 hit");
     }
 
     #[test]
