@@ -2,6 +2,7 @@
 
 pub mod mutation;
 pub mod readers;
+pub mod rgbd;
 pub mod sample;
 pub mod seeds;
 pub mod shell;

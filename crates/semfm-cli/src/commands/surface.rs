@@ -52,7 +52,7 @@ pub struct SurfaceCommand {
     #[command(flatten)]
     bag: BagOptions,
     /// Merge all frames, whose cameras' poses are known: the surface is then in the frame of the poses
-    #[arg(long, requires = "source", help_heading = "Merge")]
+    #[arg(long, help_heading = "Merge")]
     merge: bool,
     /// Merge the first frame and each that is so many further on
     #[arg(long, value_name = "N", default_value_t = 1, requires = "merge", help_heading = "Merge")]
@@ -203,6 +203,11 @@ impl SurfaceCommand {
                 let frame = read_source_frame(path, *number, &self.bag)?;
                 note(&frame.report);
                 Ok(vec![frame.observation])
+            }
+            None if self.merge => {
+                bail!(
+                    "--merge: expected a source of several frames, a bag or a BOP scene, found files"
+                )
             }
             None if self.files.is_given() => Ok(vec![self.files.read()?]),
             None => bail!(
