@@ -5,9 +5,10 @@ use semfm_geom::math::DVec3;
 use super::signed_distance::HandDistance;
 
 /// What touching counts against where the hand was said to be: the most contact that is found is worth this much of a
-/// logarithm, a shift by one standard deviation costs one half. On the one grasp measured so far (`bench/README.md`) 10
-/// moves a hand that was right by enough to cost a third of the overlap: smaller values are to be tried first.
-const WORTH_OF_CONTACT: f64 = 10.0;
+/// logarithm, a shift by one standard deviation costs one half. On two grasps of one hammer (`bench/README.md`) 1 leaves a hand
+/// that was right nearly where it is (overlap .90, with 4 .78), but then one that is 10 mm off along the ray stays off (.56
+/// against .79). 10, measured on one of the two, is worse than 4 or the same in seven rows of eight.
+const WORTH_OF_CONTACT: f64 = 4.0;
 /// An area that is inside the hand by one reach more than soft tissue allows counts this many times against.
 const WORTH_OF_PENETRATION: f64 = 3.0;
 /// As deep as this share of the reach tissue gives way.
