@@ -79,9 +79,9 @@ impl ObservedPicture<'_> {
             Brightness::OfGreyView => brightness_factor(&view, &shown, &on_mesh),
         };
         for (pixel, shown) in shown.iter().enumerate() {
-            for channel in 0..3 {
+            for (channel, background) in background.iter().enumerate() {
                 let object = (factor * shown.color[channel]).min(255.0);
-                let mixed = shown.share * object + (1.0 - shown.share) * background[channel];
+                let mixed = shown.share * object + (1.0 - shown.share) * background;
                 view.rgb[3 * pixel + channel] = mixed.round() as u8;
             }
             if shown.share < SHOWS {
