@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use semfm_geom::io::MeshFile;
-use semfm_geom::{Mesh, Task};
+use semfm_geom::{Mesh, Task, noise_free};
 #[cfg(feature = "mcap")]
 use semfm_views::mcap::{ViewsMetadata, write_views};
 use semfm_views::{RenderSettings, Renderer, RigSettings, SurfaceColor, View, rig};
@@ -104,7 +104,7 @@ impl Coloring {
 /// holds.
 #[derive(Clone, Debug)]
 pub struct RenderedObject<'a> {
-    /// The mesh that was drawn.
+    /// The mesh as read.
     pub mesh: &'a Mesh,
     /// One picture per camera.
     pub views: Vec<View>,
@@ -117,7 +117,7 @@ pub struct RenderedObject<'a> {
 }
 
 impl<'a> RenderedObject<'a> {
-    /// Renders the views of an object.
+    /// Renders the views of an object; of a noisy one the surface without its noise ([`noise_free`]).
     ///
     /// # Errors
     /// [`semfm_views::Error::Invalid`] for settings out of range, [`semfm_views::Error::Gpu`] where a
@@ -139,8 +139,9 @@ impl<'a> RenderedObject<'a> {
             (_, None) => (Coloring::Grey, SurfaceColor::default()),
         };
         let mesh = object.mesh();
-        let cameras = rig(mesh, &settings.rig)?;
-        let views = renderer.render(mesh, &paint, &cameras, &settings.render, task)?;
+        let drawn = noise_free(mesh);
+        let cameras = rig(&drawn, &settings.rig)?;
+        let views = renderer.render(&drawn, &paint, &cameras, &settings.render, task)?;
         let of_vertices = own.and_then(|file| file.appearance.vertex_colors.as_ref());
         Ok(Self {
             mesh,

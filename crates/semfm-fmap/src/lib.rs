@@ -14,8 +14,8 @@
 //! [`fit`] finds the C that agrees with them, [`zoomout`] refines it and reads a point map off it.
 //! Two more steps need no anchors: [`features`] puts both clouds into one small space, and
 //! [`transport`] couples them there; [`propagation`] spreads the vote that was transferred along the
-//! target's own features. A [`Method`] is made of these steps, [`confidence`] says how far to trust its
-//! answer, [`metrics`] how good the answer was.
+//! target's own features, unless the target is the source's surface once more. A [`Method`] is made of
+//! these steps, [`confidence`] says how far to trust its answer, [`metrics`] how good the answer was.
 //!
 //! [`PreparedObject`] is made once for each object, [`Matching`] once for each pair; the matching
 //! transfers any number of regions. [`transfer()`] is the short call for one region:
@@ -52,6 +52,7 @@ mod assignment;
 mod closest_triangle;
 pub mod clusters;
 pub mod confidence;
+mod congruence;
 pub mod descriptors;
 mod error;
 pub mod features;

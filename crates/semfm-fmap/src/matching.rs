@@ -186,7 +186,7 @@ impl Matching {
         let agreement = second.as_ref().map(|second| overlap(&answer, &mask(second), areas));
         let other = self.other_rule(&voted.inside)?;
         let other_iou = other.as_ref().map(|other| overlap(&answer, &mask(other), areas));
-        let region = onto_original(target, &voted.votes)?;
+        let region = self.onto_original(&voted.votes, &region.mask())?;
         let evidence = Evidence { likeness: self.likeness()?, ..self.evidence(&voted, &answer) };
         let one_kind = evidence.likeness.and_then(|likeness| self.one_kind(likeness));
         let confidence = match (self.settings.method.info().confidence, agreement) {
@@ -241,7 +241,24 @@ impl Matching {
         let inside = self.source().region_on_working(&region.mask());
         let votes = self.settings.method.info().votes;
         let votes = votes(&self.pair, &self.settings, &self.matched, &inside)?;
-        Ok(Voted { votes: at_threshold(&votes, self.settings.threshold), inside })
+        let mut votes = at_threshold(&votes, self.settings.threshold);
+        if let Some(congruence) = &self.matched.congruence {
+            let to_original = &self.target().shape().working().to_original;
+            congruence.mixed_into_working(&mut votes, to_original, &region.mask());
+        }
+        Ok(Voted { votes, inside })
+    }
+
+    /// Votes on the working vertices as a region of the target's mesh as read; where that is the source's surface once
+    /// more, with the source's region (`inside`) as it is.
+    fn onto_original(&self, votes: &[f64], inside: &[bool]) -> Result<Region> {
+        let target = self.target().shape();
+        let Some(congruence) = &self.matched.congruence else {
+            return onto_original(target, votes);
+        };
+        let mut weights = target.onto_original(votes);
+        congruence.mixed_into(&mut weights, inside);
+        Region::from_weights(weights.into_iter().map(|w| w.clamp(0.0, 1.0)).collect())
     }
 
     /// The votes of the second opinion: of the map of `fused` beside a method without a map, else of

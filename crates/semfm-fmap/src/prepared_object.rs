@@ -6,8 +6,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use semfm_geom::descriptors::{WksSettings, wks};
+use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{ConfidenceWeights, HeatStep, PointIndex, SemanticCloud, Shape, Task};
+use semfm_geom::{
+    ConfidenceWeights, HeatStep, PointIndex, SemanticCloud, Shape, SurfaceIndex, SurfaceMoments,
+    Task,
+};
 
 use crate::clusters::{ClusterSettings, Clusters, spectral_clusters};
 use crate::features::CentredFeatures;
@@ -76,6 +80,8 @@ struct Derived {
     samples: OnceLock<Vec<u32>>,
     graph: OnceLock<NeighbourGraph>,
     heat_step: OnceLock<KeptHeatStep>,
+    moments: OnceLock<SurfaceMoments>,
+    surface: OnceLock<SurfaceIndex>,
     point_of_original_vertex: OnceLock<Vec<u32>>,
 }
 
@@ -153,6 +159,8 @@ impl PreparedObject {
             samples: OnceLock::new(),
             graph: OnceLock::new(),
             heat_step: OnceLock::new(),
+            moments: OnceLock::new(),
+            surface: OnceLock::new(),
             point_of_original_vertex: OnceLock::new(),
         };
         Ok(Self {
@@ -272,6 +280,29 @@ impl PreparedObject {
             features.squared_distance(i, j)
         })?;
         Ok(self.derived.graph.get_or_init(|| graph))
+    }
+
+    /// Where the surface lies and how far it reaches.
+    pub(crate) fn moments(&self) -> Result<&SurfaceMoments> {
+        if let Some(moments) = self.derived.moments.get() {
+            return Ok(moments);
+        }
+        let moments = SurfaceMoments::of(self.shape().mesh())?;
+        Ok(self.derived.moments.get_or_init(|| moments))
+    }
+
+    /// The surface, to look up its nearest point; triangles are those of the mesh as read.
+    pub(crate) fn surface(&self) -> Result<&SurfaceIndex> {
+        if let Some(surface) = self.derived.surface.get() {
+            return Ok(surface);
+        }
+        let surface = SurfaceIndex::new(self.shape().surface())?;
+        Ok(self.derived.surface.get_or_init(|| surface))
+    }
+
+    /// The cloud point nearest to a position.
+    pub(crate) fn nearest_point(&self, position: DVec3) -> usize {
+        self.derived.cloud_index.nearest(position).0
     }
 
     /// [`Shape::smooth`] for values on the working vertices (n); the factor of the first time asked for is kept.

@@ -98,6 +98,10 @@ pub struct TransferSettings {
     pub diffusion: f64,
     /// How the vote is spread along the target's own features, weight 0 for not at all.
     pub propagation: PropagationSettings,
+    /// How far the target's surface may lie from the source's, as a share of the source's diagonal, to be the same
+    /// surface once more; 0 to not look for that.
+    #[serde(default)]
+    pub congruence: f64,
     /// The vote from which a vertex counts, inside (0, 1).
     pub threshold: f64,
     /// Whether a second opinion is computed, in another way than the method's: by transport beside a
@@ -132,6 +136,7 @@ impl TransferSettings {
             neighbours: 15,
             diffusion: 0.0,
             propagation: PropagationSettings { weight: 0.0, ..PropagationSettings::default() },
+            congruence: 0.0,
             threshold: 0.5,
             second_opinion: true,
         }
@@ -153,6 +158,10 @@ impl TransferSettings {
                 "a weight of at least 0 and a positive contrast",
                 found,
             );
+        }
+        if !(self.congruence >= 0.0 && self.congruence.is_finite()) {
+            let expected = "a share of the diagonal, at least 0";
+            return Error::out_of_range("congruence", expected, self.congruence);
         }
         if self.n_anchors == 0 || self.feature_dims == 0 || self.neighbours == 0 {
             let found =

@@ -8,7 +8,7 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 8 + 32 | `SEMFMSH3`, key |
+//! | 8 + 32 | `SEMFMSH4`, key |
 //! | 7 × 8 | n original vertices, n_w working vertices, m triangles, k, e entries of the stiffness on and below the diagonal, p original vertices beside the working ones, length of the report |
 //! | 4 n_w + 12 m | `to_original`, from which the working vertices are read, and the triangles |
 //! | 4 n + 4 p + 20 p | `of_original`; the p vertices that are no working vertex (nor one that they were welded to), and `point_of_original` of each: the last two weights in `f32`, then corners |
@@ -27,13 +27,14 @@ use std::time::SystemTime;
 use faer::Mat;
 use faer::sparse::{SparseColMat, Triplet};
 
+use crate::denoise::without_noise;
 use crate::shape::ShapeParts;
 use crate::working_mesh::{BarycentricPoint, WorkingMesh};
 use crate::{Eigenbasis, Error, Laplacian, Mesh, MeshHash, Result, Shape, ShapeSettings, Task};
 
 /// Names format and version. A change of the layout *or of any step that leads to a shape* must
 /// change it: entries of other versions are never read.
-const MAGIC: [u8; 8] = *b"SEMFMSH3";
+const MAGIC: [u8; 8] = *b"SEMFMSH4";
 const SUFFIX: &str = "shape";
 const N_COUNTS: usize = 7;
 const HEADER: usize = 8 + 32 + N_COUNTS * 8;
@@ -312,7 +313,9 @@ fn decode(bytes: &[u8], key: &[u8; 32], original: &Mesh) -> Option<ShapeParts> {
     if !sound {
         return None;
     }
-    let points = to_original.iter().map(|&id| original.vertices()[id as usize]).collect();
+    let noise_free = without_noise(original);
+    let surface = noise_free.as_ref().unwrap_or(original);
+    let points = to_original.iter().map(|&id| surface.vertices()[id as usize]).collect();
     let mesh = Mesh::new(points, faces).ok()?;
     let mut point_of_original: Vec<BarycentricPoint> =
         of_original.iter().map(|&id| BarycentricPoint::vertex(id)).collect();
@@ -324,7 +327,7 @@ fn decode(bytes: &[u8], key: &[u8; 32], original: &Mesh) -> Option<ShapeParts> {
         Laplacian { stiffness: symmetric(&entries, &rows, &in_column)?, mass: mass.clone() };
     let basis = Eigenbasis { values, functions, mass, residuals };
     let working = WorkingMesh { mesh, of_original, to_original, point_of_original };
-    Some(ShapeParts { working, laplacian, basis, report })
+    Some(ShapeParts { noise_free, working, laplacian, basis, report })
 }
 
 /// The symmetric matrix with these entries on and below its diagonal, column after column.

@@ -22,21 +22,9 @@ const JACOBI_SWEEPS: usize = 12;
 /// [`Error::NoArea`] where every triangle is degenerate.
 pub fn principal_axes(mesh: &Mesh) -> Result<DMat3> {
     let scale = mesh.diagonal();
-    let (area, centroid) = area_and_centroid(mesh);
-    if !(area > 0.0 && area.is_finite() && scale.is_finite()) {
-        return Err(Error::NoArea { n_faces: mesh.n_faces() });
-    }
-    // In units of the diagonal, so that neither kilometres nor micrometres leave f64's range.
+    let (area, centroid) = checked_area_and_centroid(mesh)?;
     let to_unit = |p: DVec3| (p - centroid) / scale;
-    let mut covariance = DMat3::ZERO;
-    for face in 0..mesh.n_faces() {
-        let corners = mesh.corners(face).map(to_unit);
-        let sum = corners[0] + corners[1] + corners[2];
-        // ∫ x xᵀ over a triangle = area/12 · (Σ aᵢ aᵢᵀ + s sᵀ), s the sum of the corners.
-        let moment: DMat3 = corners.iter().map(|&a| outer(a)).fold(outer(sum), |m, a| m + a);
-        covariance += moment * (mesh.face_area(face) / area / 12.0);
-    }
-    let (variances, axes) = eigen_ascending(covariance);
+    let (variances, axes) = eigen_ascending(covariance(mesh, area, to_unit));
     let skewness = [0, 1, 2].map(|axis| {
         let third: f64 = (0..mesh.n_faces())
             .map(|face| {
@@ -52,6 +40,60 @@ pub fn principal_axes(mesh: &Mesh) -> Result<DMat3> {
     } else {
         DMat3::from_cols(y.cross(z), y, z).transpose()
     })
+}
+
+/// Where a surface lies and how far it reaches along its principal axes: exact integrals over the triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceMoments {
+    /// The mean of its points.
+    pub centroid: DVec3,
+    /// Orthonormal; their signs mean nothing.
+    pub axes: [DVec3; 3],
+    /// Standard deviations along the axes, ascending, in the units of the mesh.
+    pub deviations: [f64; 3],
+}
+
+impl SurfaceMoments {
+    /// Those of a mesh.
+    ///
+    /// # Errors
+    /// [`Error::NoArea`] where every triangle is degenerate.
+    pub fn of(mesh: &Mesh) -> Result<Self> {
+        let scale = mesh.diagonal();
+        let (area, centroid) = checked_area_and_centroid(mesh)?;
+        let to_unit = |p: DVec3| (p - centroid) / scale;
+        let (variances, axes) = eigen_ascending(covariance(mesh, area, to_unit));
+        let deviations = variances.map(|variance| variance.max(0.0).sqrt() * scale);
+        Ok(Self { centroid, axes, deviations })
+    }
+
+    /// Root of the mean squared distance from the centroid.
+    pub fn size(&self) -> f64 {
+        let [x, y, z] = self.deviations;
+        (x * x + y * y + z * z).sqrt()
+    }
+}
+
+/// The second moments of a surface about its centroid, in the units of `to_unit`: those of the diagonal, so that neither
+/// kilometres nor micrometres leave f64's range.
+fn covariance(mesh: &Mesh, area: f64, to_unit: impl Fn(DVec3) -> DVec3) -> DMat3 {
+    let mut covariance = DMat3::ZERO;
+    for face in 0..mesh.n_faces() {
+        let corners = mesh.corners(face).map(&to_unit);
+        let sum = corners[0] + corners[1] + corners[2];
+        // ∫ x xᵀ over a triangle = area/12 · (Σ aᵢ aᵢᵀ + s sᵀ), s the sum of the corners.
+        let moment: DMat3 = corners.iter().map(|&a| outer(a)).fold(outer(sum), |m, a| m + a);
+        covariance += moment * (mesh.face_area(face) / area / 12.0);
+    }
+    covariance
+}
+
+fn checked_area_and_centroid(mesh: &Mesh) -> Result<(f64, DVec3)> {
+    let (area, centroid) = area_and_centroid(mesh);
+    if !(area > 0.0 && area.is_finite() && mesh.diagonal().is_finite()) {
+        return Err(Error::NoArea { n_faces: mesh.n_faces() });
+    }
+    Ok((area, centroid))
 }
 
 fn area_and_centroid(mesh: &Mesh) -> (f64, DVec3) {
@@ -146,6 +188,22 @@ mod tests {
             let difference = principal_axes(&turned).unwrap() * turn - frame;
             assert!(difference.to_cols_array().iter().all(|x| x.abs() < 1e-9), "{difference}");
         }
+    }
+
+    #[test]
+    fn moments_are_those_of_a_known_surface_and_grow_with_it() {
+        // A plate of 4 × 2 in the plane z = 1: variances 16/12 and 4/12.
+        let corners = [[-2.0, -1.0, 1.0], [2.0, -1.0, 1.0], [2.0, 1.0, 1.0], [-2.0, 1.0, 1.0]];
+        let faces = vec![[0, 1, 2], [0, 2, 3]];
+        let plate = Mesh::new(corners.map(DVec3::from_array).to_vec(), faces).unwrap();
+        let found = SurfaceMoments::of(&plate).unwrap();
+        assert!((found.centroid - DVec3::Z).length() < 1e-12);
+        let expected = [0.0, (4f64 / 12.0).sqrt(), (16f64 / 12.0).sqrt()];
+        assert!(found.deviations.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert!((found.size() - (20f64 / 12.0).sqrt()).abs() < 1e-12);
+        let larger = moved(&plate, DMat3::from_rotation_x(1.0), 3.0, DVec3::ONE);
+        let larger = SurfaceMoments::of(&larger).unwrap();
+        assert!((larger.size() - 3.0 * found.size()).abs() < 1e-12);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cholesky::SparseCholesky;
 use crate::clean::{CleanReport, CleanSettings};
+use crate::denoise::without_noise;
 use crate::eigensolver::{EigenSettings, eigenbasis};
 use crate::laplacian::{BridgeSettings, Laplacian, LaplacianKind, bridge, laplacian};
 use crate::simplify::{SimplifyReport, SimplifySettings};
@@ -101,6 +102,8 @@ pub struct ShapeTimes {
 #[derive(Clone, Debug)]
 pub struct Shape {
     original: Mesh,
+    /// Where the original is noisy, its surface without the noise.
+    noise_free: Option<Mesh>,
     working: WorkingMesh,
     laplacian: Laplacian,
     basis: Eigenbasis,
@@ -109,6 +112,7 @@ pub struct Shape {
 
 /// What is computed from the original mesh.
 pub(crate) struct ShapeParts {
+    pub noise_free: Option<Mesh>,
     pub working: WorkingMesh,
     pub laplacian: Laplacian,
     pub basis: Eigenbasis,
@@ -116,7 +120,7 @@ pub(crate) struct ShapeParts {
 }
 
 impl Shape {
-    /// Prepares a mesh: clean, simplify, Laplacian at area 1, bridges, eigenbasis.
+    /// Prepares a mesh: noise off, clean, simplify, Laplacian at area 1, bridges, eigenbasis.
     ///
     /// # Errors
     /// [`Error::NoArea`]; [`Error::TooManyEigenpairs`] for a k of 0, or one above the number of
@@ -130,8 +134,10 @@ impl Shape {
             ..SimplifySettings::default()
         };
         task.step("working mesh", 0, 3)?;
+        let noise_free = without_noise(&original);
+        let surface = noise_free.as_ref().unwrap_or(&original);
         let PreparedWorkingMesh { working, cleaning, simplification } =
-            WorkingMesh::prepare(&original, &settings.cleaning, &simplification, task)?;
+            WorkingMesh::prepare(surface, &settings.cleaning, &simplification, task)?;
         let (k, clipped) = number_of_pairs(settings, working.mesh.n_vertices())?;
         let mut stages_ms = ShapeTimes { working_mesh: clock.lap(), ..ShapeTimes::default() };
 
@@ -156,19 +162,25 @@ impl Shape {
             stages_ms,
         };
         task.step("eigenbasis", 3, 3)?;
-        Ok(Self { original, working, laplacian: operator.laplacian, basis, report })
+        Ok(Self { original, noise_free, working, laplacian: operator.laplacian, basis, report })
     }
 
     /// Puts a shape together from its parts, as the cache does. All of them must be of
     /// `original`.
     pub(crate) fn from_parts(original: Mesh, parts: ShapeParts) -> Self {
-        let ShapeParts { working, laplacian, basis, report } = parts;
-        Self { original, working, laplacian, basis, report }
+        let ShapeParts { noise_free, working, laplacian, basis, report } = parts;
+        Self { original, noise_free, working, laplacian, basis, report }
     }
 
     /// The mesh as the caller gave it.
     pub fn original(&self) -> &Mesh {
         &self.original
+    }
+
+    /// The surface that everything here was computed from, vertex by vertex that of the original: without its noise
+    /// where it is noisy ([`without_noise`](crate::without_noise)), the original itself where it is not.
+    pub fn surface(&self) -> &Mesh {
+        self.noise_free.as_ref().unwrap_or(&self.original)
     }
 
     /// The working mesh and its index maps.

@@ -9,6 +9,7 @@
 //! matching works, and whatever it writes says that it is simulated.
 
 mod arm;
+mod change;
 mod demonstration;
 mod encoder;
 mod error;
@@ -26,6 +27,7 @@ use std::str::FromStr;
 use semfm_geom::suggestion::unknown_name;
 
 pub use arm::{ARM_FLANGE, ARM_HOME, ARM_NAME, arm_urdf};
+pub use change::{Change, ChangedCopy};
 pub use demonstration::{DemonstrationPictures, StandingObject, write_demonstration_pictures};
 pub use encoder::{Level, embed};
 pub use error::{Error, Result};

@@ -10,7 +10,7 @@ use half::f16;
 use semfm_encoder::rendered_views::{Coloring, Drawable, ViewSettings};
 use semfm_encoder::{Encoder, EncoderIdentity, OpenSettings, open_encoder};
 use semfm_geom::io::{read_json, write_json};
-use semfm_geom::{Mesh, MeshHash, ShapeCache, Task};
+use semfm_geom::{Mesh, MeshHash, ShapeCache, Task, noise_free};
 use semfm_views::EmbeddedView;
 use semfm_views::mcap::{Dtype, EmbeddingsFile};
 use serde::{Deserialize, Serialize};
@@ -284,13 +284,14 @@ impl ObjectEncoder {
     fn look(&self, object: Drawable<'_>, coloring: Coloring) -> Look {
         let coloring = self.encoder.wants().settings(coloring).coloring;
         let colors = (coloring == Coloring::Own).then(|| object.hash_of_colors()).flatten();
-        Look { mesh: object.mesh().hash(), colors }
+        Look { mesh: noise_free(object.mesh()).hash(), colors }
     }
 }
 
 /// An object as an encoder sees it.
 #[derive(PartialEq)]
 struct Look {
+    /// Hash of the surface that is drawn.
     mesh: MeshHash,
     /// Hash of the object's colours, where they are shown.
     colors: Option<String>,

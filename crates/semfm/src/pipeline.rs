@@ -19,7 +19,9 @@ use semfm_encoder::{EncodedViews, Encoder, EncoderIdentity, confidence_weights};
 use semfm_fmap::{Lifting, Method, PreparedObject, TransferSettings};
 use semfm_geom::math::DVec3;
 use semfm_geom::sampling::farthest_points;
-use semfm_geom::{ConfidenceWeights, Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task};
+use semfm_geom::{
+    ConfidenceWeights, Mesh, SemanticCloud, ShapeCache, ShapeSettings, Task, noise_free,
+};
 #[cfg(feature = "mcap")]
 use semfm_views::mcap::EmbeddingsFile;
 use semfm_views::{EmbeddedView, LiftReport, LiftSettings, lift};
@@ -265,7 +267,7 @@ pub fn semantic_cloud(
             semantic_cloud(mesh, features, settings, task)
         }
         FeatureSource::Views(views) => {
-            let lifted = lift(mesh, views, settings, task)?;
+            let lifted = lift(&noise_free(mesh), views, settings, task)?;
             let (cloud, report) = (Arc::new(lifted.cloud), Some(lifted.report));
             Ok(LiftedCloud { cloud, report, encoder: None })
         }

@@ -4,13 +4,15 @@
 //! the other it resembles most, given that everything must go somewhere. Those matches, both ways,
 //! start a bidirectional ZoomOut (10 → 30) whose search runs in the basis and the features at once;
 //! the map transfers the region, a little heat takes out the specks, and the vote is spread along the
-//! target's own features ([`propagation`](crate::propagation)). Anchors are not needed.
+//! target's own features ([`propagation`](crate::propagation)). Anchors are not needed. A target that is the source's
+//! surface once more ([`congruence`](crate::congruence)) gets the region as it is.
 
 use semfm_geom::Task;
 
 use super::info::{ConfidenceRule, Matched, MethodInfo, ViewFeatures};
 use super::pair::Pair;
 use super::votes;
+use crate::congruence::Congruence;
 use crate::propagation::PropagationSettings;
 use crate::settings::{Rule, TransferSettings};
 use crate::stages::Stages;
@@ -41,6 +43,7 @@ pub(super) fn settings(common: TransferSettings) -> TransferSettings {
         // to .3 on the handle of a kettle.
         diffusion: 0.001,
         propagation: PropagationSettings::default(),
+        congruence: 0.004,
         // Once the vote is spread, .4 to .45 are the same on real pairs; .5 costs .01, and .02 on
         // the hardest of the simulated ones.
         threshold: 0.42,
@@ -48,7 +51,7 @@ pub(super) fn settings(common: TransferSettings) -> TransferSettings {
     }
 }
 
-/// Couple, start, ZoomOut, point map.
+/// Couple, start, ZoomOut, point map, congruence.
 pub(super) fn matched(
     pair: &Pair,
     settings: &TransferSettings,
@@ -63,13 +66,18 @@ pub(super) fn matched(
     let map =
         stages.time("zoomout", || zoomout_bidirectional(matches, source, target, zoomout, task))?; // IV-E
     let weight = zoomout.feature_weight;
-    let points = stages.time("point_map", || point_map(&map, source, target, weight))?; // IV-E
+    let mut points = stages.time("point_map", || point_map(&map, source, target, weight))?; // IV-E
+    let same = || Congruence::of(pair, &points, settings.congruence);
+    let congruence = stages.time("congruence", same)?;
+    if let Some(congruence) = &congruence {
+        congruence.correct(&mut points, &pair.source, &pair.target);
+    }
     let reversed = || reverse_point_map(&map, source, target, weight);
     let target_of = match settings.rule {
         Rule::Image => Some(stages.time("point_map", reversed)?),
         Rule::Preimage => None,
     };
-    Ok(Matched { target_of, map: Some(map), ..Matched::points(points) })
+    Ok(Matched { target_of, map: Some(map), congruence, ..Matched::points(points) })
 }
 
 /// Vote, spread.

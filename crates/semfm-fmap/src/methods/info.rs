@@ -3,6 +3,7 @@
 use semfm_geom::Task;
 
 use super::pair::Pair;
+use crate::congruence::Congruence;
 use crate::fit::FitReport;
 use crate::settings::TransferSettings;
 use crate::stages::Stages;
@@ -87,11 +88,13 @@ pub(crate) struct Matched {
     pub target_of: Option<Vec<u32>>,
     pub map: Option<FunctionalMap>,
     pub fit: Option<FitReport>,
+    /// How the target lies on the source, where it is the same surface once more.
+    pub congruence: Option<Congruence>,
 }
 
 impl Matched {
     /// A point map that no functional map stands behind.
     pub fn points(point_map: PointMap) -> Self {
-        Self { point_map, target_of: None, map: None, fit: None }
+        Self { point_map, target_of: None, map: None, fit: None, congruence: None }
     }
 }
