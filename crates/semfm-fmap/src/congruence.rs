@@ -2,7 +2,7 @@
 //!
 //! A map between two different objects is right about parts and wrong about outlines, so that its vote is smoothed and
 //! spread. Where one surface lies on the other there is nothing to smooth: each point has its partner, and an outline
-//! that is redrawn gets worse (an object onto its own copy: IoU .89 instead of 1). Whether it does is a matter of
+//! that is redrawn gets worse (an axe and a hammer onto their own copies: IoU .98 and .93 instead of 1). Whether it does is a matter of
 //! geometry alone, and is decided so: similarities x ↦ s R x + t, R a rotation or a mirror image, are taken from the
 //! principal axes of both surfaces and from the matches, the best are refined by distances to the surface's planes
 //! (Chen & Medioni, "Object modelling by registration of multiple range images", 1992, with scale), and one counts
@@ -32,7 +32,7 @@ const N_REFINED: usize = 4;
 const MOST_ROUGH: f64 = 5.0;
 /// Samples that a similarity is refined and judged by.
 const N_SAMPLES: usize = 200;
-/// Steps of refinement. From 8° off they end within 1e-4 of the size.
+/// Steps of refinement; fewer were not tried.
 const N_STEPS: usize = 10;
 /// Share of the samples, the nearest ones, that a step of refinement listens to.
 const LISTENED: f64 = 0.85;
