@@ -279,7 +279,7 @@ fn what_is_wrong_with_a_recipe_is_named_with_its_line() {
     assert_eq!(template.code, Some(0));
     std::fs::write(&toml, &template.out).unwrap();
     let refused = run(&["run", &toml, "-o", &out]);
-    assert!(refused.code == Some(2) && refused.err.contains("kettle.obj"), "{}", refused.err);
+    assert!(refused.code == Some(2) && refused.err.contains("color.png"), "{}", refused.err);
     // A stage that fails is named, and those before it are kept.
     let text = format!(
         "{sound}[transfer]\nsource_features = 'grip.json'\ntarget_features = 'grip.json'\n"
