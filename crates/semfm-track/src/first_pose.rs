@@ -12,6 +12,9 @@ use crate::tracker::DepthFrame;
 /// Pieces of a frame's foreground in which the object is sought.
 const PIECES: usize = 3;
 
+/// A piece wider than this (metres) is none that a hand takes: three alignments with all of a cluttered table took 26 s.
+const WIDEST: f64 = 0.8;
+
 /// Frames between two alignments, at most: each takes a tenth of a second and more, so that the first frames are tried,
 /// and then fewer and fewer.
 const MOST_WAIT: usize = 16;
@@ -55,8 +58,8 @@ impl FirstPose {
         let masks: Vec<Vec<bool>> = match frame.mask {
             Some(mask) => vec![mask.to_vec()],
             None => {
-                let found = foreground(view, None, f64::INFINITY, settings.seed);
-                let pieces = found.pieces.iter().take(PIECES);
+                let found = foreground(view, None, f64::INFINITY, PIECES, settings.seed);
+                let pieces = found.pieces.iter().filter(|piece| piece.diameter <= WIDEST);
                 pieces.map(|piece| found.mask(piece, width, height)).collect()
             }
         };

@@ -43,6 +43,10 @@ const FOUND: f64 = 0.8;
 const SEEN_SHARE: f64 = 0.1;
 const FOUND_SHARE: f64 = 0.3;
 
+/// Points of the outline at which the depth must jump before an object is believed where it was not followed to: a flat thing
+/// lies in any wall.
+const FOUND_JUMPS: usize = 5;
+
 /// An object of which this share is hidden, and of what is not less than this share is looked through, is not contradicted.
 const HIDDEN_SHARE: f64 = 0.5;
 const CONTRADICTED: f64 = 0.4;
@@ -114,12 +118,13 @@ impl Followed {
         let expected = self.last.map(|last| *camera_from_world * last);
         let near = expected.and_then(|expected| self.look_near(view, &expected));
         let seen = near.filter(|attempt| {
-            let share = if self.state.is_seen() || self.state == TrackState::Occluded {
-                SEEN_SHARE
-            } else {
-                FOUND_SHARE
+            let evidence = &attempt.evidence;
+            let follows = self.state.is_seen() || self.state == TrackState::Occluded;
+            let is_enough = match follows {
+                true => evidence.visible_share() >= SEEN_SHARE,
+                false => is_distinct(evidence),
             };
-            attempt.probability >= SEEN && attempt.evidence.visible_share() >= share
+            attempt.probability >= SEEN && is_enough
         });
         if let Some(attempt) = seen {
             let state = match self.state {
@@ -187,6 +192,7 @@ impl Followed {
             last: expected,
             noise: self.noise,
             budget: settings.hypotheses,
+            is_first: !self.was_seen,
             seed: settings.seed.wrapping_add(number as u64),
         };
         let poses = self.search.frame(&at);
@@ -194,7 +200,7 @@ impl Followed {
         let attempts =
             poses.iter().take(LOOKED_AT).filter_map(|pose| self.attempt(view, pose, width));
         let best = attempts.max_by(|a, b| a.probability.total_cmp(&b.probability))?;
-        let is_found = best.probability >= FOUND && best.evidence.visible_share() >= FOUND_SHARE;
+        let is_found = best.probability >= FOUND && is_distinct(&best.evidence);
         is_found.then_some(best)
     }
 
@@ -310,4 +316,9 @@ impl Followed {
             region,
         }
     }
+}
+
+/// Whether enough is seen to believe an object where it was not followed to.
+fn is_distinct(evidence: &Evidence) -> bool {
+    evidence.visible_share() >= FOUND_SHARE && evidence.n_jumps >= FOUND_JUMPS
 }

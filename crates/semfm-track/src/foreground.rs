@@ -27,9 +27,6 @@ const PLANE_THICKNESS: f64 = 0.008;
 /// Smallest piece, in cells of the grid.
 const LEAST_CELLS: usize = 10;
 
-/// Pieces that are handed out at most.
-const MOST_PIECES: usize = 6;
-
 /// A piece of the foreground.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
@@ -48,12 +45,13 @@ pub(crate) struct Foreground {
     pub step: usize,
 }
 
-/// The foreground's pieces, largest first; what is wider than `most_diameter` is cut into blocks. Where there is a mask,
+/// The foreground's pieces, the `most` largest first; what is wider than `most_diameter` is cut into blocks. Where there is a mask,
 /// what it leaves out is no foreground.
 pub(crate) fn foreground(
     view: &DepthView<'_>,
     mask: Option<&[bool]>,
     most_diameter: f64,
+    most: usize,
     seed: u64,
 ) -> Foreground {
     let (width, height) = (view.depth.width(), view.depth.height());
@@ -85,7 +83,7 @@ pub(crate) fn foreground(
     }
     pieces.retain(|piece| piece.pixels.len() >= LEAST_CELLS);
     pieces.sort_by_key(|piece| std::cmp::Reverse(piece.pixels.len()));
-    pieces.truncate(MOST_PIECES);
+    pieces.truncate(most);
     Foreground { pieces, step }
 }
 
@@ -226,15 +224,15 @@ mod tests {
         let left: Vec<bool> = (0..width * height).map(|i| i % width < 150).collect();
         let depth = DepthImage::new(width, height, metres).unwrap();
         let view = DepthView::new(&depth, &camera);
-        let found = foreground(&view, None, 0.3, 1);
+        let found = foreground(&view, None, 0.3, 6, 1);
         assert_eq!(found.pieces.len(), 2);
         let depths: Vec<f64> = found.pieces.iter().map(|piece| piece.middle.z).collect();
         assert!(depths.iter().any(|z| (z - 0.8).abs() < 1e-3), "{depths:?}");
         let mask = found.mask(&found.pieces[0], width, height);
         assert!((1500..1800).contains(&mask.iter().filter(|&&m| m).count()));
-        let masked = foreground(&view, Some(&left), 2.0, 1);
+        let masked = foreground(&view, Some(&left), 2.0, 6, 1);
         assert!(masked.pieces.iter().all(|piece| piece.middle.x < 0.0));
-        let cut = foreground(&view, None, 0.06, 1);
+        let cut = foreground(&view, None, 0.06, 6, 1);
         assert!(cut.pieces.len() > 2);
     }
 }

@@ -33,6 +33,14 @@ const SAME: f64 = 0.15;
 /// A piece wider than this many diameters is cut up.
 const MOST_PIECE: f64 = 1.4;
 
+/// Pieces of the foreground in which it is sought: the largest, and more of them while nobody waits.
+const PIECES: usize = 6;
+const FIRST_PIECES: usize = 12;
+
+/// So many times the hypotheses of a frame are tried in each frame until the object is found for the first time: nothing is
+/// lost yet that should be answered soon.
+const FIRST_HYPOTHESES: usize = 12;
+
 /// A search that goes on from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Search {
@@ -54,6 +62,8 @@ pub(crate) struct SearchFrame<'a> {
     pub noise: f64,
     /// Hypotheses in this frame.
     pub budget: usize,
+    /// Whether it was never found.
+    pub is_first: bool,
     pub seed: u64,
 }
 
@@ -61,12 +71,16 @@ impl Search {
     /// Tries the next hypotheses, and the best of the frames before; the best first.
     pub fn frame(&mut self, at: &SearchFrame<'_>) -> Vec<Sim3> {
         let most = MOST_PIECE * at.model.diameter();
-        let pieces = foreground(at.view, at.mask, most, at.seed).pieces;
+        let (n_pieces, budget) = match at.is_first {
+            true => (FIRST_PIECES, FIRST_HYPOTHESES * at.budget),
+            false => (PIECES, at.budget),
+        };
+        let pieces = foreground(at.view, at.mask, most, n_pieces, at.seed).pieces;
         let mut starts: Vec<Sim3> = self.kept.clone();
         let rotations = rotations(at.last.as_ref());
         let n_places = pieces.len() + usize::from(at.last.is_some());
         if n_places > 0 {
-            for _ in 0..at.budget.div_ceil(n_places).min(rotations.len()) {
+            for _ in 0..budget.div_ceil(n_places).min(rotations.len()) {
                 let rotation = rotations[self.tried % rotations.len()];
                 self.tried += 1;
                 starts.extend(at.last.map(|last| Sim3 { rotation, ..last }));

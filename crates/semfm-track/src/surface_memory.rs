@@ -142,7 +142,7 @@ impl SurfaceMemory {
                 return weight;
             }
             let (id, _) = index.nearest(model.scale * (vertex - model.centre));
-            weight * self.confidence(id as usize, noise)
+            weight * self.confidence(id, noise)
         });
         Ok(refined.collect())
     }

@@ -10,7 +10,7 @@ use crate::outline::Shown;
 use crate::register::{Beside, OutlineLine, Registration};
 
 /// What errors of neighbouring pixels, of the camera and of the mesh add, which the normal equations take for independent:
-/// factor of the covariance.
+/// factor of the covariance. A guess: it was not held against true errors yet.
 const INFLATION: f64 = 4.0;
 
 /// A direction is uncertain by half a turn at most: more is not known of any.
