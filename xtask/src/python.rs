@@ -70,7 +70,9 @@ fn virtual_environment(workspace: &Workspace) -> Result<PathBuf> {
             bail!("Python's venv is missing: apt-get install python3-venv");
         }
         program(workspace, system, &["-m", "venv", "--clear", ".venv"]).succeed()?;
-        // Debian 12 comes with pip 23, which knows no dependency groups.
+    }
+    // Debian 12 comes with pip 23, which knows no dependency groups.
+    if !program(workspace, &python, &["-c", PIP_IS_NEW]).works() {
         let arguments = [&PIP_INSTALL[..], &["--upgrade", PIP]].concat();
         program(workspace, &python, &arguments).succeed()?;
     }
@@ -83,8 +85,10 @@ fn group_options(needs: Needs) -> Vec<&'static str> {
 }
 
 const PIP_INSTALL: [&str; 5] = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-/// The first pip with `--group`.
+/// The first pip with `--group`, and whether it is there.
 const PIP: &str = "pip>=25.1";
+const PIP_IS_NEW: &str =
+    "import pip; assert tuple(map(int, pip.__version__.split('.')[:2])) >= (25, 1)";
 
 /// Writes the type stubs of the compiled module into the sources.
 pub fn stubs(workspace: &Workspace) -> Result<()> {

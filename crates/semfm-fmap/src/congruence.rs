@@ -7,7 +7,7 @@
 //! principal axes of both surfaces and from the matches, the best are refined by distances to the surface's planes
 //! (Chen & Medioni, "Object modelling by registration of multiple range images", 1992, with scale), and one counts
 //! where nearly all of either surface then lies on the other. Among several that do (a symmetric object) the one
-//! under which the features agree best is taken.
+//! under which the features agree best is taken, and where others are as likely a region on which they differ is left as it is.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -23,26 +23,38 @@ const MOST_EXTENT_RATIO: f64 = 0.05;
 const MOST_EXTENT_DIFFERENCE: f64 = 0.005;
 /// Extents within this share of each other leave the axes between them open: turns about the third are tried.
 const LIKE_EXTENTS: f64 = 0.25;
-/// Turns that are then tried.
-const N_TURNS: usize = 12;
+/// Turns within half a turn that are then tried; the flips of the axes give the other half.
+const N_TURNS: usize = 6;
+/// Sizes of both surfaces after the motion differ by at most this share: a map that sends everything to one place would
+/// shrink the target into the source, where it lies well.
+const MOST_GROWTH: f64 = 0.1;
 /// Samples that a similarity is first judged by; how many of the best are refined, and the residual, in tolerances, beyond
 /// which none is.
 const N_FIRST: usize = 16;
-const N_REFINED: usize = 4;
+const N_REFINED: usize = 6;
 const MOST_ROUGH: f64 = 5.0;
 /// Samples that a similarity is refined and judged by.
 const N_SAMPLES: usize = 200;
-/// Steps of refinement; fewer were not tried.
+/// Steps of refinement.
 const N_STEPS: usize = 10;
-/// Share of the samples, the nearest ones, that a step of refinement listens to.
-const LISTENED: f64 = 0.85;
+/// Share of the samples, the nearest ones, that a step of refinement uses.
+const NEAREST_SHARE: f64 = 0.85;
 /// Weight of standing still in a step of refinement, beside the mean square of a sample's equation: directions in which
 /// a surface of revolution slides on itself are not moved in.
 const DAMPING: f64 = 1e-6;
 /// Share of either surface's samples that must lie on the other: certain from the second on, not at all below the first.
 const LYING: [f64; 2] = [0.85, 0.95];
-/// Similarities whose residual exceeds the least by less than this share of the tolerance fit equally well.
+/// Similarities whose residual exceeds the least by less than this share of the tolerance fit equally well at first
+/// sight; so do those under which the share of either surface that lies on the other is less by at most the second.
 const TIE: f64 = 0.2;
+const SAME_SHARE: f64 = 0.015;
+/// Features that disagree by this share more do not tell two similarities apart. Regions on which these differ are left
+/// to the vote: a symmetric object lies on itself in several ways.
+const SAME_FEATURES: f64 = 0.1;
+/// Nor do those that disagree by this much more, beside features of mean square 1.
+const LEAST_DISAGREEMENT: f64 = 0.005;
+/// Points whose features are compared.
+const N_COMPARED: usize = 200;
 /// Rounds in which matches that disagree with most others lose their weight.
 const N_ROUNDS: usize = 6;
 
@@ -53,6 +65,8 @@ pub(crate) struct Congruence {
     certainty: Vec<f64>,
     /// And the place: the source's vertices at the corners of the triangle, and their weights.
     places: Vec<Place>,
+    /// The places under other similarities that are as likely.
+    others: Vec<Vec<Place>>,
 }
 
 /// A point of the source's surface.
@@ -63,6 +77,7 @@ struct Place {
 }
 
 /// A similarity and how well the surfaces then fit.
+#[derive(Clone, Copy)]
 struct Candidate {
     source_from_target: DAffine3,
     /// Mean distance of the samples, the farthest left out.
@@ -75,9 +90,12 @@ impl Congruence {
     /// # Errors
     /// [`Error::Geom`](crate::Error::Geom) for a mesh without area.
     pub fn of(pair: &Pair, points: &PointMap, tolerance: f64) -> Result<Option<Self>> {
+        if tolerance == 0.0 {
+            return Ok(None);
+        }
         let (source, target) = (&pair.source, &pair.target);
         let (on_source, on_target) = (source.moments()?, target.moments()?);
-        if tolerance == 0.0 || !are_alike(on_source, on_target) {
+        if !are_alike(on_source, on_target) {
             return Ok(None);
         }
         let tolerance = tolerance * source.shape().surface().diagonal();
@@ -88,52 +106,43 @@ impl Congruence {
             .chain(by_matches)
             .map(|motion| judged(surface, motion, &samples[..N_FIRST.min(samples.len())]))
             .collect();
-        found.retain(|rough| rough.residual <= MOST_ROUGH * tolerance);
+        let growth = on_target.size() / on_source.size();
+        let keeps_size = |c: &Candidate| (c.scale() * growth - 1.0).abs() <= MOST_GROWTH;
+        found.retain(|rough| rough.residual <= MOST_ROUGH * tolerance && keeps_size(rough));
         found.sort_by(|a, b| a.residual.total_cmp(&b.residual)); // stable
+        // Those that fit equally well in the order in which their features agree.
+        let least = found.first().map_or(0.0, |best| best.residual);
+        let n_ties = found.iter().take_while(|c| c.residual <= least + TIE * tolerance).count();
+        sort_by_features(pair, &mut found[..n_ties]);
         found.truncate(N_REFINED);
         let refined = found.into_iter().map(|rough| {
             let motion = refined(source, surface, rough.source_from_target, &samples);
             judged(surface, motion, &samples)
         });
-        let fitting: Vec<Candidate> = refined.filter(|c| c.residual <= tolerance).collect();
-        let Some(least) = fitting.iter().map(|c| c.residual).reduce(f64::min) else {
+        let mut lying: Vec<(f64, Candidate)> = Vec::new();
+        for fitting in refined.filter(|c| c.residual <= tolerance && keeps_size(c)) {
+            lying.push((share_lying(pair, &fitting, tolerance)?, fitting));
+        }
+        let most = lying.iter().map(|(share, _)| *share).fold(0.0, f64::max);
+        let certainty = ((most - LYING[0]) / (LYING[1] - LYING[0])).clamp(0.0, 1.0);
+        if certainty == 0.0 {
             return Ok(None);
+        }
+        lying.retain(|(share, _)| *share >= most - SAME_SHARE);
+        let mut likely: Vec<Candidate> = lying.into_iter().map(|(_, fitting)| fitting).collect();
+        let disagreements = sort_by_features(pair, &mut likely);
+        let least = disagreements.first().copied().unwrap_or(0.0);
+        let limit = (least * (1.0 + SAME_FEATURES)).max(least + LEAST_DISAGREEMENT);
+        likely.truncate(disagreements.iter().take_while(|&&d| d <= limit).count().max(1));
+        let best = likely.first().copied();
+        likely.retain(|other| best.is_none_or(|best| !best.is_like(other, &samples, tolerance)));
+        likely.splice(0..0, best);
+        let mut laid = likely.into_iter().filter_map(|motion| Laid::new(pair, &motion, tolerance));
+        let Some(Laid { certainties, places }) = laid.next() else {
+            return Ok(None); // coordinates whose squares overflow
         };
-        let ties = fitting.iter().filter(|c| c.residual <= least + TIE * tolerance);
-        let by_features = ties.map(|c| (disagreement(pair, c.source_from_target), c));
-        let best = by_features.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map_or(Ok(None), |(_, best)| Self::along(pair, best.source_from_target, tolerance))
-    }
-
-    /// What lies on what after this motion; none where that is too little.
-    fn along(pair: &Pair, source_from_target: DAffine3, tolerance: f64) -> Result<Option<Self>> {
-        let (source, target) = (&pair.source, &pair.target);
-        let (on_source, on_target) = (source.surface()?, target.surface()?);
-        let scale = source_from_target.matrix3.determinant().abs().cbrt();
-        let back = source_from_target.inverse();
-        let there = positions(target).into_iter().map(|p| source_from_target.transform_point3(p));
-        let there = there.filter(|&p| distance(on_source, p) <= tolerance).count();
-        let samples = positions(source);
-        let n_source = samples.len();
-        let home = samples.into_iter().map(|p| back.transform_point3(p));
-        let home = home.filter(|&p| scale * distance(on_target, p) <= tolerance).count();
-        let share =
-            (there as f64 / positions(target).len() as f64).min(home as f64 / n_source as f64);
-        let lying = ((share - LYING[0]) / (LYING[1] - LYING[0])).clamp(0.0, 1.0);
-        if lying == 0.0 {
-            return Ok(None);
-        }
-        let faces = source.shape().surface().faces();
-        let (mut certainty, mut places) = (Vec::new(), Vec::new());
-        for &p in target.shape().surface().vertices() {
-            let Some(hit) = on_source.closest(source_from_target.transform_point3(p)) else {
-                return Ok(None); // coordinates whose squares overflow
-            };
-            // Certain within the tolerance, not at all from twice that.
-            certainty.push(lying * (2.0 - hit.distance / tolerance).clamp(0.0, 1.0));
-            places.push(Place { corners: faces[hit.face as usize], weights: hit.barycentric });
-        }
-        Ok(Some(Self { certainty, places }))
+        let certainty = certainties.into_iter().map(|c| certainty * c).collect();
+        Ok(Some(Self { certainty, places, others: laid.map(|other| other.places).collect() }))
     }
 
     /// Weights on the target's vertices as read (n_target) where they are certain replaced by those of the source's
@@ -155,15 +164,92 @@ impl Congruence {
     pub fn correct(&self, points: &mut PointMap, source: &PreparedObject, target: &PreparedObject) {
         let of_original = &source.shape().working().of_original;
         let vertices = target.shape().working().to_original.iter().zip(&mut points.source_of);
+        if !self.others.is_empty() {
+            return; // the map's own choice among them stands
+        }
         for (&v, partner) in vertices.filter(|(v, _)| self.certainty[**v as usize] >= 0.5) {
             *partner = of_original[self.places[v as usize].nearest_corner() as usize];
         }
     }
 
     fn mixed(&self, v: usize, weight: f64, inside: &[bool]) -> f64 {
-        let certainty = self.certainty[v];
-        (1.0 - certainty) * weight + certainty * self.places[v].share(inside)
+        let (certainty, share) = (self.certainty[v], self.places[v].share(inside));
+        if self.others.iter().any(|places| (places[v].share(inside) - share).abs() > 0.5) {
+            return weight;
+        }
+        (1.0 - certainty) * weight + certainty * share
     }
+}
+
+impl Candidate {
+    fn scale(&self) -> f64 {
+        self.source_from_target.matrix3.determinant().abs().cbrt()
+    }
+
+    /// Whether both lay all samples to about the same places: refinement brings several starts to one end.
+    fn is_like(&self, other: &Self, samples: &[DVec3], tolerance: f64) -> bool {
+        let places = |p: DVec3| [self, other].map(|c| c.source_from_target.transform_point3(p));
+        samples.iter().all(|&p| {
+            let [one, another] = places(p);
+            one.distance(another) <= 4.0 * tolerance
+        })
+    }
+}
+
+/// Where the target's vertices as read (n_target) lie on the source.
+struct Laid {
+    /// Certain within the tolerance, not at all from twice that.
+    certainties: Vec<f64>,
+    places: Vec<Place>,
+}
+
+impl Laid {
+    /// `None` for coordinates whose squares overflow.
+    fn new(pair: &Pair, motion: &Candidate, tolerance: f64) -> Option<Self> {
+        let on_source = pair.source.surface().ok()?;
+        let faces = pair.source.shape().surface().faces();
+        let (mut certainties, mut places) = (Vec::new(), Vec::new());
+        for &p in pair.target.shape().surface().vertices() {
+            let hit = on_source.closest(motion.source_from_target.transform_point3(p))?;
+            certainties.push((2.0 - hit.distance / tolerance).clamp(0.0, 1.0));
+            places.push(Place { corners: faces[hit.face as usize], weights: hit.barycentric });
+        }
+        Some(Self { certainties, places })
+    }
+}
+
+/// The share of the samples of either surface, the lesser one, that lies on the other.
+fn share_lying(pair: &Pair, motion: &Candidate, tolerance: f64) -> Result<f64> {
+    let (source, target) = (&pair.source, &pair.target);
+    let (on_source, on_target) = (source.surface()?, target.surface()?);
+    let (there, scale) = (motion.source_from_target, motion.scale());
+    let back = there.inverse();
+    let share = |distances: &mut dyn Iterator<Item = f64>| {
+        let (mut n, mut lying) = (0, 0);
+        for distance in distances {
+            n += 1;
+            lying += usize::from(distance <= tolerance);
+        }
+        lying as f64 / f64::from(n.max(1))
+    };
+    let of_target = share(
+        &mut positions(target).into_iter().map(|p| distance(on_source, there.transform_point3(p))),
+    );
+    let of_source = share(
+        &mut positions(source)
+            .into_iter()
+            .map(|p| scale * distance(on_target, back.transform_point3(p))),
+    );
+    Ok(of_target.min(of_source))
+}
+
+/// Sorts similarities by how much features disagree, and returns by how much.
+fn sort_by_features(pair: &Pair, candidates: &mut [Candidate]) -> Vec<f64> {
+    let mut keyed: Vec<(f64, Candidate)> =
+        candidates.iter().map(|c| (disagreement(pair, c.source_from_target), *c)).collect();
+    keyed.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable
+    candidates.iter_mut().zip(&keyed).for_each(|(to, (_, from))| *to = *from);
+    keyed.into_iter().map(|(disagreement, _)| disagreement).collect()
 }
 
 impl Place {
@@ -200,7 +286,7 @@ fn by_axes(source: &SurfaceMoments, target: &SurfaceMoments) -> Vec<DAffine3> {
     let [to_source, to_target] =
         [source, target].map(|m| DMat3::from_cols(m.axes[0], m.axes[1], m.axes[2]));
     let mut turns = vec![DMat3::IDENTITY];
-    let step = std::f64::consts::TAU / N_TURNS as f64;
+    let step = std::f64::consts::PI / N_TURNS as f64;
     let [x, y, z] = source.deviations; // ascending
     if y - x < LIKE_EXTENTS * y {
         turns.extend((1..N_TURNS).map(|i| DMat3::from_rotation_z(step * i as f64)));
@@ -277,7 +363,7 @@ fn similarity(from: &[DVec3], to: &[DVec3], weights: &[f64]) -> Option<DAffine3>
     Some(about(linear, y, x))
 }
 
-/// Makes a motion better by steps that listen to the planes of the nearest triangles:
+/// Makes a motion better by steps towards the planes of the nearest triangles:
 ///
 /// min Σ (n · (y + ω × y + σ y + t − q))²,   y = the moved sample, q the nearest point of the source, n its normal,
 ///
@@ -299,7 +385,7 @@ fn refined(
         let mut hits: Vec<(DVec3, SurfacePoint)> =
             moved.iter().filter_map(|&p| surface.closest(p).map(|hit| (p, hit))).collect();
         hits.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-        hits.truncate((LISTENED * samples.len() as f64).ceil() as usize);
+        hits.truncate((NEAREST_SHARE * samples.len() as f64).ceil() as usize);
         let mut normal = Mat::<f64>::zeros(7, 7);
         let mut right = Mat::<f64>::zeros(7, 1);
         for (p, hit) in &hits {
@@ -334,7 +420,7 @@ fn judged(
     let moved = samples.iter().map(|&p| source_from_target.transform_point3(p));
     let mut distances: Vec<f64> = moved.map(|p| distance(surface, p)).collect();
     distances.sort_by(f64::total_cmp);
-    distances.truncate((LISTENED * samples.len() as f64).ceil() as usize);
+    distances.truncate((NEAREST_SHARE * samples.len() as f64).ceil() as usize);
     let residual = distances.iter().sum::<f64>() / distances.len() as f64;
     Candidate { source_from_target, residual }
 }
@@ -349,12 +435,15 @@ fn disagreement(pair: &Pair, source_from_target: DAffine3) -> f64 {
     let (on_source, on_target) = (&pair.joint.source, &pair.joint.target);
     let points = pair.target.cloud().points();
     let mut sum = 0.0;
-    for (j, &p) in points.iter().enumerate() {
+    let step = points.len().div_ceil(N_COMPARED).max(1);
+    let compared = points.iter().enumerate().step_by(step);
+    let n = compared.len();
+    for (j, &p) in compared {
         let i = pair.source.nearest_point(source_from_target.transform_point3(p));
         let both = on_source.row(i).iter().zip(on_target.row(j).iter());
         sum += both.map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
     }
-    sum / points.len() as f64
+    sum / n as f64
 }
 
 #[cfg(test)]
@@ -429,5 +518,41 @@ mod tests {
         let wavy = mesh.vertices().iter().map(|&p| p * (1.0 + 0.05 * (2.0 * p.x + p.z).sin()));
         let wavy = Mesh::new(wavy.collect(), mesh.faces().to_vec()).unwrap();
         assert!(congruence(&mesh, &wavy, identity).is_none());
+    }
+
+    #[test]
+    fn where_a_symmetric_object_leaves_several_places_the_vote_stays() {
+        // An ellipsoid lies on itself in eight ways, and features that are symmetric, too, tell none of them apart.
+        let ball = semfm_geom::zoo::icosphere(3);
+        let vertices = ball.vertices().iter().map(|&p| p * DVec3::new(1.0, 0.7, 0.4));
+        let mesh = Mesh::new(vertices.collect(), ball.faces().to_vec()).unwrap();
+        let plain = || {
+            let points = mesh.vertices().to_vec();
+            let n = points.len();
+            let features = points.iter().flat_map(|p| p.abs().as_vec3().to_array()).collect();
+            let cloud = SemanticCloud::new(points, features, 3, vec![1; n]).unwrap();
+            let shape = Arc::new(shape(&mesh, 10));
+            PreparedObject::new(shape, Arc::new(cloud), &Task::default()).unwrap()
+        };
+        let settings = TransferSettings::default();
+        let (a, b) = (plain(), plain());
+        let pair = Pair::new(&a, &b, &settings, &mut Stages::default()).unwrap();
+        let n = mesh.n_vertices() as u32;
+        let points = PointMap { source_of: (0..n).collect() };
+        let found = Congruence::of(&pair, &points, TOLERANCE).unwrap().unwrap();
+        let mixed = |inside: &dyn Fn(DVec3) -> bool| {
+            let inside: Vec<bool> = mesh.vertices().iter().map(|&p| inside(p)).collect();
+            let mut weights = vec![0.3; inside.len()];
+            found.mixed_into(&mut weights, &inside);
+            weights
+        };
+        let one_end = mixed(&|p| p.x > 0.4);
+        let both_ends = mixed(&|p| p.x.abs() > 0.4);
+        for (v, p) in mesh.vertices().iter().enumerate() {
+            if p.x.abs() > 0.5 {
+                assert_eq!(one_end[v], 0.3, "{p}: either end may be the one");
+                assert!(both_ends[v] > 0.99, "{p}: {}", both_ends[v]);
+            }
+        }
     }
 }

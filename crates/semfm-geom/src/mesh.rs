@@ -125,6 +125,18 @@ impl Mesh {
         low.distance(high)
     }
 
+    /// Median length of the triangles' edges, counted once per triangle; 0 without triangles.
+    pub(crate) fn median_edge(&self) -> f64 {
+        let sides = (0..self.n_faces()).map(|face| self.corners(face));
+        let mut lengths: Vec<f64> =
+            sides.flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)]).collect();
+        let middle = lengths.len() / 2;
+        if lengths.is_empty() {
+            return 0.0;
+        }
+        *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
     /// Centre of the bounding box and the distance from it to the farthest vertex.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
         let (low, high) = self.bounds();

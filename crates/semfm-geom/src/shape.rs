@@ -178,7 +178,7 @@ impl Shape {
     }
 
     /// The surface that everything here was computed from, vertex by vertex that of the original: without its noise
-    /// where it is noisy ([`without_noise`](crate::without_noise)), the original itself where it is not.
+    /// where it is noisy ([`noise_free`](crate::noise_free)), the original itself where it is not.
     pub fn surface(&self) -> &Mesh {
         self.noise_free.as_ref().unwrap_or(&self.original)
     }

@@ -54,9 +54,7 @@ pub use npz::testing;
 pub use numpy_array::{Numbers, NumpyArray};
 pub use observation::{Mask, Observation, SeenObject};
 pub use observation_files::{MaskFile, ObservationFiles};
-pub use registration::{
-    DepthGrid, RegistrationCheck, check_registration, registration_doubt,
-};
+pub use registration::{DepthGrid, RegistrationCheck, check_registration, registration_doubt};
 #[cfg(feature = "mcap")]
 pub use source::{SourceReport, SourceSettings, read_observations};
 pub use surface::{ObservedSurface, SurfaceReport, SurfaceSettings};

@@ -10,7 +10,7 @@ use semfm_geom::math::{DVec3, bounds};
 use semfm_geom::{Mesh, Pinhole};
 
 use crate::observation::{Mask, Observation};
-use crate::surface::{Pieces, SurfaceSettings, without_crumbs};
+use crate::surface::{Pieces, SurfaceSettings, without_small_pieces};
 use crate::{Error, Result};
 
 /// A frame with the object's mask in it; without one all that was seen is the object.
@@ -209,7 +209,7 @@ impl Lattice {
         let (faces, _) = ids.as_chunks::<3>();
         let faces = faces.iter().map(|&[a, b, c]| [a, c, b]);
         let known = faces.filter(|face| self.is_known(field, face.map(|v| points[v as usize])));
-        without_crumbs(&points, known.collect())
+        without_small_pieces(&points, known.collect())
     }
 
     /// Whether all corners of the cell of a triangle are known.

@@ -85,7 +85,8 @@ impl Observation {
         let step = grid.step;
         let report =
             SurfaceReport { n_pixels, n_filled: smoothed.n_filled, step, n_cut: triangles.n_cut };
-        let Some(Pieces { mesh, kept }) = without_crumbs(&grid.points, triangles.faces)? else {
+        let Some(Pieces { mesh, kept }) = without_small_pieces(&grid.points, triangles.faces)?
+        else {
             let under = mask.map_or(String::new(), |mask| format!(" under mask `{}`", mask.name));
             let found = format!("{n_pixels} pixels with a depth, none of them neighbours");
             let expected = "three neighbouring pixels with a depth";
@@ -258,8 +259,12 @@ pub(crate) struct Pieces {
     pub kept: Vec<usize>,
 }
 
-/// The surface without crumbs and without points that no triangle uses; `None` where nothing is left.
-pub(crate) fn without_crumbs(points: &[DVec3], faces: Vec<[u32; 3]>) -> Result<Option<Pieces>> {
+/// The surface without pieces of less than [`LEAST_PIECE`] of its area and without points that no triangle uses; `None`
+/// where nothing is left.
+pub(crate) fn without_small_pieces(
+    points: &[DVec3],
+    faces: Vec<[u32; 3]>,
+) -> Result<Option<Pieces>> {
     if faces.is_empty() {
         return Ok(None);
     }

@@ -1,4 +1,4 @@
-//! One road from pictures to a grasp: a demonstration (a mesh, and a hand that a camera saw on it) and a target (a mesh,
+//! From pictures to a grasp by one recipe: a demonstration (a mesh, and a hand that a camera saw on it) and a target (a mesh,
 //! and a camera's picture of it) in, a region, grasps and, where a robot is named, its motion out.
 //!
 //! A [`Recipe`] (`demo.toml`) says what there is. [`Run`] turns it into stages, each of which does what one command does

@@ -16,7 +16,8 @@ use semfm_show::{
 use serde_json::Value;
 
 use crate::stages::{
-    Bench, CONTACT_FILE, HAND_FILE, aligned_of_frame, observation_of_frame, observation_of_target,
+    CONTACT_FILE, HAND_FILE, StageContext, aligned_of_frame, observation_of_frame,
+    observation_of_target,
 };
 use crate::{Result, Stage};
 
@@ -29,26 +30,26 @@ const HAND: [u8; 3] = [230, 159, 0];
 
 /// Writes the page of a run that came as far as these stages.
 pub fn write_run_page(
-    bench: &Bench<'_>,
+    context: &StageContext<'_>,
     stages: &[RunStageRecord],
     no_answer: Option<&NoAnswerRecord>,
     path: &Path,
     task: &Task,
 ) -> Result<()> {
-    let page = Page { bench, stages, task };
+    let page = Page { context, stages, task };
     let mut sections = vec![page.outcome(no_answer)];
     sections.extend(page.demonstration()?);
     sections.extend(page.contact()?);
     sections.extend(page.transfer()?);
     sections.extend(page.target()?);
     sections.extend(page.motion()?);
-    let title = bench.recipe.title.as_deref().unwrap_or("From a demonstration to a grasp");
+    let title = context.recipe.title.as_deref().unwrap_or("From a demonstration to a grasp");
     Ok(write_page_with(path, title, &sections, &page.groups()?)?)
 }
 
 /// A run that is shown.
 struct Page<'a> {
-    bench: &'a Bench<'a>,
+    context: &'a StageContext<'a>,
     stages: &'a [RunStageRecord],
     task: &'a Task,
 }
@@ -99,7 +100,7 @@ impl Page<'_> {
 
     /// The pictures of the demonstration, with masks and with the region where the mesh was found.
     fn demonstration(&self) -> Result<Option<Section>> {
-        let demonstration = &self.bench.recipe.demonstration;
+        let demonstration = &self.context.recipe.demonstration;
         let mut figures = Vec::new();
         for (i, frame) in demonstration.frames.iter().enumerate() {
             let Some(seen) = observation_of_frame(frame)? else { continue };
@@ -123,7 +124,7 @@ impl Page<'_> {
 
     /// The mesh where it was found in a picture of the demonstration, with the region.
     fn found_in(&self, photo: &Photo, frame: usize) -> Result<Option<Figure>> {
-        let Some(aligned) = aligned_of_frame(self.bench, frame) else { return Ok(None) };
+        let Some(aligned) = aligned_of_frame(self.context, frame) else { return Ok(None) };
         if aligned.is_made_here && !aligned.path.is_file() {
             return Ok(None);
         }
@@ -138,11 +139,11 @@ impl Page<'_> {
     }
 
     fn source(&self) -> Result<Mesh> {
-        Ok(read_mesh(&self.bench.recipe.demonstration.mesh)?.mesh)
+        Ok(read_mesh(&self.context.recipe.demonstration.mesh)?.mesh)
     }
 
     fn region(&self, stage: Stage, mesh: &Mesh) -> Result<Region> {
-        Ok(read_region(&self.bench.file(stage, "region.json"), mesh)?)
+        Ok(read_region(&self.context.file(stage, "region.json"), mesh)?)
     }
 
     /// The region on the source, and which fingers touched it.
@@ -151,7 +152,7 @@ impl Page<'_> {
         let mesh = self.source()?;
         let region = self.region(Stage::Region, &mesh)?;
         let hand = match self.has(Stage::Region, HAND_FILE) {
-            true => Some(read_mesh(self.bench.file(Stage::Region, HAND_FILE))?.mesh),
+            true => Some(read_mesh(self.context.file(Stage::Region, HAND_FILE))?.mesh),
             false => None,
         };
         let picture = contact_picture(&mesh, region.weights(), hand.as_ref(), self.task)?;
@@ -162,7 +163,7 @@ impl Page<'_> {
             None => "the region on the demonstrated mesh (red)",
         };
         let table = match self.has(Stage::Region, CONTACT_FILE) {
-            true => fingers(&read_json(self.bench.file(Stage::Region, CONTACT_FILE))?),
+            true => fingers(&read_json(self.context.file(Stage::Region, CONTACT_FILE))?),
             false => None,
         };
         Ok(Some(Section {
@@ -177,7 +178,8 @@ impl Page<'_> {
     /// Both objects with the region.
     fn transfer(&self) -> Result<Option<Section>> {
         let Some(record) = self.record(Stage::Transfer) else { return Ok(None) };
-        let region = TransferredRegionFile::read(&self.bench.file(Stage::Transfer, "region.json"))?;
+        let region =
+            TransferredRegionFile::read(&self.context.file(Stage::Transfer, "region.json"))?;
         let picture = self.png(Stage::Transfer, "transfer.png")?;
         let caption = "the region on both objects, and which place of one is matched to which of the other (equal colours)";
         Ok(Some(Section {
@@ -195,7 +197,7 @@ impl Page<'_> {
 
     /// The target's picture, with the region and the best grasp in it.
     fn target(&self) -> Result<Option<Section>> {
-        let target = &self.bench.recipe.target;
+        let target = &self.context.recipe.target;
         let mut figures = Vec::new();
         let seen = match &target.frame {
             Some(frame) => observation_of_target(frame)?,
@@ -225,11 +227,11 @@ impl Page<'_> {
             .collect();
         let masked =
             figure("what the camera saw: the object's mask in blue", photo.with_masks(&masks)?);
-        let recipe = self.bench.recipe;
+        let recipe = self.context.recipe;
         let pose = match &recipe.target.aligned {
             Some(path) => Some(read_pose(path)?),
             None if self.has(Stage::TargetPose, "aligned.json") => {
-                Some(read_pose(&self.bench.file(Stage::TargetPose, "aligned.json"))?)
+                Some(read_pose(&self.context.file(Stage::TargetPose, "aligned.json"))?)
             }
             None => None,
         };
@@ -240,7 +242,7 @@ impl Page<'_> {
             None => vec![0.0; mesh.n_vertices()],
         };
         if self.has(Stage::Grasp, "grasps.json") {
-            let grasps = GraspsFile::read(&self.bench.file(Stage::Grasp, "grasps.json"), &mesh)?;
+            let grasps = GraspsFile::read(&self.context.file(Stage::Grasp, "grasps.json"), &mesh)?;
             if !grasps.grasps.is_empty() {
                 let drawn = photo.with_grasp(&mesh, &weights, &grasps, 0, self.task)?;
                 let caption = "the best grasp in the target's picture: the hand (blue), its contacts (yellow), the region (red)";
@@ -254,7 +256,7 @@ impl Page<'_> {
 
     /// Weights of the transferred region; zeros where it is empty, which no file of a region is.
     fn transferred_weights(&self, mesh: &Mesh) -> Result<Vec<f64>> {
-        let map = PointMapFile::read(&self.bench.file(Stage::Transfer, "point_map.json"))?;
+        let map = PointMapFile::read(&self.context.file(Stage::Transfer, "point_map.json"))?;
         let weights = map.target_weight;
         Ok(if weights.len() == mesh.n_vertices() { weights } else { vec![0.0; mesh.n_vertices()] })
     }
@@ -275,12 +277,12 @@ impl Page<'_> {
         if !self.has(stage, name) {
             return Ok(None);
         }
-        Ok(RgbPicture::decode(&read_file(self.bench.file(stage, name))?))
+        Ok(RgbPicture::decode(&read_file(self.context.file(stage, name))?))
     }
 
     /// The same in three dimensions: contact, transfer, grasps, motion.
     fn groups(&self) -> Result<Vec<Group>> {
-        let recipe = self.bench.recipe;
+        let recipe = self.context.recipe;
         let mut groups = Vec::new();
         let mut add = |title: &str, paths: &[std::path::PathBuf], first: usize| -> Result<()> {
             let found = groups_of_paths(paths, self.task)?;
@@ -290,25 +292,25 @@ impl Page<'_> {
             Ok(())
         };
         if self.has(Stage::Region, "region.json") {
-            let region = self.bench.file(Stage::Region, "region.json");
+            let region = self.context.file(Stage::Region, "region.json");
             add("What was touched", &[recipe.demonstration.mesh.clone(), region], 0)?;
         }
         // A region without a vertex is none of a file that is shown.
-        let region = self.bench.file(Stage::Transfer, "region.json");
+        let region = self.context.file(Stage::Transfer, "region.json");
         if self.has(Stage::Transfer, "region.json")
             && !TransferredRegionFile::read(&region)?.region.vertices.is_empty()
         {
-            let folder = self.bench.output.join(Stage::Transfer.name());
+            let folder = self.context.output.join(Stage::Transfer.name());
             add("What was carried over", &[folder], 0)?;
         }
         if self.has(Stage::Grasp, "grasps.json") {
-            let region = self.bench.file(Stage::Transfer, "region.json");
-            let grasps = self.bench.file(Stage::Grasp, "grasps.json");
+            let region = self.context.file(Stage::Transfer, "region.json");
+            let grasps = self.context.file(Stage::Grasp, "grasps.json");
             // The mesh with its region alone is shown beside the source already.
             add("Grasps", &[recipe.target.mesh.clone(), region, grasps], 1)?;
         }
         if self.has(Stage::Plan, "trajectory.json") {
-            add("The motion", &[self.bench.file(Stage::Plan, "trajectory.json")], 0)?;
+            add("The motion", &[self.context.file(Stage::Plan, "trajectory.json")], 0)?;
         }
         Ok(groups)
     }

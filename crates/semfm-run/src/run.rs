@@ -1,13 +1,13 @@
 //! A recipe carried out, stage by stage.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::Instant;
 
 use semfm::Task;
 use semfm::files::{
-    NoAnswerRecord, RUN_FILE, RUN_FORMAT, RunFile, RunStageRecord, STAGE_FILE, STAGE_FORMAT,
-    StageFile, StageState,
+    FileHash, NoAnswerRecord, RUN_FILE, RUN_FORMAT, RunFile, RunStageRecord, STAGE_FILE,
+    STAGE_FORMAT, StageFile, StageState,
 };
 use semfm::geom::io::{FormatError, ReadFiles, StagedFolder, is_same_file, refuse_to_overwrite};
 use semfm::geom::{Error as GeomError, ShapeCache};
@@ -15,7 +15,7 @@ use semfm::geom::{Error as GeomError, ShapeCache};
 use crate::fingerprint::{hashes, of_settings};
 use crate::page::{PAGE_FILE, write_run_page};
 use crate::recipe::{NamedPath, Recipe};
-use crate::stages::{Bench, StageEnd};
+use crate::stages::{StageContext, StageEnd};
 use crate::{Error, Result, Stage};
 
 /// The version that records name.
@@ -161,6 +161,12 @@ impl Run {
                 break;
             }
         }
+        // What later stages wrote in an earlier run answers another question.
+        for stage in Stage::ALL {
+            if !records.iter().any(|record| record.stage == stage.name()) {
+                self.clear(&self.folder(stage))?;
+            }
+        }
         self.finish(records, no_answer, settings, task)
     }
 
@@ -194,7 +200,7 @@ impl Run {
         fs::create_dir_all(&folder).map_err(io(&folder))?;
         let staged = StagedFolder::new(&folder)?;
         let read = ReadFiles::begin();
-        let end = self.bench(settings).work(stage, staged.path(), task)?;
+        let end = self.context(settings).work(stage, staged.path(), task)?;
         let StageEnd { summary, no_answer, more_inputs } = end;
         let inputs = read.finish().into_iter().filter(|path| self.is_input(path, &folder));
         let written = names_in(staged.path())?;
@@ -221,7 +227,8 @@ impl Run {
         let names = earlier.iter().map(|output| output.file.as_str());
         for name in [STAGE_FILE].into_iter().chain(names) {
             // A record names files of its own folder; one that was tampered with may name others.
-            if Path::new(name).components().count() == 1 {
+            let mut parts = Path::new(name).components();
+            if let (Some(Component::Normal(_)), None) = (parts.next(), parts.next()) {
                 remove(&folder.join(name))?;
             }
         }
@@ -239,8 +246,8 @@ impl Run {
         !(within(folder) || is_cached || is_record)
     }
 
-    fn bench(&self, settings: &RunSettings) -> Bench<'_> {
-        Bench {
+    fn context(&self, settings: &RunSettings) -> StageContext<'_> {
+        StageContext {
             recipe: &self.recipe,
             output: &self.output,
             threads: settings.threads,
@@ -262,10 +269,11 @@ impl Run {
         }
         self.forget_page()?;
         let read = ReadFiles::begin();
-        write_run_page(&self.bench(settings), &stages, no_answer.as_ref(), &self.page(), task)?;
+        write_run_page(&self.context(settings), &stages, no_answer.as_ref(), &self.page(), task)?;
         let inputs = read.finish().into_iter().chain([self.recipe_file.clone()]);
         let page_inputs = hashes(inputs, &self.output);
-        let page = hashes([self.page()], &self.output).remove(0);
+        let page = FileHash::of(&self.page(), &self.output)
+            .ok_or_else(|| io(&self.page())(std::io::ErrorKind::NotFound.into()))?;
         let (format, version) = (RUN_FORMAT.into(), VERSION.into());
         let file = RunFile { format, version, stages, no_answer, page, page_inputs };
         file.write(&self.output)?;

@@ -43,30 +43,31 @@ pub fn write_transfer(
         files::write_answer(staged.path(), result)?;
         return Ok(files::put_transfer(staged)?);
     }
-    files::write_transfer(staged.path(), result, task)?;
+    let data = || files::write_transfer_data(staged.path(), result, task);
     if which == TransferFiles::WithoutPictures {
-        return Ok(files::put_transfer(staged)?);
+        data()?;
+    } else {
+        let (data, drawn) = rayon::join(data, || draw(staged.path(), result, task));
+        data?;
+        drawn?;
     }
+    result.write_report(staged.path(), start)?; // last: its stage `write` is all of this
+    Ok(files::put_transfer(staged)?)
+}
+
+/// The pictures of a transfer, and its scene for Foxglove.
+fn draw(folder: &Path, result: &TransferResult<'_>, task: &Task) -> Result<()> {
     let figure = TransferFigure::new(result, task)?;
-    let [transfer, features] =
-        ["transfer.png", "features.png"].map(|name| staged.path().join(name));
-    let pictures = || {
-        let (transfer, features) = rayon::join(
-            || figure.write_transfer_picture(&transfer, task),
-            || figure.write_features_picture(&features, task),
-        );
-        transfer.and(features)
-    };
+    let [transfer, features] = ["transfer.png", "features.png"].map(|name| folder.join(name));
+    let pictures = || figure.write_pictures(&transfer, &features, task);
     #[cfg(feature = "mcap")]
     {
-        let scene = staged.path().join("transfer.mcap");
+        let scene = folder.join("transfer.mcap");
         let report = result.report().to_json();
         let write_scene = || crate::foxglove::write_transfer_scene(&scene, &figure, &report, task);
         let (pictures, scene) = rayon::join(pictures, write_scene);
-        pictures.and(scene)?;
+        pictures.and(scene)
     }
     #[cfg(not(feature = "mcap"))]
-    pictures()?;
-    result.write_report(staged.path(), start)?; // anew: the pictures belong to its stage `write`
-    Ok(files::put_transfer(staged)?)
+    pictures()
 }

@@ -150,10 +150,11 @@ fn with_middles(mesh: &Mesh, region: &[bool]) -> Result<ChangedCopy> {
     }
     let middle = |a: u32, b: u32| {
         let edge = [a.min(b), a.max(b)];
-        let at = edges.binary_search(&edge).unwrap_or_default(); // every side of a triangle is an edge
+        let at = edges.binary_search(&edge).expect("a side of a triangle that has three");
         (mesh.n_vertices() + at) as u32
     };
-    let cut = mesh.faces().iter().flat_map(|&[a, b, c]| {
+    let triangles = mesh.faces().iter().filter(|[a, b, c]| a != b && b != c && c != a);
+    let cut = triangles.flat_map(|&[a, b, c]| {
         let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
     });

@@ -1,5 +1,6 @@
 //! An object of known size from frame to frame.
 
+use nalgebra::Matrix3;
 use semfm_align::Sim3;
 use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Task};
@@ -64,6 +65,8 @@ pub(crate) struct Followed {
     search: Search,
     /// World from the inner frame, where it was seen last or is expected.
     pub last: Option<Sim3>,
+    /// Camera from world of the frame before.
+    camera_before: Option<Sim3>,
     /// Whether `last` was seen in some frame, and not only given.
     was_seen: bool,
     /// Motion of the last frame, where the two before it were seen.
@@ -97,6 +100,7 @@ impl Followed {
             memory,
             search: Search::default(),
             last: None,
+            camera_before: None,
             was_seen: false,
             velocity: None,
             covariance: Matrix6::identity(),
@@ -115,6 +119,9 @@ impl Followed {
         camera_from_world: &Sim3,
         settings: &TrackSettings,
     ) -> Result<TrackRecord> {
+        if let Some(before) = self.camera_before.replace(*camera_from_world) {
+            self.seen_from(&(*camera_from_world * before.inverse()));
+        }
         let expected = self.last.map(|last| *camera_from_world * last);
         let near = expected.and_then(|expected| self.look_near(view, &expected));
         let seen = near.filter(|attempt| {
@@ -140,8 +147,20 @@ impl Followed {
             return Ok(self.found(number, frame, view, camera_from_world, attempt, state));
         }
         self.velocity = None;
-        self.memory.look_away();
+        self.memory.none_visible();
         Ok(self.not_seen(number, frame, view, expected))
+    }
+
+    /// Expresses what is kept along the axes of another camera.
+    fn seen_from(&mut self, now_from_before: &Sim3) {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| now_from_before.rotation * axis);
+        let turn = Matrix3::from_fn(|i, j| axes[j][i]);
+        let mut both = Matrix6::zeros();
+        both.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        both.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        self.covariance = both * self.covariance * both.transpose();
+        self.velocity = self.velocity.map(|velocity| both * velocity);
+        self.search.seen_from(now_from_before);
     }
 
     /// A pose made better by a frame, and what the image says of it.
@@ -164,7 +183,7 @@ impl Followed {
     fn look_near(&self, view: &DepthView<'_>, expected: &Sim3) -> Option<Attempt> {
         let width = (WIDTH * self.model.diameter()).max(LEAST_WIDTH);
         let still = self.attempt(view, expected, width);
-        let moves_on = self.velocity.filter(|velocity| velocity.norm() > SHOWS_OTHERS);
+        let moves_on = self.velocity.filter(|velocity| self.way(velocity) > SHOWS_OTHERS);
         let is_clear = |attempt: &Attempt| attempt.probability >= FOUND;
         match (still, moves_on) {
             (Some(still), _) if is_clear(&still) => Some(still),
@@ -204,13 +223,17 @@ impl Followed {
         is_found.then_some(best)
     }
 
+    /// How far a motion takes the farthest points of the object, metres.
+    fn way(&self, twist: &Twist) -> f64 {
+        twist.fixed_rows::<3>(0).norm() + self.model.radius * twist.fixed_rows::<3>(3).norm()
+    }
+
     fn attempt(&self, view: &DepthView<'_>, pose: &Sim3, width: f64) -> Option<Attempt> {
         let mut shown = Shown::new(&self.model, view, pose);
         let start = Start { pose: *pose, width, noise: self.noise };
         let mut registration = register(&self.model, view, &shown, &start)?;
         let twist = twist_between(pose, &registration.pose);
-        let turn = self.model.radius * twist.fixed_rows::<3>(3).norm();
-        if twist.fixed_rows::<3>(0).norm() + turn > SHOWS_OTHERS {
+        if self.way(&twist) > SHOWS_OTHERS {
             shown = Shown::new(&self.model, view, &registration.pose);
             let Registration { pose, noise, .. } = registration;
             let start = Start { pose, width: (0.5 * width).max(LEAST_WIDTH), noise };

@@ -88,7 +88,8 @@ pub(crate) fn register(
     start: &Start,
 ) -> Option<Registration> {
     let Start { mut pose, mut width, mut noise } = *start;
-    let most_noise = NOISE[1].min(NOISE_SHARE * model.diameter());
+    // Of a very small object even the least noise is more than its share.
+    let most_noise = NOISE[1].min(NOISE_SHARE * model.diameter()).max(NOISE[0]);
     let mut hold = Matrix6::identity() / (HOLD_TURN * HOLD_TURN);
     (0..3).for_each(|k| hold[(k, k)] = 1.0 / (HOLD_SHIFT * HOLD_SHIFT));
     let mut last_steps = 0;

@@ -68,6 +68,11 @@ pub(crate) struct SearchFrame<'a> {
 }
 
 impl Search {
+    /// Expresses the kept poses in the frame of another camera.
+    pub fn seen_from(&mut self, now_from_before: &Sim3) {
+        self.kept.iter_mut().for_each(|pose| *pose = *now_from_before * *pose);
+    }
+
     /// Tries the next hypotheses, and the best of the frames before; the best first.
     pub fn frame(&mut self, at: &SearchFrame<'_>) -> Vec<Sim3> {
         let most = MOST_PIECE * at.model.diameter();

@@ -60,13 +60,13 @@ impl SurfaceMemory {
     }
 
     /// No place is seen in this frame.
-    pub fn look_away(&mut self) {
+    pub fn none_visible(&mut self) {
         self.places.iter_mut().for_each(|place| place.now = false);
     }
 
     /// Takes what a frame says of the places that its pose shows. Hidden places stay as they are.
     pub fn take(&mut self, evidence: &Evidence) {
-        self.look_away();
+        self.none_visible();
         for &(id, seen) in &evidence.samples {
             let place = &mut self.places[id as usize];
             let change = match seen {

@@ -39,7 +39,7 @@ pub(crate) fn covariance(
     shown: &Shown,
     found: &Registration,
 ) -> Matrix6 {
-    let mut covariance = inverted(&found.information, model.radius) * INFLATION;
+    let mut covariance = inverted(&(found.information / INFLATION), model.radius);
     let turns = SymmetricEigen::new(covariance.fixed_view::<3, 3>(3, 3).into_owned());
     let variance = turns.eigenvalues.max();
     if variance.sqrt() <= DOUBTFUL {
@@ -49,7 +49,7 @@ pub(crate) fn covariance(
     // What moves along with a turn about this axis at the least cost.
     let along: Twist = covariance.fixed_view::<6, 3>(0, 3) * axis / variance;
     let cost = |turn: f64| {
-        objection(model, view, shown, &moved(&found.pose, &(along * turn)), found.noise)
+        truncated_cost(model, view, shown, &moved(&found.pose, &(along * turn)), found.noise)
     };
     let here = cost(0.0);
     let increase = (cost(TRIAL_TURN).min(cost(-TRIAL_TURN)) - here).max(0.0) / INFLATION;
@@ -67,7 +67,11 @@ pub(crate) fn after_a_frame(covariance: &Matrix6) -> Matrix6 {
     let mut grown = *covariance;
     for k in 0..6 {
         let most: f64 = if k < 3 { 10.0 } else { MOST };
-        grown[(k, k)] = (grown[(k, k)] + WALK[k / 3].powi(2)).min(most * most);
+        grown[(k, k)] += WALK[k / 3].powi(2);
+        // Row and column together, so that it stays a covariance.
+        let shrink = (most / grown[(k, k)].sqrt()).min(1.0);
+        grown.row_mut(k).scale_mut(shrink);
+        grown.column_mut(k).scale_mut(shrink);
     }
     grown
 }
@@ -86,14 +90,14 @@ fn inverted(information: &Matrix6, radius: f64) -> Matrix6 {
 
 /// Sum over what a pose shows of how much the image objects: r²/σ² of a sample up to that of one that does not match, and
 /// as much for a point of the outline without a jump.
-fn objection(
+fn truncated_cost(
     model: &TrackModel,
     view: &DepthView<'_>,
     shown: &Shown,
     pose: &Sim3,
     noise: f64,
 ) -> f64 {
-    const MOST_OBJECTION: f64 = 16.0;
+    const MOST_COST: f64 = 16.0;
     let turn = matrix(pose);
     let of_sample = |&id: &u32| {
         let sample = &model.samples[id as usize];
@@ -104,7 +108,7 @@ fn objection(
             // What hides it says nothing.
             Pixel::Depth(z) if z > place.z - 10.0 * noise => {
                 let distance = normal.dot(view.point(at, z) - place) / noise;
-                Some((distance * distance).min(MOST_OBJECTION))
+                Some((distance * distance).min(MOST_COST))
             }
             _ => None,
         }
@@ -112,8 +116,8 @@ fn objection(
     let of_outline = |rim: &crate::outline::OutlinePoint| {
         let line = OutlineLine::new(view, pose, rim)?;
         match line.jump(view, 4, 8.0 * noise) {
-            Some(jump) => Some((jump * jump).min(MOST_OBJECTION)),
-            None if line.beside(view, -4.0, 8.0 * noise) == Beside::Ground => Some(MOST_OBJECTION),
+            Some(jump) => Some((jump * jump).min(MOST_COST)),
+            None if line.beside(view, -4.0, 8.0 * noise) == Beside::Ground => Some(MOST_COST),
             None => None,
         }
     };
@@ -124,4 +128,27 @@ fn objection(
 /// The greatest standard deviation of a block of a covariance.
 pub(crate) fn greatest_std(block: Matrix3<f64>) -> f64 {
     SymmetricEigen::new(block).eigenvalues.max().max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uncertainty_grows_up_to_half_a_turn_and_stays_a_covariance() {
+        let mut covariance = Matrix6::identity() * 1e-6;
+        covariance[(3, 4)] = 9e-7;
+        covariance[(4, 3)] = 9e-7;
+        for _ in 0..20_000 {
+            covariance = after_a_frame(&covariance);
+            let eigen = SymmetricEigen::new(covariance);
+            assert!(eigen.eigenvalues.min() > -1e-12, "{}", eigen.eigenvalues);
+        }
+        for k in 3..6 {
+            assert!((covariance[(k, k)].sqrt() - MOST).abs() < 1e-6, "{}", covariance[(k, k)]);
+        }
+        // Nothing is known of any direction.
+        let unknown = inverted(&Matrix6::zeros(), 0.1);
+        assert!((3..6).all(|k| unknown[(k, k)].sqrt() <= MOST * (1.0 + 1e-12)));
+    }
 }

@@ -22,7 +22,9 @@ pub use error::{Error, Fault, Result};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuRenderer;
 pub use lift::{LiftReport, LiftRule, LiftSettings, Lifted, lift};
-pub use render::{CornerNormals, RenderSettings, SurfaceColor, openness, render, triangle_ids};
+pub use render::{
+    CornerNormals, RenderSettings, SurfaceColor, openness, render, render_colorings, triangle_ids,
+};
 pub use renderer::{Renderer, RendererChoice};
 pub use rig::{CLOSE_UP, RigSettings, camera_towards, rig};
 pub use view::View;

@@ -122,7 +122,7 @@ pub fn parse_source(text: &str) -> (PathBuf, usize) {
 
 /// Reads one frame.
 pub fn read_source_frame(source: &Path, number: usize, bag: &BagOptions) -> Result<SourceFrame> {
-    let most = Some(number + 1);
+    let most = number.checked_add(1); // all, for the last number there is
     let settings = SourceSettings { bag: bag.settings()?, most, ..SourceSettings::default() };
     let (mut n_seen, mut found) = (0, None);
     let report = read_observations(source, &settings, |seen| {

@@ -243,6 +243,9 @@ impl TrackCommand {
 
     fn finish(self, run: Run<'_>, common: &Common) -> Result<Outcome> {
         let n_frames = run.states.values().sum::<usize>();
+        if n_frames == 0 {
+            bail!("{}: expected at least one frame, found none", self.source.display());
+        }
         run.task.step("track", n_frames, n_frames)?;
         if let (Some(path), Some(weights)) = (&self.refined, run.tracker.refined_region()?) {
             write_region(path, &Region::from_weights(weights)?, run.mesh)?;

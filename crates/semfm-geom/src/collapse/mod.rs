@@ -6,14 +6,12 @@
 mod fans;
 mod quadric;
 mod queue;
-mod spatial_order;
 
 use self::fans::Fans;
 use self::quadric::Quadric;
 use self::queue::{Queue, Waiting};
-use self::spatial_order::SpatialOrder;
 use crate::math::DVec3;
-use crate::{Mesh, Result, Task};
+use crate::{Mesh, Result, SpatialOrder, Task};
 
 /// Weight of edge length against distance from the surface in the order of collapses: an edge of
 /// length l costs as much as a vertex that strays `EVENNESS · l` from the planes it stands for.

@@ -82,7 +82,7 @@ pub fn bridge(
             bridges: Vec::new(),
         });
     }
-    let mut bridges = links(mesh, labels, settings.reach * median_edge(mesh));
+    let mut bridges = links(mesh, labels, settings.reach * mesh.median_edge());
     bridges.sort_unstable();
     bridges.dedup();
 
@@ -175,18 +175,6 @@ pub(crate) fn components(n: usize, stiffness: &SparseColMat<usize, f64>) -> Comp
         }
     }
     Components { of_vertex: labels, count: count as usize }
-}
-
-/// Median length of the triangles' edges, counted once per triangle.
-fn median_edge(mesh: &Mesh) -> f64 {
-    let mut lengths: Vec<f64> = (0..mesh.n_faces())
-        .flat_map(|face| {
-            let [a, b, c] = mesh.corners(face);
-            [a.distance(b), b.distance(c), c.distance(a)]
-        })
-        .collect();
-    let middle = lengths.len() / 2;
-    *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

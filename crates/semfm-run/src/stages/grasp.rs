@@ -14,7 +14,7 @@ use semfm_show::write_grasp_picture;
 
 use super::pose::ALIGNED_FILE;
 use super::region::REGION_FILE;
-use super::{Bench, StageEnd, no_answer};
+use super::{StageContext, StageEnd, no_answer};
 use crate::recipe::{GraspTable, TableValue};
 use crate::{Result, Stage};
 
@@ -26,13 +26,13 @@ const PICTURE: &str = "grasps.png";
 const APPROACH_CONE: f64 = 45.0;
 
 /// Finds grasps.
-pub fn grasp(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
-    let Some(table) = &bench.recipe.grasp else { return Ok(StageEnd::default()) };
-    let mesh = read_mesh(&bench.recipe.target.mesh)?.mesh;
-    let region = read_region(&bench.file(Stage::Transfer, REGION_FILE), &mesh)?;
-    let mut request = request(bench, &mesh)?;
+pub fn grasp(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let Some(table) = &context.recipe.grasp else { return Ok(StageEnd::default()) };
+    let mesh = read_mesh(&context.recipe.target.mesh)?.mesh;
+    let region = read_region(&context.file(Stage::Transfer, REGION_FILE), &mesh)?;
+    let mut request = request(context, &mesh)?;
     let pose_margin = request.settings.pose_margin;
-    request.settings = GraspSettings { pose_margin, ..settings(table, bench.recipe.seed) };
+    request.settings = GraspSettings { pose_margin, ..settings(table, context.recipe.seed) };
     request.table = table.table.map(|TableValue { point, normal }| Table {
         point: DVec3::from_array(point),
         normal: DVec3::from_array(normal),
@@ -58,11 +58,11 @@ pub fn grasp(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> 
 }
 
 /// A request with metres, and the pose before the camera where there is one.
-fn request(bench: &Bench<'_>, mesh: &Mesh) -> Result<GraspRequest> {
-    let target = &bench.recipe.target;
-    let aligned = match (&target.aligned, bench.recipe.aligns_target()) {
+fn request(context: &StageContext<'_>, mesh: &Mesh) -> Result<GraspRequest> {
+    let target = &context.recipe.target;
+    let aligned = match (&target.aligned, context.recipe.aligns_target()) {
         (Some(path), _) => Some(path.clone()),
-        (None, true) => Some(bench.file(Stage::TargetPose, ALIGNED_FILE)),
+        (None, true) => Some(context.file(Stage::TargetPose, ALIGNED_FILE)),
         (None, false) => None,
     };
     Ok(match aligned {

@@ -16,7 +16,7 @@ use crate::{Result, Stage};
 
 /// Where a stage finds what it needs.
 #[derive(Clone, Copy, Debug)]
-pub struct Bench<'a> {
+pub struct StageContext<'a> {
     /// The recipe, its paths from the current folder.
     pub recipe: &'a Recipe,
     /// The folder of the run.
@@ -40,7 +40,7 @@ pub struct StageEnd {
     pub more_inputs: Vec<PathBuf>,
 }
 
-impl Bench<'_> {
+impl StageContext<'_> {
     /// Where a file of a finished stage is.
     pub fn file(&self, stage: Stage, name: &str) -> PathBuf {
         self.output.join(stage.name()).join(name)

@@ -15,16 +15,16 @@ use semfm::{
 use semfm_show::write_plan;
 
 use super::grasp::GRASPS_FILE;
-use super::{Bench, StageEnd, no_answer};
+use super::{StageContext, StageEnd, no_answer};
 use crate::recipe::{PoseValue, RobotTable, StartValue};
 use crate::{Error, Result, Stage};
 
 /// Plans the motion.
-pub fn plan(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
-    let Some(table) = &bench.recipe.robot else { return Ok(StageEnd::default()) };
-    let target = &bench.recipe.target.mesh;
+pub fn plan(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let Some(table) = &context.recipe.robot else { return Ok(StageEnd::default()) };
+    let target = &context.recipe.target.mesh;
     let mesh = read_mesh(target)?.mesh;
-    let grasps = GraspsFile::read(&bench.file(Stage::Grasp, GRASPS_FILE), &mesh)?;
+    let grasps = GraspsFile::read(&context.file(Stage::Grasp, GRASPS_FILE), &mesh)?;
     let files = ArmFiles {
         urdf: table.urdf.clone(),
         srdf: table.srdf.clone(),
@@ -42,7 +42,7 @@ pub fn plan(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
         start: start(table, &arm)?,
         scene: SceneContents::read(&table.scene)?,
         with_table: true,
-        settings: settings(table, bench.recipe.seed),
+        settings: settings(table, context.recipe.seed),
     };
     let plan = plan_grasps(&arm, &request, task)?;
     write_plan(folder, &arm, &plan, task)?;

@@ -8,7 +8,7 @@ use semfm::geom::io::read_mesh;
 use semfm::observe::{MaskFile, Observation, ObservationFiles};
 use semfm::{Mesh, ObjectSize, Task};
 
-use super::{Bench, StageEnd, no_answer};
+use super::{StageContext, StageEnd, no_answer};
 use crate::recipe::{AlignTable, DemonstrationFrame, TargetFrame};
 use crate::{Result, Stage};
 
@@ -19,8 +19,8 @@ pub struct AlignedFrame {
 }
 
 /// Every frame of the demonstration whose pose is not told.
-pub fn demonstration(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
-    let demonstration = &bench.recipe.demonstration;
+pub fn demonstration(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let demonstration = &context.recipe.demonstration;
     let mesh = read_mesh(&demonstration.mesh)?.mesh;
     let mut end = StageEnd::default();
     for (i, frame) in demonstration.frames.iter().enumerate() {
@@ -30,7 +30,7 @@ pub fn demonstration(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<St
         let seen = files_of_frame(frame, frame.mask.as_deref());
         let search = Search { table: &demonstration.align, init: frame.init.as_deref() };
         let name = aligned_name(i, demonstration.frames.len());
-        let of_frame = Aligned { mesh: &mesh, files: &seen, seed: bench.recipe.seed, search };
+        let of_frame = Aligned { mesh: &mesh, files: &seen, seed: context.recipe.seed, search };
         let found = of_frame.write(&folder.join(name), task)?;
         end.add(&mesh, &found);
         if found.verdict == Verdict::Refuse && !demonstration.use_refused {
@@ -43,13 +43,13 @@ pub fn demonstration(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<St
 }
 
 /// The target.
-pub fn target(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
-    let target = &bench.recipe.target;
+pub fn target(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let target = &context.recipe.target;
     let mesh = read_mesh(&target.mesh)?.mesh;
     let frame = target.frame.clone().unwrap_or_default();
     let seen = files_of_target(&frame, false);
     let search = Search { table: &target.align, init: frame.init.as_deref() };
-    let aligned = Aligned { mesh: &mesh, files: &seen, seed: bench.recipe.seed, search };
+    let aligned = Aligned { mesh: &mesh, files: &seen, seed: context.recipe.seed, search };
     let found = aligned.write(&folder.join(ALIGNED_FILE), task)?;
     let mut end = StageEnd::default();
     end.add(&mesh, &found);
@@ -68,14 +68,14 @@ fn aligned_name(frame: usize, n_frames: usize) -> String {
 }
 
 /// The pose of the demonstrated mesh in a frame, told or found; `None` where there is none.
-pub fn aligned_of_frame(bench: &Bench<'_>, frame: usize) -> Option<AlignedFrame> {
-    let frames = &bench.recipe.demonstration.frames;
+pub fn aligned_of_frame(context: &StageContext<'_>, frame: usize) -> Option<AlignedFrame> {
+    let frames = &context.recipe.demonstration.frames;
     let of_frame = frames.get(frame)?;
     if let Some(path) = &of_frame.aligned {
         return Some(AlignedFrame { path: path.clone(), is_made_here: false });
     }
     let name = aligned_name(frame, frames.len());
-    let path = bench.file(Stage::DemonstrationPose, &name);
+    let path = context.file(Stage::DemonstrationPose, &name);
     of_frame.is_aligned_here().then_some(AlignedFrame { path, is_made_here: true })
 }
 

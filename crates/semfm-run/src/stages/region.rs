@@ -14,7 +14,7 @@ use semfm::observe::{ContactReport, ContactSettings, HandFiles, HandFrame};
 use semfm::{Mesh, Region};
 
 use super::pose::{aligned_of_frame, files_of_frame};
-use super::{Bench, StageEnd};
+use super::{StageContext, StageEnd};
 use crate::Result;
 use crate::recipe::DemonstrationFrame;
 
@@ -25,8 +25,8 @@ pub const HAND_FILE: &str = "hand.ply";
 pub const REGION_FILE: &str = "region.json";
 
 /// Marks the region.
-pub fn region(bench: &Bench<'_>, folder: &Path) -> Result<StageEnd> {
-    let demonstration = &bench.recipe.demonstration;
+pub fn region(context: &StageContext<'_>, folder: &Path) -> Result<StageEnd> {
+    let demonstration = &context.recipe.demonstration;
     let mesh = read_mesh(&demonstration.mesh)?.mesh;
     let mut end = StageEnd::default();
     let mut region = if let Some(path) = &demonstration.region {
@@ -34,10 +34,10 @@ pub fn region(bench: &Bench<'_>, folder: &Path) -> Result<StageEnd> {
     } else if let (Some(near), Some(radius)) = (demonstration.near, demonstration.radius) {
         region_around_contact(&mesh, DVec3::from_array(near), radius)?
     } else if demonstration.frames.iter().any(DemonstrationFrame::has_hand) {
-        touched(bench, &mesh, folder, &mut end)?
+        touched(context, &mesh, folder, &mut end)?
     } else {
         let frames = demonstration.frames.iter().enumerate();
-        let seen = frames.map(|(i, frame)| masked(bench, &mesh, i, frame));
+        let seen = frames.map(|(i, frame)| masked(context, &mesh, i, frame));
         merge_regions(seen.collect::<Result<Vec<Region>>>()?)?
     };
     if demonstration.grow {
@@ -52,9 +52,14 @@ pub fn region(bench: &Bench<'_>, folder: &Path) -> Result<StageEnd> {
 }
 
 /// What the hands of the frames touch.
-fn touched(bench: &Bench<'_>, mesh: &Mesh, folder: &Path, end: &mut StageEnd) -> Result<Region> {
-    let frames = bench.recipe.demonstration.frames.iter().enumerate();
-    let frames = frames.map(|(i, frame)| hand_frame(bench, i, frame));
+fn touched(
+    context: &StageContext<'_>,
+    mesh: &Mesh,
+    folder: &Path,
+    end: &mut StageEnd,
+) -> Result<Region> {
+    let frames = context.recipe.demonstration.frames.iter().enumerate();
+    let frames = frames.map(|(i, frame)| hand_frame(context, i, frame));
     let frames: Vec<HandFrame> = frames.collect::<Result<_>>()?;
     let touched = region_of_hands(mesh, &frames, &ContactSettings::default())?;
     write_json(folder.join(CONTACT_FILE), &touched.report)?;
@@ -66,10 +71,14 @@ fn touched(bench: &Bench<'_>, mesh: &Mesh, folder: &Path, end: &mut StageEnd) ->
 }
 
 /// A hand with the pose of the mesh in its frame.
-fn hand_frame(bench: &Bench<'_>, i: usize, frame: &DemonstrationFrame) -> Result<HandFrame> {
+fn hand_frame(
+    context: &StageContext<'_>,
+    i: usize,
+    frame: &DemonstrationFrame,
+) -> Result<HandFrame> {
     let has_picture = frame.depth.is_some() || frame.color.is_some();
     let is_seen = frame.hand_mask.is_some() && frame.intrinsics.is_some() && has_picture;
-    let pose = aligned_of_frame(bench, i).map(|aligned| read_pose(&aligned.path)).transpose()?;
+    let pose = aligned_of_frame(context, i).map(|aligned| read_pose(&aligned.path)).transpose()?;
     let files = HandFiles {
         hand: frame.hand.clone(),
         vertices: frame.hand_vertices.clone(),
@@ -98,9 +107,14 @@ fn affine(motion: &Sim3) -> DAffine3 {
 }
 
 /// What a camera saw inside the mask of the region.
-fn masked(bench: &Bench<'_>, mesh: &Mesh, i: usize, frame: &DemonstrationFrame) -> Result<Region> {
+fn masked(
+    context: &StageContext<'_>,
+    mesh: &Mesh,
+    i: usize,
+    frame: &DemonstrationFrame,
+) -> Result<Region> {
     let seen = files_of_frame(frame, frame.region_mask.as_deref()).read()?;
-    let pose = aligned_of_frame(bench, i).map(|aligned| read_pose(&aligned.path)).transpose()?;
+    let pose = aligned_of_frame(context, i).map(|aligned| read_pose(&aligned.path)).transpose()?;
     let pose = pose.unwrap_or(Sim3::IDENTITY);
     // A camera has no scale: the mesh is made as large as it is before it.
     let points = mesh.vertices().iter().map(|&p| pose.scale * p).collect();

@@ -14,21 +14,21 @@ use semfm::{
 use semfm_show::{TransferFiles, write_transfer};
 
 use super::region::REGION_FILE;
-use super::{Bench, StageEnd, no_answer};
+use super::{StageContext, StageEnd, no_answer};
 use crate::fingerprint::files_under;
 use crate::recipe::TransferTable;
 use crate::{Result, Stage};
 
 /// Carries the region over.
-pub fn transfer(bench: &Bench<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
-    let recipe = bench.recipe;
+pub fn transfer(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
+    let recipe = context.recipe;
     let (source_path, target_path) = (&recipe.demonstration.mesh, &recipe.target.mesh);
     let source = NamedMesh { path: source_path, file: read_mesh(source_path)? };
     let target = NamedMesh { path: target_path, file: read_mesh(target_path)? };
-    let region_path = bench.file(Stage::Region, REGION_FILE);
+    let region_path = context.file(Stage::Region, REGION_FILE);
     let region = read_region(&region_path, &source.file.mesh)?;
-    let settings = settings(&recipe.transfer, recipe.seed, bench.cache);
-    let features = features(bench, &settings)?;
+    let settings = settings(&recipe.transfer, recipe.seed, context.cache);
+    let features = features(context, &settings)?;
     let PreparedPair { source, target, notes } =
         prepare_pair(source, target, &features, &settings, task)?;
     let found =
@@ -94,8 +94,8 @@ fn settings(table: &TransferTable, seed: u64, cache: bool) -> PipelineSettings {
 }
 
 /// Where the features come from.
-fn features(bench: &Bench<'_>, settings: &PipelineSettings) -> Result<PairFeatures> {
-    let table = &bench.recipe.transfer;
+fn features(context: &StageContext<'_>, settings: &PipelineSettings) -> Result<PairFeatures> {
+    let table = &context.recipe.transfer;
     let pair = |source: &Option<PathBuf>, target: &Option<PathBuf>| {
         let (source, target) = (source.clone()?, target.clone()?);
         Some(PairFiles { source, target })
@@ -111,7 +111,7 @@ fn features(bench: &Bench<'_>, settings: &PipelineSettings) -> Result<PairFeatur
         return Ok(PairFeatures::Geometry);
     }
     let name = table.encoder.as_deref().unwrap_or(BUILTIN_ENCODERS[0].name);
-    let open = OpenSettings { threads: bench.threads, quiet: bench.quiet };
+    let open = OpenSettings { threads: context.threads, quiet: context.quiet };
     let encoder = open_encoder(name, &open).map_err(semfm::Error::from)?;
     let rolls = table.rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(method.features.rolls));
     Ok(PairFeatures::Encoder(ObjectEncoder::new(encoder, &settings.cache).with_rolls(rolls)))

@@ -7,28 +7,26 @@
 
 use std::path::Path;
 
-use semfm::Task;
 use semfm::files::ObjectAnchors;
-use semfm::views::{RenderSettings, SurfaceColor, View, render};
+use semfm::views::View;
 
+use super::row_pictures::RowColors;
 use super::sheet::{Entry, Row, Sheet};
-use super::{ObjectFigure, TransferFigure, Viewpoints};
+use super::{ObjectFigure, TransferFigure};
 use crate::Result;
 use crate::colors::{anchor_color, cluster_color};
 
 impl TransferFigure<'_> {
-    /// Writes the picture of the features, clusters and anchors.
-    ///
-    /// # Errors
-    /// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails, and where the task was
-    /// cancelled.
-    pub fn write_features_picture(&self, path: &Path, task: &Task) -> Result<()> {
-        let (source, target) =
-            rayon::join(|| pictures(&self.source, task), || pictures(&self.target, task));
-        let (source, target) = (source?, target?);
+    /// Writes the sheet from pictures that [`row_pictures`](super::row_pictures::row_pictures) drew.
+    pub(super) fn write_features_sheet(
+        &self,
+        path: &Path,
+        source: &[View],
+        target: &[View],
+    ) -> Result<()> {
         let rows = [
-            Row { title: "source".into(), pictures: &source },
-            Row { title: "target".into(), pictures: &target },
+            Row { title: "source".into(), pictures: source },
+            Row { title: "target".into(), pictures: target },
         ];
         let anchors = self.transfer.report.anchors.iter().enumerate();
         let mut legend: Vec<Entry> = anchors
@@ -45,16 +43,14 @@ impl TransferFigure<'_> {
     }
 }
 
-/// The three pictures of one object.
-fn pictures(figure: &ObjectFigure<'_>, task: &Task) -> Result<Vec<View>> {
-    let Viewpoints { best, other, .. } = figure.viewpoints;
-    let (mesh, light) = (figure.mesh(), RenderSettings::default());
-    let features = figure.onto_vertices(&figure.feature_colors);
-    let clusters = figure.onto_vertices(&cluster_colors(&figure.anchors));
-    let mut pictures =
-        render(mesh, &SurfaceColor::Vertices(&features), &[best, other], &light, task)?;
-    pictures.extend(render(mesh, &SurfaceColor::Vertices(&clusters), &[best], &light, task)?);
-    Ok(pictures)
+impl RowColors {
+    /// The features, and the clusters with their anchors.
+    pub(super) fn of_features(figure: &ObjectFigure<'_>) -> Self {
+        Self {
+            from_two_sides: figure.onto_vertices(&figure.feature_colors),
+            from_the_best: figure.onto_vertices(&cluster_colors(&figure.anchors)),
+        }
+    }
 }
 
 /// The colour of each cloud point's cluster.

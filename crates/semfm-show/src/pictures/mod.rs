@@ -12,6 +12,7 @@ mod painted;
 mod pair_rotation;
 mod photo;
 mod rgb_picture;
+mod row_pictures;
 mod scale_bar;
 mod sheet;
 mod stroke_font;

@@ -1,9 +1,12 @@
 //! A finished transfer with everything that its pictures and scenes show of it.
 
+use std::path::Path;
+
 use semfm::files::{ObjectAnchors, TransferResult};
 use semfm::{Mesh, PreparedObject, Task, Transfer};
 
 use super::feature_colors::FeatureColors;
+use super::row_pictures::{RowColors, row_pictures};
 use super::sheet::PICTURE_SIDE;
 use super::{PairedViewpoints, Seen, Viewpoints, WeightedMesh, paired_viewpoints};
 use crate::Result;
@@ -82,6 +85,25 @@ impl<'a> TransferFigure<'a> {
                 anchors: anchors.target,
             },
         })
+    }
+
+    /// Writes `transfer.png` and `features.png` to these paths.
+    ///
+    /// # Errors
+    /// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails, and where the task was
+    /// cancelled.
+    pub fn write_pictures(&self, transfer: &Path, features: &Path, task: &Task) -> Result<()> {
+        let rows = |figure| {
+            let colors = [RowColors::of_transfer(figure), RowColors::of_features(figure)];
+            row_pictures(figure, &colors, task)
+        };
+        let (source, target) = rayon::join(|| rows(&self.source), || rows(&self.target));
+        let (source, target) = (source?, target?);
+        let (transfer, features) = rayon::join(
+            || self.write_transfer_sheet(transfer, &source[0], &target[0]),
+            || self.write_features_sheet(features, &source[1], &target[1]),
+        );
+        transfer.and(features)
     }
 
     /// The verdict in a line: "accept, confidence 0.93".

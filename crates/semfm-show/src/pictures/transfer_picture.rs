@@ -7,10 +7,11 @@
 use std::path::Path;
 
 use semfm::Task;
-use semfm::views::{RenderSettings, SurfaceColor, View, render};
+use semfm::views::View;
 
+use super::row_pictures::{RowColors, row_pictures};
 use super::sheet::{Entry, Row, Sheet};
-use super::{ObjectFigure, TransferFigure, Viewpoints};
+use super::{ObjectFigure, TransferFigure};
 use crate::Result;
 use crate::colors::weight_colors;
 
@@ -21,12 +22,21 @@ impl TransferFigure<'_> {
     /// [`Error::Semfm`](crate::Error::Semfm) where rendering or writing fails, and where the task was
     /// cancelled.
     pub fn write_transfer_picture(&self, path: &Path, task: &Task) -> Result<()> {
-        let (source, target) =
-            rayon::join(|| pictures(&self.source, task), || pictures(&self.target, task));
-        let (source, target) = (source?, target?);
+        let row = |figure| row_pictures(figure, &[RowColors::of_transfer(figure)], task);
+        let (source, target) = rayon::join(|| row(&self.source), || row(&self.target));
+        self.write_transfer_sheet(path, &source?[0], &target?[0])
+    }
+
+    /// Writes the sheet from pictures that [`row_pictures`] drew.
+    pub(super) fn write_transfer_sheet(
+        &self,
+        path: &Path,
+        source: &[View],
+        target: &[View],
+    ) -> Result<()> {
         let rows = [
-            Row { title: "source: the demonstrated region".into(), pictures: &source },
-            Row { title: format!("target: {}", self.verdict_line()), pictures: &target },
+            Row { title: "source: the demonstrated region".into(), pictures: source },
+            Row { title: format!("target: {}", self.verdict_line()), pictures: target },
         ];
         let columns = ["region", "from another side", "colour transfer"];
         Sheet { columns: &columns, rows: &rows, legend: &self.legend() }.write(path)
@@ -51,14 +61,12 @@ impl TransferFigure<'_> {
     }
 }
 
-/// The three pictures of one object.
-fn pictures(figure: &ObjectFigure<'_>, task: &Task) -> Result<Vec<View>> {
-    let Viewpoints { best, other, .. } = figure.viewpoints;
-    let (mesh, light) = (figure.mesh(), RenderSettings::default());
-    let weights = weight_colors(figure.weights);
-    let mut pictures =
-        render(mesh, &SurfaceColor::Vertices(&weights), &[best, other], &light, task)?;
-    let matches = SurfaceColor::Vertices(&figure.match_colors);
-    pictures.extend(render(mesh, &matches, &[best], &light, task)?);
-    Ok(pictures)
+impl RowColors {
+    /// The region, and what is matched to what.
+    pub(super) fn of_transfer(figure: &ObjectFigure<'_>) -> Self {
+        Self {
+            from_two_sides: weight_colors(figure.weights),
+            from_the_best: figure.match_colors.clone(),
+        }
+    }
 }

@@ -82,7 +82,7 @@ pub(super) fn batches(
 }
 
 fn window(request: &Request<'_>, camera: &Pinhole) -> [Range<usize>; 2] {
-    let [columns, rows] = Projection::new(request.mesh, camera).window();
+    let [columns, rows] = Projection::new(&request.ordered, camera).window();
     [with_margin(columns, camera.width()), with_margin(rows, camera.height())]
 }
 

@@ -7,6 +7,7 @@ use semfm_geom::{Mesh, Pinhole, PixelDepth, Task};
 use super::nearest_seen::nearest_seen;
 use super::{Features, nothing_in_sight};
 use crate::render::depth_lookup::inverse_depths;
+use crate::render::ordered_mesh::OrderedMesh;
 use crate::render::triangle::Projection;
 use crate::{EmbeddedView, PatchEmbeddings, PatchGrid, Result};
 
@@ -45,9 +46,10 @@ pub(super) fn pull(
     task: &Task,
 ) -> Result<Features> {
     task.step("lift", 0, 2)?;
+    let ordered = OrderedMesh::new(mesh);
     // (views × M)
     let sightings: Vec<Vec<Option<Sighting>>> =
-        views.par_iter().map(|view| sightings(mesh, samples, view, tolerance)).collect();
+        views.par_iter().map(|view| sightings(&ordered, samples, view, tolerance)).collect();
     let lifted_by_view: Vec<usize> =
         sightings.iter().map(|seen| seen.iter().flatten().count()).collect();
     if lifted_by_view.iter().all(|&n| n == 0) {
@@ -90,7 +92,7 @@ pub(super) fn pull(
 
 /// For each sample, what the view says about it, if it sees it.
 fn sightings(
-    mesh: &Mesh,
+    mesh: &OrderedMesh<'_>,
     samples: &[SurfaceSample],
     view: &EmbeddedView,
     tolerance: f64,

@@ -7,6 +7,7 @@ use semfm_geom::{Mesh, PointIndex, Task};
 
 use super::{Features, nothing_in_sight};
 use crate::render::depth_lookup::inverse_depths;
+use crate::render::ordered_mesh::OrderedMesh;
 use crate::render::triangle::Projection;
 use crate::{EmbeddedView, Result};
 
@@ -26,8 +27,9 @@ pub(super) fn unproject(
     task: &Task,
 ) -> Result<Features> {
     task.step("lift", 0, 2)?;
+    let ordered = OrderedMesh::new(mesh);
     let by_view: Vec<Vec<LiftedPatch>> =
-        (0..views.len()).into_par_iter().map(|k| lifted_patches(mesh, views, k)).collect();
+        (0..views.len()).into_par_iter().map(|k| lifted_patches(&ordered, views, k)).collect();
     let lifted_by_view = by_view.iter().map(Vec::len).collect();
     let lifted: Vec<LiftedPatch> = by_view.into_iter().flatten().collect();
     if lifted.is_empty() {
@@ -61,7 +63,7 @@ pub(super) fn unproject(
 }
 
 /// The valid patches of view `k` whose centres see the surface, with the points they see.
-fn lifted_patches(mesh: &Mesh, views: &[EmbeddedView], k: usize) -> Vec<LiftedPatch> {
+fn lifted_patches(mesh: &OrderedMesh<'_>, views: &[EmbeddedView], k: usize) -> Vec<LiftedPatch> {
     let EmbeddedView { camera, patches } = &views[k];
     let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
     let centres: Vec<[f64; 2]> = (0..patches.n_patches())

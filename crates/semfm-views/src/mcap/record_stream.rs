@@ -86,6 +86,8 @@ impl<'p, R: Read + Seek> RecordStream<'p, R> {
             return Err(place.error(Fault::Truncated, format!("a body of {length} bytes"), found));
         };
         let mut body = std::mem::take(&mut self.body);
+        body.clear();
+        reserve(&mut body, length, place)?;
         body.resize(length, 0);
         self.fill(&mut body)?;
         self.body = body;
@@ -131,7 +133,9 @@ impl<'p, R: Read + Seek> RecordStream<'p, R> {
 
     fn read_at(&mut self, at: usize, n: usize) -> Result<Vec<u8>> {
         self.seek(at)?;
-        let mut bytes = vec![0; n];
+        let mut bytes = Vec::new();
+        reserve(&mut bytes, n, self.place())?;
+        bytes.resize(n, 0);
         self.fill(&mut bytes)?;
         Ok(bytes)
     }
@@ -144,6 +148,13 @@ impl<'p, R: Read + Seek> RecordStream<'p, R> {
     fn fill(&mut self, bytes: &mut [u8]) -> Result<()> {
         self.source.read_exact(bytes).map_err(|cause| io_error(self.path, cause))
     }
+}
+
+/// Room for so many bytes: a file may claim more than there is memory.
+fn reserve(bytes: &mut Vec<u8>, n: usize, place: Place<'_>) -> Result<()> {
+    bytes.try_reserve_exact(n).map_err(|_| {
+        place.error(Fault::OverLimit, "a record that fits into memory", bytes_in_words(n))
+    })
 }
 
 fn io_error(path: &Path, source: std::io::Error) -> crate::Error {

@@ -14,22 +14,26 @@ const POSITIONS_PER_CELL: f64 = 0.5;
 pub(crate) fn inverse_depths(projection: &Projection<'_>, positions: &[[f64; 2]]) -> Vec<f64> {
     let cells = Cells::new(positions);
     let mut nearest = vec![0.0; positions.len()];
-    for face in 0..projection.mesh.n_faces() {
-        let bounds = projection.pixel_box(face);
-        let mut forms = None;
-        for id in cells.within(bounds) {
-            let [u, v] = positions[id];
-            let inside = bounds.low[0] <= u
-                && u <= bounds.high[0]
-                && bounds.low[1] <= v
-                && v <= bounds.high[1];
-            if !inside {
-                continue;
-            }
-            // Made at the first position that needs them; most triangles meet none.
-            let forms = *forms.get_or_insert_with(|| projection.forms(face));
-            if let Some(inverse) = forms.and_then(|forms| forms.inverse_depth_at(u, v)) {
-                nearest[id] = inverse.max(nearest[id]);
+    for (places, block) in projection.mesh.blocks() {
+        if block.is_some_and(|block| {
+            let bounds = projection.block_box(block);
+            !cells.within(bounds).any(|id| bounds.holds(positions[id]))
+        }) {
+            continue;
+        }
+        for place in places {
+            let bounds = projection.pixel_box(place);
+            let mut forms = None;
+            for id in cells.within(bounds) {
+                let [u, v] = positions[id];
+                if !bounds.holds([u, v]) {
+                    continue;
+                }
+                // Made at the first position that needs them; most triangles meet none.
+                let forms = *forms.get_or_insert_with(|| projection.forms(place));
+                if let Some(inverse) = forms.and_then(|forms| forms.inverse_depth_at(u, v)) {
+                    nearest[id] = inverse.max(nearest[id]);
+                }
             }
         }
     }

@@ -1,13 +1,14 @@
 //! The renderer: a mesh and cameras in, pictures with depth and triangle ids out.
 //!
-//! `triangle` turns a triangle into linear forms over the image, `raster` fills a z-buffer with
-//! them, `shade` gives its samples colours, `depth_lookup` finds the depth at single positions,
-//! `occlusion` darkens what little light reaches, `edges` draws outlines.
+//! `ordered_mesh` sorts dense meshes, `triangle` turns a triangle into linear forms over the image,
+//! `raster` fills a z-buffer with them, `shade` gives its samples colours, `depth_lookup` finds the
+//! depth at single positions, `occlusion` darkens what little light reaches, `edges` draws outlines.
 //! Everything is computed on the CPU, the same at every thread count.
 
 pub(crate) mod depth_lookup;
 mod edges;
 mod occlusion;
+pub(crate) mod ordered_mesh;
 pub(crate) mod raster;
 mod shade;
 pub(crate) mod triangle;
@@ -15,6 +16,7 @@ pub(crate) mod triangle;
 use std::fmt;
 #[cfg(feature = "gpu")]
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -26,7 +28,9 @@ pub use shade::{CornerNormals, SurfaceColor};
 
 use crate::{Error, Result, View};
 pub use occlusion::openness;
+use ordered_mesh::OrderedMesh;
 use raster::{DrawAll, Raster};
+use shade::Shader;
 use triangle::Projection;
 
 /// Largest width or height of a view, in pixels.
@@ -136,18 +140,39 @@ pub fn render(
     settings: &RenderSettings,
     task: &Task,
 ) -> Result<Vec<View>> {
-    let request = Request::new(mesh, color, cameras, settings)?;
+    let mut views = render_colorings(mesh, std::slice::from_ref(color), cameras, settings, task)?;
+    Ok(views.swap_remove(0))
+}
+
+/// Pictures of one surface in several colourings from the same cameras (colourings × cameras): those of [`render`],
+/// but what each sample sees is found once for all colourings.
+///
+/// # Errors
+/// As [`render`]; [`Error::Invalid`] for no colouring.
+pub fn render_colorings(
+    mesh: &Mesh,
+    colorings: &[SurfaceColor<'_>],
+    cameras: &[Pinhole],
+    settings: &RenderSettings,
+    task: &Task,
+) -> Result<Vec<Vec<View>>> {
+    let requests = Request::for_each(mesh, colorings, cameras, settings)?;
     let done = AtomicUsize::new(0);
     task.step("render", 0, cameras.len())?;
-    cameras
+    let by_camera: Vec<Vec<View>> = cameras
         .par_iter()
         .map(|camera| {
             task.check()?;
-            let view = render_one(&request, camera);
+            let views = render_one(&requests, camera);
             task.step("render", done.fetch_add(1, Ordering::Relaxed) + 1, cameras.len())?;
-            Ok(view)
+            Ok(views)
         })
-        .collect()
+        .collect::<Result<_>>()?;
+    let mut by_coloring: Vec<Vec<View>> = requests.iter().map(|_| Vec::new()).collect();
+    for views in by_camera {
+        by_coloring.iter_mut().zip(views).for_each(|(to, view)| to.push(view));
+    }
+    Ok(by_coloring)
 }
 
 /// The triangle of every pixel (height × width, −1 on the background) for each camera: that of
@@ -157,17 +182,18 @@ pub fn render(
 /// As [`render`].
 pub fn triangle_ids(mesh: &Mesh, cameras: &[Pinhole], task: &Task) -> Result<Vec<Vec<i32>>> {
     check_scene(mesh, cameras)?;
+    let ordered = OrderedMesh::new(mesh);
     cameras
         .par_iter()
         .map(|camera| {
             task.check()?;
-            Ok(triangles_of(mesh, camera))
+            Ok(triangles_of(&ordered, camera))
         })
         .collect()
 }
 
 /// The triangle of every pixel of one view, band by band as [`render_one`] draws it.
-fn triangles_of(mesh: &Mesh, camera: &Pinhole) -> Vec<i32> {
+fn triangles_of(mesh: &OrderedMesh<'_>, camera: &Pinhole) -> Vec<i32> {
     let (width, height) = (camera.width() as usize, camera.height() as usize);
     let mut triangles = vec![-1; width * height];
     let projection = Projection::new(mesh, camera);
@@ -210,13 +236,15 @@ fn check_scene(mesh: &Mesh, cameras: &[Pinhole]) -> Result<()> {
 /// What is to be drawn: checked, and with what all views of it share.
 pub(crate) struct Request<'a> {
     pub mesh: &'a Mesh,
+    /// The same in the order of drawing.
+    pub ordered: Arc<OrderedMesh<'a>>,
     pub color: &'a SurfaceColor<'a>,
     pub settings: &'a RenderSettings,
-    pub normals: CornerNormals,
+    pub normals: Arc<CornerNormals>,
     /// Centre and radius of the surface.
     pub sphere: Sphere,
     /// Light that reaches each vertex (n) where occlusion is asked for.
-    occlusion: Option<Vec<f32>>,
+    occlusion: Option<Arc<[f32]>>,
 }
 
 impl<'a> Request<'a> {
@@ -228,16 +256,44 @@ impl<'a> Request<'a> {
         cameras: &[Pinhole],
         settings: &'a RenderSettings,
     ) -> Result<Self> {
+        let mut requests = Self::for_each(mesh, std::slice::from_ref(color), cameras, settings)?;
+        Ok(requests.swap_remove(0))
+    }
+
+    /// One for each colouring, with everything shared that they have in common.
+    ///
+    /// # Errors
+    /// As [`render_colorings`].
+    fn for_each(
+        mesh: &'a Mesh,
+        colorings: &'a [SurfaceColor<'a>],
+        cameras: &[Pinhole],
+        settings: &'a RenderSettings,
+    ) -> Result<Vec<Self>> {
+        if colorings.is_empty() {
+            return Err(Error::invalid("colourings", "at least one", "none"));
+        }
         settings.check()?;
-        color.check(mesh)?;
+        colorings.iter().try_for_each(|color| color.check(mesh))?;
         check_scene(mesh, cameras)?;
+        let is_lit = |color: &SurfaceColor<'_>| !matches!(color, SurfaceColor::Normals);
         let strength = settings.occlusion as f32;
-        let is_lit = !matches!(color, SurfaceColor::Normals);
-        let occlusion = (is_lit && settings.occlusion > 0.0).then(|| {
+        let occlusion = (strength > 0.0 && colorings.iter().any(is_lit)).then(|| {
             openness(mesh).into_iter().map(|open| 1.0 - strength * (1.0 - open)).collect()
         });
-        let normals = CornerNormals::new(mesh, settings.crease);
-        Ok(Self { mesh, color, settings, normals, sphere: surface_sphere(mesh), occlusion })
+        let ordered = Arc::new(OrderedMesh::new(mesh));
+        let normals = Arc::new(CornerNormals::new(mesh, settings.crease));
+        let sphere = surface_sphere(mesh);
+        let request = |color| Self {
+            mesh,
+            ordered: Arc::clone(&ordered),
+            color,
+            settings,
+            normals: Arc::clone(&normals),
+            sphere,
+            occlusion: occlusion.clone().filter(|_| is_lit(color)),
+        };
+        Ok(colorings.iter().map(request).collect())
     }
 
     /// Share of the light that reaches a vertex.
@@ -261,11 +317,11 @@ impl<'a> Request<'a> {
         [columns, rows]: [Range<usize>; 2],
         samples: impl Iterator<Item = (i32, f32)>,
     ) {
-        let projection = Projection::new(self.mesh, &view.camera);
+        let projection = Projection::new(&self.ordered, &view.camera);
         let width = view.camera.width() as usize;
         let first = rows.start * width * 3;
         let raster = Raster::of(self.settings.supersampling, columns, rows, samples);
-        shade::Shader::new(&projection, self).mix(&raster, &mut view.rgb[first..], width);
+        Shader::new(&projection, self).mix(&raster, &mut view.rgb[first..], width);
     }
 }
 
@@ -295,21 +351,31 @@ pub(crate) fn blank(camera: &Pinhole, settings: &RenderSettings) -> View {
     }
 }
 
-fn render_one(request: &Request<'_>, camera: &Pinhole) -> View {
-    let settings = request.settings;
+/// One view for each request: they differ in their colours alone.
+fn render_one(requests: &[Request<'_>], camera: &Pinhole) -> Vec<View> {
+    let Some(&Request { settings, ref ordered, .. }) = requests.first() else { return Vec::new() };
     let (width, height) = (camera.width() as usize, camera.height() as usize);
-    let projection = Projection::new(request.mesh, camera);
-    let light = shade::Shader::new(&projection, request);
-    let mut view = blank(camera, settings);
+    let projection = Projection::new(ordered, camera);
+    let shaders: Vec<Shader<'_>> =
+        requests.iter().map(|request| Shader::new(&projection, request)).collect();
+    let View { rgb, mut depth, mut triangles, .. } = blank(camera, settings);
+    let mut pictures = vec![rgb; requests.len()];
     let window = projection.window();
     let samples_per_row = window[0].len() * (settings.supersampling as usize).pow(2);
     let rows_per_band = (BAND_SAMPLES / samples_per_row.max(1)).clamp(1, height);
     let band_pixels = rows_per_band * width;
-    view.rgb
-        .par_chunks_mut(band_pixels * 3)
-        .zip(view.depth.par_chunks_mut(band_pixels).zip(view.triangles.par_chunks_mut(band_pixels)))
+    // Of each band its part of every picture.
+    let mut bands: Vec<Vec<&mut [u8]>> = Vec::new();
+    bands.resize_with(height.div_ceil(rows_per_band), Vec::new);
+    for rgb in &mut pictures {
+        let parts = rgb.chunks_mut(band_pixels * 3);
+        bands.iter_mut().zip(parts).for_each(|(band, part)| band.push(part));
+    }
+    bands
+        .par_iter_mut()
+        .zip(depth.par_chunks_mut(band_pixels).zip(triangles.par_chunks_mut(band_pixels)))
         .enumerate()
-        .for_each(|(band, (rgb, (depth, triangles)))| {
+        .for_each(|(band, (pictures, (depth, triangles)))| {
             let first = band * rows_per_band;
             let [columns, rows] = window.clone();
             let rows = rows.start.max(first)..rows.end.min(first + depth.len() / width);
@@ -331,8 +397,13 @@ fn render_one(request: &Request<'_>, camera: &Pinhole) -> View {
                     *triangle = hit.face().map_or(-1, |face| face as i32);
                 }
             }
-            light.mix(&samples, &mut rgb[skipped * 3..], width);
+            for (shader, rgb) in shaders.iter().zip(pictures) {
+                shader.mix(&samples, &mut rgb[skipped * 3..], width);
+            }
         });
-    request.finish(&mut view);
-    view
+    let view =
+        |rgb| View { camera: *camera, rgb, depth: depth.clone(), triangles: triangles.clone() };
+    let mut views: Vec<View> = pictures.into_iter().map(view).collect();
+    requests.iter().zip(&mut views).for_each(|(request, view)| request.finish(view));
+    views
 }

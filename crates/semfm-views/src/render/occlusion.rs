@@ -6,6 +6,7 @@ use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{Intrinsics, Mesh, Pinhole, PixelDepth, Sphere, surface_sphere};
 
 use super::depth_lookup::inverse_depths;
+use super::ordered_mesh::OrderedMesh;
 use super::triangle::Projection;
 use semfm_geom::sampling::fibonacci_directions;
 
@@ -27,7 +28,7 @@ const TOLERANCE: f64 = 0.01;
 /// winding is asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
 /// Vertices of no triangle have 1.
 pub fn openness(mesh: &Mesh) -> Vec<f32> {
-    let Sphere { centre, radius } = surface_sphere(mesh);
+    let sphere = surface_sphere(mesh);
     let directions: Vec<DVec3> =
         fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
     let normals: Vec<DVec3> =
@@ -35,6 +36,7 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
     // For each direction d: which vertices are in sight from there, and the weight w_d = Σ |N·d| over the
     // scaled normals N of a vertex's triangles. The openness is
     //   min(1, 2 · Σ_{d in sight} w_d / Σ_d w_d).
+    let ordered = OrderedMesh::new(mesh);
     let looks: Vec<(Vec<bool>, Vec<f64>)> = directions
         .par_iter()
         .map(|&direction| {
@@ -43,7 +45,7 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
                 let weight = normal.dot(direction).abs();
                 ids.iter().for_each(|&id| weights[id as usize] += weight);
             }
-            (vertices_in_sight(mesh, centre, radius, direction), weights)
+            (vertices_in_sight(mesh, &ordered, sphere, direction), weights)
         })
         .collect();
     let open = (0..mesh.n_vertices()).map(|id| {
@@ -58,7 +60,12 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
 }
 
 /// Which vertices (n) an eye far away in a direction sees.
-fn vertices_in_sight(mesh: &Mesh, centre: DVec3, radius: f64, direction: DVec3) -> Vec<bool> {
+fn vertices_in_sight(
+    mesh: &Mesh,
+    ordered: &OrderedMesh<'_>,
+    Sphere { centre, radius }: Sphere,
+    direction: DVec3,
+) -> Vec<bool> {
     let right = direction.any_orthonormal_vector();
     let turn = DMat3::from_cols(right, right.cross(direction), -direction).transpose();
     let eye = centre + DISTANCE * radius * direction;
@@ -69,7 +76,7 @@ fn vertices_in_sight(mesh: &Mesh, centre: DVec3, radius: f64, direction: DVec3) 
         .expect("a mesh has finite bounds, so the eye does");
     let projected: Vec<PixelDepth> = mesh.vertices().iter().map(|&p| camera.project(p)).collect();
     let positions: Vec<[f64; 2]> = projected.iter().map(|p| [p.u, p.v]).collect();
-    let nearest = inverse_depths(&Projection::new(mesh, &camera), &positions);
+    let nearest = inverse_depths(&Projection::new(ordered, &camera), &positions);
     let tolerance = TOLERANCE * radius;
     projected.iter().zip(nearest).map(|(p, inverse)| p.z <= 1.0 / inverse + tolerance).collect()
 }

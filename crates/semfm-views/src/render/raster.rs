@@ -14,6 +14,7 @@ impl Hit {
     /// Endlessly far: also what triangles beyond f32's range come to.
     const NONE: Self = Self(0);
 
+    #[inline(always)]
     fn new(inverse_depth: f32, face: u32) -> Self {
         Self(u64::from(inverse_depth.to_bits()) << 32 | u64::from(!face))
     }
@@ -82,6 +83,11 @@ impl Raster {
         [self.reach(bounds, 0, &self.columns), self.reach(bounds, 1, &self.rows)]
     }
 
+    /// Whether a rectangle reaches any sample.
+    fn has_samples(&self, bounds: PixelBox) -> bool {
+        !self.within(bounds).iter().any(Range::is_empty)
+    }
+
     /// Those along one axis.
     fn reach(&self, bounds: PixelBox, axis: usize, allowed: &Range<usize>) -> Range<usize> {
         let per_pixel = f64::from(self.per_pixel);
@@ -90,6 +96,7 @@ impl Raster {
         ceil(bounds.low[axis] * per_pixel - 0.5).max(allowed.start)..end.min(allowed.end)
     }
 
+    #[inline(always)] // into the dispatch to vector instructions
     fn draw(&mut self, face: u32, forms: &TriangleForms, [columns, rows]: [Range<usize>; 2]) {
         let per_pixel = f64::from(self.per_pixel);
         let edges = forms.weights.map(|weight| Edge::new(weight, per_pixel));
@@ -126,17 +133,26 @@ impl pulp::WithSimd for DrawAll<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        for face in 0..self.projection.mesh.n_faces() {
-            let bounds = self.projection.pixel_box(face);
-            let mut forms = None;
-            for raster in &mut *self.rasters {
-                let within = raster.within(bounds);
-                // Most triangles of a dense mesh miss every sample: leave before any arithmetic.
-                if within.iter().any(Range::is_empty) {
+        let mesh = self.projection.mesh;
+        for (places, block) in mesh.blocks() {
+            if let Some(block) = block {
+                let bounds = self.projection.block_box(block);
+                if !self.rasters.iter().any(|raster| raster.has_samples(bounds)) {
                     continue;
                 }
-                if let Some(forms) = forms.get_or_insert_with(|| self.projection.forms(face)) {
-                    raster.draw(face as u32, forms, within);
+            }
+            for place in places {
+                let bounds = self.projection.pixel_box(place);
+                let mut forms = None;
+                for raster in &mut *self.rasters {
+                    let within = raster.within(bounds);
+                    // Most triangles of a dense mesh miss every sample: leave before any arithmetic.
+                    if within.iter().any(Range::is_empty) {
+                        continue;
+                    }
+                    if let Some(forms) = forms.get_or_insert_with(|| self.projection.forms(place)) {
+                        raster.draw(mesh.id(place), forms, within);
+                    }
                 }
             }
         }
@@ -156,6 +172,7 @@ struct Edge {
 }
 
 impl Edge {
+    #[inline(always)]
     fn new(weight: LinearForm, per_pixel: f64) -> Self {
         let (far, half) = (f64::INFINITY, -0.5);
         let (to_low, to_high) = if weight.du < 0.0 { (-far, half) } else { (half, far) };
@@ -169,6 +186,7 @@ impl Edge {
 ///
 /// Two triangles compute the same crossing for the edge they share, so one takes the columns up to
 /// it and the other those from it on.
+#[inline(always)]
 fn span(edges: &[Edge; 3], v: f64, columns: &Range<usize>) -> Range<usize> {
     let (mut low, mut high) = (columns.start as f64, columns.end as f64 - 1.0);
     for edge in edges {
@@ -183,17 +201,20 @@ fn span(edges: &[Edge; 3], v: f64, columns: &Range<usize>) -> Range<usize> {
 }
 
 /// The larger number, `low` where the other is NaN: one instruction, unlike `f64::max`.
+#[inline(always)]
 fn at_least(low: f64, x: f64) -> f64 {
     if x > low { x } else { low }
 }
 
 /// The smaller number, `high` where the other is NaN.
+#[inline(always)]
 fn at_most(high: f64, x: f64) -> f64 {
     if x < high { x } else { high }
 }
 
 /// Smallest index that is not below `x`; 0 for anything negative or NaN. (`f64::ceil` is a call
 /// on processors without SSE 4.1, and casts to `usize` are slow on x86.)
+#[inline(always)]
 fn ceil(x: f64) -> usize {
     let below = x.max(0.0) as i32;
     below as usize + usize::from(f64::from(below) < x)

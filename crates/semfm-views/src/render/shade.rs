@@ -142,7 +142,7 @@ impl<'a> Shader<'a> {
     /// with the ambient share a, the corner's normal n, the direction l of the light, and the share o
     /// of the light that reaches the vertex.
     fn brightness(&self, face: usize) -> [f64; 3] {
-        let (ambient, ids) = (self.settings.ambient, self.projection.mesh.faces()[face]);
+        let (ambient, ids) = (self.settings.ambient, self.request.mesh.faces()[face]);
         let normals = self.request.normals.0[face];
         [0, 1, 2].map(|corner| {
             let normal = DVec3::from_array(normals[corner].map(f64::from));
@@ -154,7 +154,7 @@ impl<'a> Shader<'a> {
 
     /// The corners' normals in camera axes, on the side that the camera sees, as colors.
     fn normal_colours(&self, face: usize) -> [[f32; 3]; 3] {
-        let (mesh, camera) = (self.projection.mesh, self.projection.camera);
+        let (mesh, camera) = (self.request.mesh, self.projection.camera);
         let towards = camera.eye() - mesh.vertices()[mesh.faces()[face][0] as usize];
         let side = mesh.face_normal_scaled(face).dot(towards).signum();
         self.request.normals.0[face].map(|normal| {
@@ -314,7 +314,7 @@ impl Shader<'_> {
 
     fn look_up(&self, face: usize) -> Known {
         let light = self.brightness(face);
-        let ids = self.projection.mesh.faces()[face];
+        let ids = self.request.mesh.faces()[face];
         let corners = match self.request.color {
             SurfaceColor::Uniform(colour) => light.map(|light| lit(*colour, light)),
             SurfaceColor::Vertices(colors) => {
@@ -323,7 +323,8 @@ impl Shader<'_> {
             SurfaceColor::Normals => self.normal_colours(face),
             SurfaceColor::Surface(_) => [[0.0; 3]; 3],
         };
-        Known { face, forms: self.projection.forms(face), light, corners }
+        let forms = self.projection.forms(self.projection.mesh.place(face));
+        Known { face, forms, light, corners }
     }
 }
 

@@ -15,8 +15,10 @@
 
 use std::ops::Range;
 
+use semfm_geom::Pinhole;
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, Pinhole};
+
+use super::ordered_mesh::{Block, OrderedMesh};
 
 /// Bounding rectangles are widened by this many pixels, so that rounding in the projection never
 /// cuts off what the exact half-planes would keep.
@@ -67,10 +69,16 @@ pub(crate) struct PixelBox {
     pub high: [f64; 2],
 }
 
+impl PixelBox {
+    pub fn holds(&self, [u, v]: [f64; 2]) -> bool {
+        self.low[0] <= u && u <= self.high[0] && self.low[1] <= v && v <= self.high[1]
+    }
+}
+
 /// A mesh before a camera: vertices in camera coordinates and where they fall in the image.
 pub(crate) struct Projection<'a> {
     pub camera: &'a Pinhole,
-    pub mesh: &'a Mesh,
+    pub mesh: &'a OrderedMesh<'a>,
     lens: Lens,
     points: Vec<DVec3>,
     /// Pixel position of each vertex; NaN at and behind the camera's plane.
@@ -89,12 +97,9 @@ pub(crate) struct TriangleForms {
 }
 
 impl<'a> Projection<'a> {
-    pub fn new(mesh: &'a Mesh, camera: &'a Pinhole) -> Self {
-        let points: Vec<DVec3> = mesh
-            .vertices()
-            .iter()
-            .map(|&p| camera.camera_from_world().transform_point3(p))
-            .collect();
+    pub fn new(mesh: &'a OrderedMesh<'a>, camera: &'a Pinhole) -> Self {
+        let points: Vec<DVec3> =
+            mesh.vertices.iter().map(|&p| camera.camera_from_world().transform_point3(p)).collect();
         let pixel = |p: &DVec3| {
             if p.z > 0.0 {
                 [camera.fx() * p.x / p.z + camera.cx(), camera.fy() * p.y / p.z + camera.cy()]
@@ -112,14 +117,40 @@ impl<'a> Projection<'a> {
         Self { camera, mesh, lens, points, pixels }
     }
 
-    /// Where triangle `face` can be in the image: everywhere, if it reaches behind the camera.
-    pub fn pixel_box(&self, face: usize) -> PixelBox {
-        let [a, b, c] = self.mesh.faces()[face].map(|id| self.pixels[id as usize]);
+    /// Where a block of triangles can be in the image: everywhere, if its ball reaches behind the camera.
+    ///
+    /// The ball lies in the box |p − c| ≤ r of camera coordinates, in which u = fx·x/z + cx is least and
+    /// largest at corners.
+    pub fn block_box(&self, block: Block) -> PixelBox {
+        let centre = self.camera.camera_from_world().transform_point3(block.centre);
+        // A pose may be 1e-5 from orthonormal; rounding must not cut anything off either.
+        let radius = (1.0 + 1e-4) * block.radius + 1e-9 * centre.abs().max_element();
+        let (near, far) = (centre.z - radius, centre.z + radius);
+        if near.is_nan() || near <= 0.0 {
+            return PixelBox { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
+        }
+        let axes = [
+            (centre.x, self.camera.fx(), self.camera.cx()),
+            (centre.y, self.camera.fy(), self.camera.cy()),
+        ];
+        let over = |x: f64, if_positive: f64, if_negative: f64| {
+            x / if x > 0.0 { if_positive } else { if_negative }
+        };
+        PixelBox {
+            low: axes.map(|(x, f, c)| f * over(x - radius, far, near) + c - MARGIN),
+            high: axes.map(|(x, f, c)| f * over(x + radius, near, far) + c + MARGIN),
+        }
+    }
+
+    /// Where the triangle at a place of the order can be in the image: everywhere, if it reaches behind the
+    /// camera.
+    pub fn pixel_box(&self, place: usize) -> PixelBox {
+        let [a, b, c] = self.mesh.faces[place].map(|id| self.pixels[id as usize]);
         let (mut low, mut high) = ([0.0; 2], [0.0; 2]);
         for k in 0..2 {
             // f64::min would pass over the NaN that marks a corner behind the camera.
             if a[k].is_nan() || b[k].is_nan() || c[k].is_nan() {
-                return self.box_behind(face);
+                return self.box_behind(place);
             }
             low[k] = a[k].min(b[k]).min(c[k]) - MARGIN;
             high[k] = a[k].max(b[k]).max(c[k]) + MARGIN;
@@ -128,8 +159,8 @@ impl<'a> Projection<'a> {
     }
 
     #[cold]
-    fn box_behind(&self, face: usize) -> PixelBox {
-        let in_front = self.mesh.faces()[face].iter().any(|&id| self.points[id as usize].z > 0.0);
+    fn box_behind(&self, place: usize) -> PixelBox {
+        let in_front = self.mesh.faces[place].iter().any(|&id| self.points[id as usize].z > 0.0);
         let (low, high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
         if in_front { PixelBox { low, high } } else { PixelBox { low: high, high: low } }
     }
@@ -154,9 +185,9 @@ impl<'a> Projection<'a> {
         })
     }
 
-    /// The linear forms of triangle `face`, `None` where it is seen exactly edge-on.
-    pub fn forms(&self, face: usize) -> Option<TriangleForms> {
-        let [a, b, c] = self.mesh.faces()[face].map(|id| self.points[id as usize]);
+    /// The linear forms of the triangle at a place of the order, `None` where it is seen exactly edge-on.
+    pub fn forms(&self, place: usize) -> Option<TriangleForms> {
+        let [a, b, c] = self.mesh.faces[place].map(|id| self.points[id as usize]);
         let normal = (b - a).cross(c - a);
         let volume = normal.dot(a);
         if volume == 0.0 || !volume.is_finite() {

@@ -13,6 +13,7 @@
 //! | `plan.json` | `semfm.plan/1` | [`PlanFile`] |
 //! | `trajectory.json` | `semfm.trajectory/1` | [`TrajectoryFile`] |
 //! | lines of `track` | `semfm.track/1` | [`TrackLine`] |
+//! | `surface.json` of an observed surface | `semfm.surface/1` | `SurfaceFile` (feature `mcap`) |
 //!
 //! [`write_transfer`] writes the folder of a transfer, [`StoredTransfer`] reads it. Grasps are also written as Isaac's YAML
 //! ([`write_isaac_grasps`]) and as a ROS 2 bag (`write_ros2_grasps`, feature `mcap`), a motion and a track as others
@@ -116,7 +117,7 @@ pub use trajectory::{
 };
 pub use transfer_folder::{
     ANSWERS as TRANSFER_ANSWERS, AnchorRanks, FILES as TRANSFER_FILES, ObjectAnchors,
-    TransferResult, put_transfer, write_answer, write_transfer,
+    TransferResult, put_transfer, write_answer, write_transfer, write_transfer_data,
 };
 pub use transfer_report::{
     CloudRecord, ObjectRecord, Provenance, Seeds, TransferInputs, TransferReportFile, stages_ms,

@@ -158,10 +158,19 @@ pub fn write_transfer(
 ) -> Result<Vec<PathBuf>> {
     let start = Instant::now();
     let staged = StagedFolder::new(folder)?;
-    region_file(staged.path(), result)?;
-    data_files(staged.path(), result, task)?;
+    write_transfer_data(staged.path(), result, task)?;
     result.write_report(staged.path(), start)?;
     put_transfer(staged)
+}
+
+/// Writes the files of [`write_transfer`] but for the report into a folder that is not in its place yet, and touches no
+/// other: pictures may be drawn into it meanwhile.
+///
+/// # Errors
+/// As [`write_transfer`].
+pub fn write_transfer_data(folder: &Path, result: &TransferResult<'_>, task: &Task) -> Result<()> {
+    region_file(folder, result)?;
+    data_files(folder, result, task)
 }
 
 /// Writes only the answer of a transfer into `folder`, which is made if it is not there:
