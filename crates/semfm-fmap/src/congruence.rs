@@ -11,6 +11,7 @@
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use rayon::prelude::*;
 use semfm_geom::math::{DAffine3, DMat3, DVec3};
 use semfm_geom::{SurfaceMoments, SurfacePoint};
 
@@ -208,12 +209,13 @@ impl Laid {
     fn new(pair: &Pair, motion: &Candidate, tolerance: f64) -> Option<Self> {
         let on_source = pair.source.surface().ok()?;
         let faces = pair.source.shape().surface().faces();
-        let (mut certainties, mut places) = (Vec::new(), Vec::new());
-        for &p in pair.target.shape().surface().vertices() {
+        let vertices = pair.target.shape().surface().vertices();
+        let laid = vertices.par_iter().map(|&p| {
             let hit = on_source.closest(motion.source_from_target.transform_point3(p))?;
-            certainties.push((2.0 - hit.distance / tolerance).clamp(0.0, 1.0));
-            places.push(Place { corners: faces[hit.face as usize], weights: hit.barycentric });
-        }
+            let certainty = (2.0 - hit.distance / tolerance).clamp(0.0, 1.0);
+            Some((certainty, Place { corners: faces[hit.face as usize], weights: hit.barycentric }))
+        });
+        let (certainties, places) = laid.collect::<Option<Vec<_>>>()?.into_iter().unzip();
         Some(Self { certainties, places })
     }
 }

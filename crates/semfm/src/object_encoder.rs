@@ -125,7 +125,7 @@ impl ObjectEncoder {
     /// say anything to the encoder; made where they are not there yet.
     ///
     /// # Errors
-    /// [`Error::Encoder`](crate::Error::Encoder) where the object cannot be drawn or encoded, or the
+    /// [`Error::Encoder`] where the object cannot be drawn or encoded, or the
     /// encoder's files cannot be read. Trouble with what is kept is never an error.
     pub fn embed<'a>(
         &self,
@@ -179,7 +179,7 @@ impl ObjectEncoder {
     /// The encoder that made a file, as far as its name tells, at that file's rotations: for the other object of a pair.
     ///
     /// # Errors
-    /// As [`open_encoder`]; [`Error::Invalid`](crate::Error::Invalid) for embeddings that no network made.
+    /// As [`open_encoder`]; [`Error::Invalid`] for embeddings that no network made.
     pub fn of_file(
         file: &EmbeddingsFile,
         settings: &OpenSettings,
@@ -197,7 +197,7 @@ impl ObjectEncoder {
     /// shown in its own.
     ///
     /// # Errors
-    /// As [`ObjectEncoder::embed`]; [`Error::Invalid`](crate::Error::Invalid) where this is another encoder, or another
+    /// As [`ObjectEncoder::embed`]; [`Error::Invalid`] where this is another encoder, or another
     /// version of it, than made the file.
     pub fn embed_beside<'a>(
         &self,
