@@ -13,6 +13,7 @@
 #![allow(clippy::print_stdout, reason = "the numbers are what this program is for")]
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::error::Error;
 use std::path::Path;
 
@@ -157,14 +158,14 @@ impl Bench {
             let noisy = Change::Noisy.copy(target.mesh(), &truth.mask(), 0)?.mesh;
             let mut prepared = |entry: &ObjectEntry, place, mesh: &Mesh, is_noisy, seed| {
                 let key = (place, is_noisy, seed);
-                if !kept.contains_key(&key) {
-                    kept.insert(
-                        key,
-                        self.prepare(mesh.clone(), seed)
-                            .map_err(|e| format!("{}: {e}", entry.name))?,
-                    );
-                }
-                Ok::<Prepared, Box<dyn Error + Send + Sync>>(kept[&key].clone())
+                let made = match kept.entry(key) {
+                    Entry::Occupied(made) => made.get().clone(),
+                    Entry::Vacant(place) => {
+                        let made = self.prepare(mesh.clone(), seed);
+                        place.insert(made.map_err(|e| format!("{}: {e}", entry.name))?).clone()
+                    }
+                };
+                Ok::<Prepared, Box<dyn Error + Send + Sync>>(made)
             };
             let mut answers = Vec::new();
             for seed in [0].into_iter().chain(OTHER_SEEDS) {
