@@ -163,11 +163,11 @@ impl Congruence {
 
     /// Partners on the source's working mesh in place of those of a point map, where they are certain.
     pub fn correct(&self, points: &mut PointMap, source: &PreparedObject, target: &PreparedObject) {
-        let of_original = &source.shape().working().of_original;
-        let vertices = target.shape().working().to_original.iter().zip(&mut points.source_of);
         if !self.others.is_empty() {
             return; // the map's own choice among them stands
         }
+        let of_original = &source.shape().working().of_original;
+        let vertices = target.shape().working().to_original.iter().zip(&mut points.source_of);
         for (&v, partner) in vertices.filter(|(v, _)| self.certainty[**v as usize] >= 0.5) {
             *partner = of_original[self.places[v as usize].nearest_corner() as usize];
         }
@@ -226,23 +226,19 @@ fn share_lying(pair: &Pair, motion: &Candidate, tolerance: f64) -> Result<f64> {
     let (on_source, on_target) = (source.surface()?, target.surface()?);
     let (there, scale) = (motion.source_from_target, motion.scale());
     let back = there.inverse();
-    let share = |distances: &mut dyn Iterator<Item = f64>| {
-        let (mut n, mut lying) = (0, 0);
-        for distance in distances {
-            n += 1;
-            lying += usize::from(distance <= tolerance);
-        }
-        lying as f64 / f64::from(n.max(1))
-    };
-    let of_target = share(
-        &mut positions(target).into_iter().map(|p| distance(on_source, there.transform_point3(p))),
-    );
-    let of_source = share(
-        &mut positions(source)
-            .into_iter()
-            .map(|p| scale * distance(on_target, back.transform_point3(p))),
-    );
+    let of_target = share_within(tolerance, &positions(target), |p| {
+        distance(on_source, there.transform_point3(p))
+    });
+    let of_source = share_within(tolerance, &positions(source), |p| {
+        scale * distance(on_target, back.transform_point3(p))
+    });
     Ok(of_target.min(of_source))
+}
+
+/// The share of points whose distance is at most the tolerance.
+fn share_within(tolerance: f64, points: &[DVec3], distance: impl Fn(DVec3) -> f64) -> f64 {
+    let n_within = points.iter().filter(|&&p| distance(p) <= tolerance).count();
+    n_within as f64 / points.len().max(1) as f64
 }
 
 /// Sorts similarities by how much features disagree, and returns by how much.

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use semfm_geom::Mesh;
+use semfm_geom::{DisjointSets, Mesh};
 use serde::{Deserialize, Serialize};
 
 use crate::Region;
-use crate::union_find::UnionFind;
 
 /// A further hypothesis needs this share of the votes.
 const LEAST_SHARE: f64 = 0.1;
@@ -100,8 +99,8 @@ pub(crate) fn is_connected(mesh: &Mesh, inside: &[bool], areas: &[f64]) -> bool 
 }
 
 /// The vertices inside, joined along the edges between them.
-fn components_of(mesh: &Mesh, inside: &[bool]) -> UnionFind {
-    let mut components = UnionFind::new(inside.len());
+fn components_of(mesh: &Mesh, inside: &[bool]) -> DisjointSets {
+    let mut components = DisjointSets::new(inside.len());
     for &[a, b, c] in mesh.faces() {
         for (i, j) in [(a, b), (b, c), (c, a)] {
             if inside[i as usize] && inside[j as usize] {

@@ -83,7 +83,6 @@ mod stages;
 mod test_objects;
 mod transfer;
 pub mod transport;
-mod union_find;
 pub mod zoomout;
 
 pub use anchors::{Anchor, Anchors, ClusteredCloud};

@@ -4,10 +4,9 @@
 //! [`propagation`](crate::propagation) spreads a vote along it.
 
 use faer::sparse::{SparseColMat, Triplet};
-use semfm_geom::PointIndex;
 use semfm_geom::math::DVec3;
+use semfm_geom::{DisjointSets, PointIndex};
 
-use crate::union_find::UnionFind;
 use crate::{Error, Result};
 
 /// An edge never weighs less: a part whose features resemble no neighbour's would otherwise fall off
@@ -77,7 +76,7 @@ fn neighbour_edges(points: &[DVec3], neighbours: usize) -> Result<Vec<(u32, u32)
     }
     edges.sort_unstable();
     edges.dedup();
-    let mut pieces = UnionFind::new(points.len());
+    let mut pieces = DisjointSets::new(points.len());
     let joined = edges.iter().filter(|&&(i, j)| pieces.join(i, j)).count();
     if joined + 1 < points.len() {
         let bridges: Vec<_> =
@@ -127,7 +126,7 @@ mod tests {
             .map(|p| if p.x < 20.0 { p } else { p + 1000.0 * DVec3::X })
             .collect();
         let edges = neighbour_edges(&points, 4).unwrap();
-        let mut pieces = UnionFind::new(60);
+        let mut pieces = DisjointSets::new(60);
         edges.iter().for_each(|&(i, j)| {
             pieces.join(i, j);
         });

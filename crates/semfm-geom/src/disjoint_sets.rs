@@ -1,7 +1,15 @@
 //! Union–find with path halving (R. E. Tarjan, 1975).
 
 /// A partition of 0..n into sets, each named by its lowest member.
-pub(crate) struct DisjointSets {
+///
+/// ```
+/// use semfm_geom::DisjointSets;
+/// let mut sets = DisjointSets::new(3);
+/// assert!(sets.join(2, 1) && !sets.join(1, 2));
+/// assert_eq!([sets.root(0), sets.root(1), sets.root(2)], [0, 1, 1]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct DisjointSets {
     /// Of each member; the lowest of its set is its own.
     parent: Vec<u32>,
 }
@@ -22,10 +30,11 @@ impl DisjointSets {
         id
     }
 
-    /// Makes one set of those of `a` and `b`.
-    pub fn join(&mut self, a: u32, b: u32) {
+    /// Makes one set of those of `a` and `b`; false where they were one already.
+    pub fn join(&mut self, a: u32, b: u32) -> bool {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
+        a != b
     }
 }
 
@@ -36,9 +45,8 @@ mod tests {
     #[test]
     fn the_lowest_member_names_the_set_in_whatever_order_it_was_joined() {
         let mut sets = DisjointSets::new(6);
-        sets.join(5, 3);
-        sets.join(4, 5);
-        sets.join(1, 4);
+        assert!(sets.join(5, 3) && sets.join(4, 5) && sets.join(1, 4));
+        assert!(!sets.join(3, 1), "they are one set already");
         let roots: Vec<u32> = (0..6).map(|id| sets.root(id)).collect();
         assert_eq!(roots, [0, 1, 2, 1, 1, 1]);
     }

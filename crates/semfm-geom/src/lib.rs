@@ -50,6 +50,7 @@ pub use cholesky::{CholeskyAnalysis, SparseCholesky};
 pub use clean::{CleanReport, CleanSettings, Cleaned, clean};
 pub use confidence_weights::ConfidenceWeights;
 pub use denoise::noise_free;
+pub use disjoint_sets::DisjointSets;
 pub use eigenbasis::Eigenbasis;
 pub use error::{Error, Result};
 pub use extent::{Sphere, surface_sphere, surface_vertices};

@@ -6,7 +6,7 @@ use isosurface::extractor::IndexedVertices;
 use isosurface::math::Vec3;
 use isosurface::sampler::Sampler;
 use isosurface::source::ScalarSource;
-use semfm_geom::math::{DVec3, bounds};
+use semfm_geom::math::DVec3;
 use semfm_geom::{Mesh, Pinhole};
 
 use crate::observation::{Mask, Observation};
@@ -55,8 +55,9 @@ pub fn merged_surface(
 ) -> Result<MergedSurface> {
     let depths: Vec<FrameDepth<'_>> =
         frames.iter().map(|frame| FrameDepth::new(frame, settings)).collect::<Result<_>>()?;
-    let points: Vec<DVec3> = depths.iter().flat_map(FrameDepth::points).collect();
-    let Some((low, high)) = bounds(&points).filter(|_| !points.is_empty()) else {
+    let points = depths.iter().flat_map(FrameDepth::points);
+    let Some((low, high)) = points.map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    else {
         return Err(Error::invalid("frames", "at least one with depth under its mask", "none"));
     };
     let lattice = Lattice::around(low, high);

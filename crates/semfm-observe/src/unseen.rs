@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use semfm_geom::math::DVec3;
-use semfm_geom::{Mesh, PointIndex};
+use semfm_geom::{DisjointSets, Mesh, PointIndex};
 
 use crate::{Error, Result};
 
@@ -143,7 +143,7 @@ impl Sheet {
             face_at.get(&[a, b]) == Some(&face) && face_at.contains_key(&[b, a])
         };
         // Corners (3 · face + place) joined across shared edges.
-        let mut parent: Vec<usize> = (0..3 * faces.len()).collect();
+        let mut corners_of_fan = DisjointSets::new(3 * faces.len());
         for (face, corners) in faces.iter().enumerate() {
             for k in 0..3 {
                 let edge = [corners[k], corners[(k + 1) % 3]];
@@ -153,17 +153,15 @@ impl Sheet {
                 let other = face_at[&[edge[1], edge[0]]];
                 for (place, vertex) in [(k, edge[0]), ((k + 1) % 3, edge[1])] {
                     let there = faces[other].iter().position(|&v| v == vertex).unwrap_or(0);
-                    let [a, b] =
-                        [3 * face + place, 3 * other + there].map(|i| root(&mut parent, i));
-                    parent[a.max(b)] = a.min(b);
+                    corners_of_fan.join((3 * face + place) as u32, (3 * other + there) as u32);
                 }
             }
         }
-        let mut number = vec![None; parent.len()];
+        let mut number = vec![None; 3 * faces.len()];
         let mut vertex_of = Vec::new();
         let mut new_faces = vec![[0; 3]; faces.len()];
-        for corner in 0..parent.len() {
-            let at = root(&mut parent, corner);
+        for corner in 0..3 * faces.len() {
+            let at = corners_of_fan.root(corner as u32) as usize;
             new_faces[corner / 3][corner % 3] = *number[at].get_or_insert_with(|| {
                 vertex_of.push(faces[corner / 3][corner % 3]);
                 vertex_of.len() as u32 - 1
@@ -179,15 +177,6 @@ impl Sheet {
         }
         Self { vertex_of, faces: new_faces, border }
     }
-}
-
-/// The first of the corners that one is joined with; shortens the way there.
-fn root(parent: &mut [usize], mut corner: usize) -> usize {
-    while parent[corner] != corner {
-        parent[corner] = parent[parent[corner]];
-        corner = parent[corner];
-    }
-    corner
 }
 
 #[cfg(test)]

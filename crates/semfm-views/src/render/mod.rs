@@ -28,6 +28,7 @@ pub use shade::{CornerNormals, SurfaceColor};
 
 use crate::{Error, Result, View};
 pub use occlusion::openness;
+use occlusion::openness_of;
 use ordered_mesh::OrderedMesh;
 use raster::{DrawAll, Raster};
 use shade::Shader;
@@ -276,12 +277,15 @@ impl<'a> Request<'a> {
         settings.check()?;
         colorings.iter().try_for_each(|color| color.check(mesh))?;
         check_scene(mesh, cameras)?;
+        let ordered = Arc::new(OrderedMesh::new(mesh));
         let is_lit = |color: &SurfaceColor<'_>| !matches!(color, SurfaceColor::Normals);
         let strength = settings.occlusion as f32;
         let occlusion = (strength > 0.0 && colorings.iter().any(is_lit)).then(|| {
-            openness(mesh).into_iter().map(|open| 1.0 - strength * (1.0 - open)).collect()
+            openness_of(mesh, &ordered)
+                .into_iter()
+                .map(|open| 1.0 - strength * (1.0 - open))
+                .collect()
         });
-        let ordered = Arc::new(OrderedMesh::new(mesh));
         let normals = Arc::new(CornerNormals::new(mesh, settings.crease));
         let sphere = surface_sphere(mesh);
         let request = |color| Self {

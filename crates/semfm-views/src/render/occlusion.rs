@@ -28,6 +28,11 @@ const TOLERANCE: f64 = 0.01;
 /// winding is asked for, so open and badly oriented meshes have it, too; a sheet in free air has 1.
 /// Vertices of no triangle have 1.
 pub fn openness(mesh: &Mesh) -> Vec<f32> {
+    openness_of(mesh, &OrderedMesh::new(mesh))
+}
+
+/// The same of a mesh whose order of drawing is known.
+pub(super) fn openness_of(mesh: &Mesh, ordered: &OrderedMesh<'_>) -> Vec<f32> {
     let sphere = surface_sphere(mesh);
     let directions: Vec<DVec3> =
         fibonacci_directions(AXES).flat_map(|axis| [axis, -axis]).collect();
@@ -36,7 +41,6 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
     // For each direction d: which vertices are in sight from there, and the weight w_d = Σ |N·d| over the
     // scaled normals N of a vertex's triangles. The openness is
     //   min(1, 2 · Σ_{d in sight} w_d / Σ_d w_d).
-    let ordered = OrderedMesh::new(mesh);
     let looks: Vec<(Vec<bool>, Vec<f64>)> = directions
         .par_iter()
         .map(|&direction| {
@@ -45,7 +49,7 @@ pub fn openness(mesh: &Mesh) -> Vec<f32> {
                 let weight = normal.dot(direction).abs();
                 ids.iter().for_each(|&id| weights[id as usize] += weight);
             }
-            (vertices_in_sight(mesh, &ordered, sphere, direction), weights)
+            (vertices_in_sight(mesh, ordered, sphere, direction), weights)
         })
         .collect();
     let open = (0..mesh.n_vertices()).map(|id| {
