@@ -14,7 +14,7 @@ use crate::Result;
 use crate::rendered_views::{Coloring, RenderedObject, ViewSettings};
 
 /// Rotations that encoders need which mix the place in the picture into their tokens.
-#[cfg(any(feature = "mcap", feature = "onnx", feature = "siglip"))]
+#[cfg(any(feature = "mcap", feature = "onnx", feature = "siglip", test))]
 pub(crate) const PRETRAINED_ROLLS: u32 = 4;
 
 /// Name and version of an encoder: where either differs, so do the features.

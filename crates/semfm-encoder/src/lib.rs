@@ -24,7 +24,9 @@ mod net_file;
 mod network;
 mod observed_picture;
 mod open;
-#[cfg(any(feature = "onnx", feature = "siglip"))]
+// Tests of what needs no runtime run without the features, too.
+#[cfg(any(feature = "onnx", feature = "siglip", test))]
+#[cfg_attr(not(all(feature = "onnx", feature = "siglip")), allow(dead_code, unused_imports))]
 mod pretrained;
 pub mod rendered_views;
 mod turned;

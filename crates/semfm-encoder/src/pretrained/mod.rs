@@ -7,14 +7,14 @@
 
 mod content;
 mod encoder;
-#[cfg(feature = "onnx")]
+#[cfg(any(feature = "onnx", test))]
 mod onnx;
 mod resize;
 mod rolled_tokens;
-#[cfg(feature = "siglip")]
+#[cfg(any(feature = "siglip", test))]
 mod siglip;
 mod token_network;
 
 pub use encoder::PretrainedEncoder;
-#[cfg(feature = "siglip")]
+#[cfg(any(feature = "siglip", test))]
 pub(crate) use siglip::is_siglip_folder;

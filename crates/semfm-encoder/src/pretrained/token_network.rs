@@ -53,3 +53,20 @@ pub(crate) trait TokenNetwork: fmt::Debug + Send + Sync {
     /// [`Error::Network`](crate::Error::Network).
     fn tokens(&self, picture: &Picture) -> Result<Vec<RawTokens>>;
 }
+
+/// Channels first (dim × tokens) as tokens (tokens × dim).
+pub(crate) fn by_token(values: &[f32], dim: usize) -> Vec<f32> {
+    let n = values.len() / dim;
+    (0..n * dim).map(|place| values[place % dim * n + place / dim]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_first_become_tokens() {
+        // Two channels of three tokens.
+        assert_eq!(by_token(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 2), [1.0, 4.0, 2.0, 5.0, 3.0, 6.0]);
+    }
+}

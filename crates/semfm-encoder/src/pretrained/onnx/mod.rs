@@ -2,66 +2,27 @@
 
 mod description;
 mod external_files;
+mod guarded;
+#[cfg(feature = "onnx")]
 mod network;
+#[cfg(feature = "onnx")]
+mod read;
 
-use std::collections::BTreeMap;
-use std::path::Path;
+/// What computes: part of the version of embeddings. As in the root `Cargo.toml`.
+const RUNTIME: &str = "rten-0.24";
 
-use description::OnnxDescription;
-use external_files::external_files;
-use network::OnnxNetwork;
-use semfm_geom::io::{FormatError, read_file};
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
 
-use super::PretrainedEncoder;
-use super::content::Content;
-use crate::Result;
-use crate::open::OpenSettings;
+    use super::*;
 
-/// Largest network, and largest file with weights, that is read.
-const MAX_FILE: u64 = 8 << 30;
-
-impl PretrainedEncoder {
-    /// Reads an `ENCODER.json`, the ONNX network beside it and the files that hold its weights.
-    ///
-    /// # Errors
-    /// [`semfm_geom::Error::Io`] where a file cannot be read; [`Error::Format`](crate::Error::Format)
-    /// with the field for a description that breaks its format or names files outside of its folder,
-    /// and for a network that is damaged, that the runtime does not take, or whose inputs and outputs
-    /// are others than described.
-    pub fn read_onnx(path: &Path, settings: &OpenSettings) -> Result<Self> {
-        let json = read_at_most(path)?;
-        let description = OnnxDescription::parse(path, &json)?;
-        let onnx = description.network_path(path)?;
-        let bytes = read_at_most(&onnx)?;
-        let mut parts = BTreeMap::from([
-            ("description".to_owned(), hash_of(&json)),
-            ("network".to_owned(), hash_of(&bytes)),
-        ]);
-        let mut external = Vec::new();
-        for file in external_files(&onnx, &bytes)? {
-            let content = read_at_most(&file.path)?;
-            parts.insert(format!("weights {}", file.location), hash_of(&content));
-            external.push((file.location, content));
-        }
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let content = Content { name, runtime: network::RUNTIME, parts };
-        let preprocessing = description.preprocessing();
-        let network = OnnxNetwork::new(description, &onnx, bytes, external)?;
-        Ok(Self::new(Box::new(network), &content, preprocessing, settings.threads))
+    /// The version in the name of what computes is that of the workspace's table.
+    #[test]
+    fn the_runtime_is_the_one_that_is_linked() {
+        let table = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.toml");
+        let Ok(table) = std::fs::read_to_string(table) else { return };
+        let version = RUNTIME.strip_prefix("rten-").unwrap();
+        assert!(table.contains(&format!("rten = {{ version = \"{version}\"")));
     }
-}
-
-/// The bytes of a file of at most [`MAX_FILE`].
-fn read_at_most(path: &Path) -> Result<Vec<u8>> {
-    let about = std::fs::metadata(path)
-        .map_err(|source| semfm_geom::Error::Io { path: path.to_owned(), source })?;
-    if about.len() > MAX_FILE {
-        let expected = format!("at most {MAX_FILE} bytes");
-        return Err(FormatError::new(path, "size", expected, about.len().to_string()).into());
-    }
-    Ok(read_file(path)?)
-}
-
-fn hash_of(bytes: &[u8]) -> String {
-    blake3::hash(bytes).to_hex().to_string()
 }

@@ -1,7 +1,6 @@
 //! An ONNX network on the runtime `rten`.
 
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,12 +9,10 @@ use semfm_geom::io::FormatError;
 use semfm_views::PatchGrid;
 
 use super::description::{Layout, OnnxDescription};
+use super::guarded::guarded;
 use crate::Error;
 use crate::pretrained::resize::{Filter, resized};
-use crate::pretrained::token_network::{Picture, RawTokens, TokenNetwork};
-
-/// What computes: part of the version of embeddings. As in the root `Cargo.toml`.
-pub(super) const RUNTIME: &str = "rten-0.24";
+use crate::pretrained::token_network::{Picture, RawTokens, TokenNetwork, by_token};
 
 /// A network that was read, its input and outputs found.
 pub(super) struct OnnxNetwork {
@@ -120,12 +117,6 @@ impl OnnxNetwork {
     }
 }
 
-/// Channels first (dim × tokens) as tokens (tokens × dim).
-fn by_token(values: &[f32], dim: usize) -> Vec<f32> {
-    let n = values.len() / dim;
-    (0..n * dim).map(|place| values[place % dim * n + place / dim]).collect()
-}
-
 impl TokenNetwork for OnnxNetwork {
     /// Tokens tile the whole picture.
     fn grid(&self, height: usize, width: usize) -> crate::Result<PatchGrid> {
@@ -163,46 +154,5 @@ impl fmt::Debug for OnnxNetwork {
         f.debug_struct("OnnxNetwork")
             .field("description", &self.description)
             .finish_non_exhaustive()
-    }
-}
-
-/// Work of the runtime: its errors in words, and its panics as errors. A network is a program of
-/// somebody else, and the runtime takes some of what it says on trust.
-fn guarded<T, E: fmt::Display>(work: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(result) => result.map_err(|error| error.to_string()),
-        Err(panic) => {
-            let words = panic
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(format!("the runtime failed: {}", words.unwrap_or("without a reason")))
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn channels_first_become_tokens() {
-        // Two channels of three tokens.
-        assert_eq!(by_token(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 2), [1.0, 4.0, 2.0, 5.0, 3.0, 6.0]);
-    }
-
-    #[test]
-    fn a_panic_is_an_error() {
-        let error = guarded(|| -> Result<(), String> { panic!("number {}", 7) }).unwrap_err();
-        assert_eq!(error, "the runtime failed: number 7");
-    }
-
-    /// The version in the name of what computes is that of the workspace's table.
-    #[test]
-    fn the_runtime_is_the_one_that_is_linked() {
-        let table = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.toml");
-        let Ok(table) = std::fs::read_to_string(table) else { return };
-        let version = RUNTIME.strip_prefix("rten-").unwrap();
-        assert!(table.contains(&format!("rten = {{ version = \"{version}\"")));
     }
 }
