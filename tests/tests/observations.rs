@@ -59,9 +59,40 @@ fn files_become_a_scene_a_bag_and_a_scene_again() {
             "camera → world",
         ),
         (vec!["frames", "-o", &at("x")], "--color"),
+        (vec!["frames", &at("scene"), "-o", &at("x"), "--mask", &at("m.png")], "--mask"),
+        (vec!["frames", &at("scene"), "-o", &at("x"), "--depth-scale", "9"], "--depth"),
+        (vec!["frames", &at("scene"), "-o", &at("x"), "--max-gap", "1"], "BOP scene"),
+        (
+            vec![
+                "frames",
+                "--color",
+                &at("c.png"),
+                "--intrinsics",
+                &at("K.json"),
+                "-o",
+                &at("x"),
+                "--every",
+                "2",
+            ],
+            "--every",
+        ),
+        (
+            vec![
+                "frames",
+                "--color",
+                &at("c.png"),
+                "--intrinsics",
+                &at("K.json"),
+                "-o",
+                &at("x"),
+                "--fixed-frame",
+                "map",
+            ],
+            "--fixed-frame",
+        ),
     ] {
         let refused = run(&arguments);
-        assert_eq!(refused.code, Some(2));
+        assert_eq!(refused.code, Some(2), "{word}");
         assert!(refused.err.contains(word), "{word}: {}", refused.err);
     }
     assert!(!folder.path().join("x").exists(), "nothing half written");

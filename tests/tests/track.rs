@@ -9,7 +9,7 @@ use semfm::geom::io::write_mesh;
 use semfm::geom::math::{DAffine3, DVec3};
 use semfm::geom::zoo::icosphere;
 use semfm::geom::{Intrinsics, Pinhole};
-use semfm::observe::{Observation, write_bag};
+use semfm::observe::{Observation, write_bag, write_bop};
 use semfm::views::mcap::inspect;
 use semfm_tests::shell::{json, run};
 
@@ -120,6 +120,39 @@ fn a_bag_becomes_lines_a_bag_and_a_region() {
 }
 
 #[test]
+fn a_frame_without_depth_shows_nothing_and_does_not_end_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let at = |name: &str| path(name).to_str().unwrap().to_owned();
+    let ball = icosphere(4);
+    let points = ball.vertices().iter().map(|&p| p * AXES).collect();
+    write_mesh(path("mesh.obj"), &Mesh::new(points, ball.faces().to_vec()).unwrap()).unwrap();
+    let without_depth = |frame: usize| {
+        let empty = DepthImage::new(160, 120, vec![0.0; 160 * 120]).unwrap();
+        let mut none = Observation::new(*seen(frame).camera()).with_depth(empty).unwrap();
+        none.time_nanos = seen(frame).time_nanos;
+        none
+    };
+    // The object goes in frame 6.
+    let is_empty = |frame: usize| frame == 2 || frame == 4;
+    let frame = |i: usize| if is_empty(i) { without_depth(i) } else { seen(i) };
+    let frames: Vec<Observation> = (0..6).map(frame).collect();
+    write_bag(&path("seen.mcap"), &frames).unwrap();
+    write_bop(&path("scene"), &frames).unwrap();
+    for source in ["seen.mcap", "scene"] {
+        let output = at("track.jsonl");
+        let made = run(&["track", &at("mesh.obj"), &at(source), "-o", &output, "--scale", "1"]);
+        assert_eq!(made.code, Some(0), "{source}: {}", made.err);
+        assert!(made.err.contains("frame 2: the depth image is empty"), "{}", made.err);
+        assert_eq!(made.err.matches("is empty").count(), 1, "{}", made.err);
+        let found = lines(&path("track.jsonl"));
+        assert_eq!(found.len(), 6);
+        let states: Vec<&str> = found.iter().map(|line| line.state.as_str()).collect();
+        assert_eq!(states[..5], ["new", "tracking", "lost", "reacquired", "lost"], "{source}");
+    }
+}
+
+#[test]
 fn what_cannot_be_followed_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
@@ -131,7 +164,9 @@ fn what_cannot_be_followed_is_told() {
     std::fs::write(path("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
     let color = Observation::new(*frames[0].camera()).with_color(vec![[9; 3]; 160 * 120]).unwrap();
     write_bag(&path("color.mcap"), &[color]).unwrap();
+    write_bop(&path("scene"), &frames).unwrap();
     let (mesh, seen_bag, lines) = (at("mesh.obj"), at("seen.mcap"), at("track.jsonl"));
+    let scene = at("scene");
     for (arguments, word) in [
         (vec!["track", &mesh, &at("cut.mcap"), "-o", &lines], "cut"),
         (vec!["track", &mesh, &at("color.mcap"), "-o", &lines], "colour alone"),
@@ -140,6 +175,8 @@ fn what_cannot_be_followed_is_told() {
         (vec!["track", &mesh, &seen_bag, "-o", &lines, "--fixed-frame", "map"], "camera → world"),
         (vec!["track", &mesh, &seen_bag, "-o", &seen_bag], "seen.mcap"),
         (vec!["track", &mesh, &seen_bag, "-o", &lines, "--mcap", &lines], "own"),
+        (vec!["track", &mesh, &seen_bag, "-o", &lines, "--camera-frame", "eye"], "--mcap"),
+        (vec!["track", &mesh, &scene, "-o", &lines, "--fixed-frame", "map"], "BOP scene"),
     ] {
         let refused = run(&arguments);
         assert_eq!(refused.code, Some(2), "{word}");

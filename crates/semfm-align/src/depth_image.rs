@@ -32,10 +32,11 @@ pub(crate) struct ImageBounds {
 }
 
 impl DepthImage {
-    /// Checks the length; what is negative or not finite counts as no return (0).
+    /// Checks the length; what is negative or not finite counts as no return (0). An image in which nothing came back
+    /// ([`has_depth`](Self::has_depth)) is one, too: cameras send it now and then.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] where the array does not fit the size or holds no depth at all.
+    /// [`Error::OutOfRange`] where the array does not fit the size.
     pub fn new(width: usize, height: usize, mut depth: Vec<f32>) -> Result<Self> {
         if width.checked_mul(height) != Some(depth.len()) || depth.is_empty() {
             let expected = format!("{width} × {height} depths, at least one");
@@ -45,10 +46,6 @@ impl DepthImage {
             if !(z.is_finite() && *z > 0.0) {
                 *z = 0.0;
             }
-        }
-        if depth.iter().all(|&z| z == 0.0) {
-            let found = format!("{} pixels without", depth.len());
-            return Err(out_of_range("depth image", "at least one pixel with a depth", found));
         }
         Ok(Self { width, height, depth })
     }
@@ -61,6 +58,11 @@ impl DepthImage {
     /// Height in pixels.
     pub fn height(&self) -> usize {
         self.height
+    }
+
+    /// Whether anything came back.
+    pub fn has_depth(&self) -> bool {
+        self.depth.iter().any(|&z| z > 0.0)
     }
 
     /// Depth of every pixel (height × width, row-major), 0 where nothing came back.
@@ -79,7 +81,7 @@ impl DepthImage {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a camera of another size, a mask of another size, or one under which
-    /// no pixel has a depth.
+    /// no pixel has a depth, and for an image without any.
     pub fn points(&self, camera: &Pinhole, mask: Option<&[bool]>) -> Result<DepthPoints> {
         if [camera.width() as usize, camera.height() as usize] != [self.width, self.height] {
             let expected = format!("{} × {} pixels, as the depth image", self.width, self.height);
@@ -89,6 +91,10 @@ impl DepthImage {
         if let Some(mask) = mask.filter(|mask| mask.len() != self.depth.len()) {
             let expected = format!("{} pixels, as the depth image", self.depth.len());
             return Err(out_of_range("mask", expected, mask.len()));
+        }
+        if !self.has_depth() {
+            let found = format!("{} pixels without", self.depth.len());
+            return Err(out_of_range("depth image", "at least one pixel with a depth", found));
         }
         let mut points = DepthPoints { object: Vec::new(), context: Vec::new() };
         for (pixel, &z) in self.depth.iter().enumerate().filter(|(_, z)| **z > 0.0) {
@@ -168,7 +174,9 @@ mod tests {
         let image = DepthImage::new(2, 1, vec![0.0, 1.0]).unwrap();
         let camera = camera(2, 1);
         let words = |result: Result<()>| result.unwrap_err().to_string();
-        assert!(words(DepthImage::new(2, 1, vec![0.0; 2]).map(drop)).contains("2 pixels without"));
+        let empty = DepthImage::new(2, 1, vec![0.0, f32::NAN]).unwrap();
+        assert!(image.has_depth() && !empty.has_depth());
+        assert!(words(empty.points(&camera, None).map(drop)).contains("2 pixels without"));
         assert!(words(DepthImage::new(2, 2, vec![1.0; 3]).map(drop)).contains("found 3"));
         assert!(words(image.points(&camera, Some(&[true, false])).map(drop)).contains("mask"));
         assert!(words(image.points(&camera, Some(&[true; 3])).map(drop)).contains("2 pixels"));

@@ -24,6 +24,16 @@ const MILLIMETRES: f64 = 1000.0;
 /// [`Error::Format`] for a picture of another kind (depth in 8 bits, or in a JPEG, was thrown away when it was
 /// written), or without any depth; [`Error::Invalid`] for a scale that is not positive.
 pub fn read_depth_image(path: &Path, per_metre: Option<f64>) -> Result<DepthImage> {
+    let image = read_depth_of_frame(path, per_metre)?;
+    if image.has_depth() {
+        return Ok(image);
+    }
+    let found = format!("{} pixels without", image.metres().len());
+    Err(FormatError::new(path, "depth image", "at least one pixel with a depth", found).into())
+}
+
+/// As [`read_depth_image`], of one frame of many: there may be no depth in it.
+pub(crate) fn read_depth_of_frame(path: &Path, per_metre: Option<f64>) -> Result<DepthImage> {
     if let Some(scale) = per_metre.filter(|&scale| !(scale > 0.0 && scale.is_finite())) {
         let expected = "a positive number of units per metre";
         return Err(Error::invalid("depth scale", expected, scale));

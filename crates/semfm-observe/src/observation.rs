@@ -130,7 +130,7 @@ impl Observation {
     /// nearest pixel, since a depth between a cup and the wall behind it is a depth of nothing.
     ///
     /// # Errors
-    /// [`Error::Align`] where no pixel with a depth is left, [`Error::Invalid`] where a mask is left without a pixel.
+    /// [`Error::Invalid`] where a mask is left without a pixel.
     pub fn undistorted(self, lens: &Distortion) -> Result<Self> {
         let sources = lens.sources(&self.camera);
         let [width, height] = self.size();

@@ -49,7 +49,7 @@ impl FirstPose {
         settings: &TrackSettings,
         task: &Task,
     ) -> Result<Option<Sim3>> {
-        if number < self.next_try {
+        if number < self.next_try || !frame.depth.has_depth() {
             return Ok(None);
         }
         self.next_try = number + self.wait;

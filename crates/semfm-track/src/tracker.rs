@@ -129,7 +129,7 @@ impl Tracker {
         Ok(self)
     }
 
-    /// The object in the next frame.
+    /// The object in the next frame. In one whose depth image is empty nothing is seen, and the object is lost.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a camera or a mask of another size than the depth image, and for a frame that is not later than

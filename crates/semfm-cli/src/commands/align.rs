@@ -69,7 +69,7 @@ struct ObservedOptions {
     #[arg(long, value_name = "DEPTH", requires = "intrinsics")]
     depth: Option<PathBuf>,
     /// Units of the depth image to the metre [default: 1000 for whole numbers, 1 for floats]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, requires = "depth")]
     depth_scale: Option<f64>,
     /// The camera: `{"fx", "fy", "cx", "cy"}` or `{"K": 3 × 3}`; with coefficients of distortion the image is undistorted
     #[arg(long, value_name = "K.json", requires = "depth")]
@@ -160,6 +160,9 @@ impl ObservedOptions {
     }
 
     fn read(&self, bag: &BagOptions) -> Result<Observed> {
+        if self.frame.is_none() {
+            bag.check_unused()?;
+        }
         if let Some(files) = self.depth_files() {
             let seen = files.read()?;
             let mask = seen.masks().first();
@@ -169,6 +172,7 @@ impl ObservedOptions {
         }
         if let Some(frame) = &self.frame {
             let (path, number) = parse_source(frame);
+            let number = number.unwrap_or(0);
             let SourceFrame { observation: seen, report } = read_source_frame(&path, number, bag)?;
             let mask = chosen_mask(&seen, self.object.as_deref())?;
             let mut notes = report.notes;

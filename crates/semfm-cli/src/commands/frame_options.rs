@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use semfm::files::read_rigid_pose;
 use semfm::geom::math::{DAffine3, DMat3};
 use semfm::observe::{
-    BagSettings, Mask, MaskFile, Observation, ObservationFiles, SourceReport, SourceSettings,
-    read_observations,
+    BagSettings, BopScene, Mask, MaskFile, Observation, ObservationFiles, SourceReport,
+    SourceSettings, read_observations,
 };
 
 /// The files of one frame.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Files")]
+#[command(next_help_heading = "Files", group = ArgGroup::new("picture").multiple(true).args(["color", "depth"]))]
 pub struct FrameFileOptions {
     /// A colour picture: PNG or JPEG
     #[arg(long, value_name = "IMAGE", requires = "intrinsics")]
@@ -22,10 +22,10 @@ pub struct FrameFileOptions {
     #[arg(long, value_name = "DEPTH", requires = "intrinsics")]
     pub depth: Option<PathBuf>,
     /// Units of the depth image to the metre [default: 1000 for whole numbers, 1 for floats]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, requires = "depth")]
     depth_scale: Option<f64>,
     /// The camera
-    #[arg(long, value_name = "K.json")]
+    #[arg(long, value_name = "K.json", requires = "picture")]
     intrinsics: Option<PathBuf>,
     /// What the pixels show; several are taken
     #[arg(long, value_name = "MASK[#LABEL]", requires = "intrinsics")]
@@ -83,24 +83,77 @@ pub struct BagOptions {
     /// Frame in which the camera's poses are given [default: the camera's own]
     #[arg(long, value_name = "FRAME")]
     fixed_frame: Option<String>,
-    /// Farthest apart that colour, depth and transforms of one frame may be, seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.03, allow_negative_numbers = true)]
-    max_gap: f64,
+    /// Farthest apart that colour, depth and transforms of one frame may be, seconds [default: 0.03]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    max_gap: Option<f64>,
 }
 
 impl BagOptions {
-    /// The settings of the reader.
-    pub fn settings(&self) -> Result<BagSettings> {
-        if !(self.max_gap >= 0.0 && self.max_gap < 3600.0) {
-            bail!("--max-gap: expected 0 to 3600 seconds, found {}", self.max_gap);
+    /// How a source is read.
+    pub fn settings(&self, source: &Path) -> Result<BagSettings> {
+        if let Some(option) = self.given().filter(|_| BopScene::is_scene(source)) {
+            bail!("{option}: expected a bag, found the BOP scene {}", source.display());
         }
+        let max_gap_nanos = match self.max_gap {
+            None => BagSettings::default().max_gap_nanos,
+            Some(gap) if (0.0..3600.0).contains(&gap) => (gap * 1e9) as u64,
+            Some(gap) => bail!("--max-gap: expected 0 to 3600 seconds, found {gap}"),
+        };
         Ok(BagSettings {
             color: self.color_topic.clone(),
             depth: self.depth_topic.clone(),
             camera_info: self.info_topic.clone(),
             fixed_frame: self.fixed_frame.clone(),
-            max_gap_nanos: (self.max_gap * 1e9) as u64,
+            max_gap_nanos,
         })
+    }
+
+    /// Refuses options of a bag where files are read.
+    pub fn check_unused(&self) -> Result<()> {
+        match self.given() {
+            Some(option) => bail!("{option}: expected a bag beside it, found files alone"),
+            None => Ok(()),
+        }
+    }
+
+    /// One of the options that were given.
+    fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--color-topic", self.color_topic.is_some()),
+            ("--depth-topic", self.depth_topic.is_some()),
+            ("--info-topic", self.info_topic.is_some()),
+            ("--fixed-frame", self.fixed_frame.is_some()),
+            ("--max-gap", self.max_gap.is_some()),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(option, _)| option)
+    }
+}
+
+/// Which frames of a source are taken.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct FrameChoice {
+    /// Take the first frame and each that is so many further on [default: 1]
+    #[arg(long, value_name = "N")]
+    every: Option<usize>,
+    /// Take at most so many
+    #[arg(long, value_name = "N")]
+    most: Option<usize>,
+}
+
+impl FrameChoice {
+    /// How these frames of a source are read.
+    pub fn settings(&self, bag: &BagOptions, source: &Path) -> Result<SourceSettings> {
+        let (bag, every) = (bag.settings(source)?, self.every.unwrap_or(1));
+        Ok(SourceSettings { bag, every, most: self.most })
+    }
+
+    /// Refuses a choice among the frames of a source where files are read.
+    pub fn check_unused(&self) -> Result<()> {
+        let given = [("--every", self.every.is_some()), ("--most", self.most.is_some())];
+        match given.into_iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => bail!("{option}: expected a source beside it, found files alone"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -113,17 +166,17 @@ pub struct SourceFrame {
 }
 
 /// `SOURCE`, or `SOURCE#N` for its frame N, counted from 0.
-pub fn parse_source(text: &str) -> (PathBuf, usize) {
+pub fn parse_source(text: &str) -> (PathBuf, Option<usize>) {
     match text.rsplit_once('#').map(|(path, number)| (path, number.parse())) {
-        Some((path, Ok(number))) if !path.is_empty() => (path.into(), number),
-        _ => (text.into(), 0),
+        Some((path, Ok(number))) if !path.is_empty() => (path.into(), Some(number)),
+        _ => (text.into(), None),
     }
 }
 
 /// Reads one frame.
 pub fn read_source_frame(source: &Path, number: usize, bag: &BagOptions) -> Result<SourceFrame> {
     let most = number.checked_add(1); // all, for the last number there is
-    let settings = SourceSettings { bag: bag.settings()?, most, ..SourceSettings::default() };
+    let settings = SourceSettings { bag: bag.settings(source)?, most, ..SourceSettings::default() };
     let (mut n_seen, mut found) = (0, None);
     let report = read_observations(source, &settings, |seen| {
         if n_seen == number {
@@ -156,15 +209,23 @@ pub fn chosen_mask<'a>(seen: &'a Observation, object: Option<&str>) -> Result<Op
     }
 }
 
+/// The mask of the object in one of many frames. That a frame has none of the name says that the object is not visible there.
+pub fn mask_in_frame<'a>(seen: &'a Observation, object: Option<&str>) -> Result<Option<&'a Mask>> {
+    match object {
+        Some(name) => Ok(seen.masks().iter().find(|mask| mask.name == name)),
+        None => chosen_mask(seen, None),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_source_may_name_its_frame() {
-        assert_eq!(parse_source("bop/000001"), (PathBuf::from("bop/000001"), 0));
-        assert_eq!(parse_source("frames.mcap#12"), (PathBuf::from("frames.mcap"), 12));
-        assert_eq!(parse_source("a#b"), (PathBuf::from("a#b"), 0));
-        assert_eq!(parse_source("#3"), (PathBuf::from("#3"), 0));
+        assert_eq!(parse_source("bop/000001"), (PathBuf::from("bop/000001"), None));
+        assert_eq!(parse_source("frames.mcap#12"), (PathBuf::from("frames.mcap"), Some(12)));
+        assert_eq!(parse_source("a#b"), (PathBuf::from("a#b"), None));
+        assert_eq!(parse_source("#3"), (PathBuf::from("#3"), None));
     }
 }

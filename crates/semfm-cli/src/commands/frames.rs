@@ -5,17 +5,17 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use semfm::geom::io::is_same_file;
-use semfm::observe::{SourceSettings, read_observations, write_bag, write_bop};
+use semfm::observe::{read_observations, write_bag, write_bop};
 
 use super::Outcome;
-use super::frame_options::{BagOptions, FrameFileOptions};
+use super::frame_options::{BagOptions, FrameChoice, FrameFileOptions};
 use crate::console;
 use crate::options::Common;
 
 /// Read what a depth camera saw, from files, a BOP scene or a ROS 2 bag, and write it as a BOP scene or a bag
 ///
 /// Everything is checked on the way: sizes, units, missing returns, cameras, times, transforms; pictures of a lens that
-/// distorts come out without distortion.
+/// distorts come out without distortion. All frames are held in memory: --every and --most take fewer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     semfm-cli frames recording.mcap -o scene --every 30 --fixed-frame base_link\n  \
@@ -23,7 +23,7 @@ use crate::options::Common;
     semfm-cli frames bop/000001 -o frames.mcap")]
 pub struct FramesCommand {
     /// A bag (.mcap, or a folder of them) or the folder of a BOP scene
-    #[arg(conflicts_with_all = ["color", "depth"])]
+    #[arg(conflicts_with_all = ["color", "depth", "depth_scale", "intrinsics", "mask", "pose"])]
     source: Option<PathBuf>,
     /// Where to write: a folder (BOP scene), or a bag (`NAME.mcap`)
     #[arg(short, long, value_name = "FOLDER|FILE.mcap")]
@@ -32,12 +32,8 @@ pub struct FramesCommand {
     files: FrameFileOptions,
     #[command(flatten)]
     bag: BagOptions,
-    /// Take the first frame and each that is so many further on
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    every: usize,
-    /// Take at most so many (they are held in memory)
-    #[arg(long, value_name = "N")]
-    most: Option<usize>,
+    #[command(flatten)]
+    choice: FrameChoice,
 }
 
 impl FramesCommand {
@@ -53,16 +49,21 @@ impl FramesCommand {
         let observations = match &self.source {
             Some(source) => {
                 let mut all = Vec::new();
-                let report = read_observations(source, &self.settings()?, |seen| {
-                    all.push(seen);
-                    Ok(())
-                })?;
+                let report =
+                    read_observations(source, &self.choice.settings(&self.bag, source)?, |seen| {
+                        all.push(seen);
+                        Ok(())
+                    })?;
                 if !common.quiet {
                     report.notes.iter().for_each(console::message);
                 }
                 all
             }
-            None => vec![self.files.read()?],
+            None => {
+                self.bag.check_unused()?;
+                self.choice.check_unused()?;
+                vec![self.files.read()?]
+            }
         };
         let is_bag = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
         if is_bag {
@@ -81,9 +82,5 @@ impl FramesCommand {
             console::data(self.output.display());
         }
         Ok(Outcome::Done)
-    }
-
-    fn settings(&self) -> Result<SourceSettings> {
-        Ok(SourceSettings { bag: self.bag.settings()?, every: self.every, most: self.most })
     }
 }

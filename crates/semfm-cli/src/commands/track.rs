@@ -9,12 +9,12 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use semfm::files::{Ros2Track, TrackLine, read_pose, read_region, write_region, write_ros2_track};
 use semfm::geom::io::{is_stdout, read_mesh, refuse_input};
-use semfm::observe::{Mask, Observation, SourceSettings, read_observations};
+use semfm::observe::{Observation, read_observations};
 use semfm::track::{DepthFrame, TrackRecord, TrackSettings, TrackState, Tracker};
 use semfm::{Mesh, Region, Task};
 
 use super::Outcome;
-use super::frame_options::{BagOptions, chosen_mask};
+use super::frame_options::{BagOptions, FrameChoice, mask_in_frame};
 use crate::console;
 use crate::options::Common;
 use crate::output::{check_distinct, check_file};
@@ -46,7 +46,13 @@ pub struct TrackCommand {
     #[arg(long, value_name = "FILE.mcap", help_heading = "Output")]
     mcap: Option<PathBuf>,
     /// Frame of the camera in that bag
-    #[arg(long, value_name = "FRAME", default_value = "camera", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "FRAME",
+        default_value = "camera",
+        requires = "mcap",
+        help_heading = "Output"
+    )]
     camera_frame: String,
     /// A region of the mesh, whose confidence is followed, too
     #[arg(long, value_name = "region.json", help_heading = "Object")]
@@ -71,12 +77,8 @@ pub struct TrackCommand {
     seed: u64,
     #[command(flatten)]
     bag: BagOptions,
-    /// Take the first frame and each that is so many further on
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    every: usize,
-    /// Take at most so many
-    #[arg(long, value_name = "N")]
-    most: Option<usize>,
+    #[command(flatten)]
+    choice: FrameChoice,
 }
 
 /// A run through the frames.
@@ -90,6 +92,8 @@ struct Run<'a> {
     states: BTreeMap<&'static str, usize>,
     last: Option<TrackRecord>,
     mask_seen: bool,
+    /// Whether it was said that a frame has no depth.
+    told_of_no_depth: bool,
 }
 
 /// Where the lines go.
@@ -128,6 +132,7 @@ impl TrackCommand {
             states: BTreeMap::new(),
             last: None,
             mask_seen: false,
+            told_of_no_depth: false,
         };
         match &self.mcap {
             None => self.frames(&mut run, None)?,
@@ -175,8 +180,7 @@ impl TrackCommand {
 
     /// Reads the source and follows the object.
     fn frames(&self, run: &mut Run<'_>, mut bag: Option<&mut Ros2Track<'_, '_>>) -> Result<()> {
-        let settings =
-            SourceSettings { bag: self.bag.settings()?, every: self.every, most: self.most };
+        let settings = self.choice.settings(&self.bag, &self.source)?;
         let mut failure = None;
         let read = read_observations(&self.source, &settings, |seen| {
             self.frame(run, &seen, bag.as_deref_mut()).map_err(|error| {
@@ -208,7 +212,10 @@ impl TrackCommand {
             let found = if seen.cloud().is_some() { "a cloud of points" } else { "colour alone" };
             bail!("frame {number}: expected a depth image, found {found}");
         };
-        let mask = self.mask(seen)?;
+        if !depth.has_depth() {
+            run.tell_of_no_depth(number);
+        }
+        let mask = mask_in_frame(seen, self.object.as_deref())?;
         run.mask_seen |= mask.is_some();
         let frame = DepthFrame {
             depth,
@@ -231,14 +238,6 @@ impl TrackCommand {
         *run.states.entry(record.state.name()).or_default() += 1;
         run.last = Some(record);
         Ok(())
-    }
-
-    /// The object's mask in a frame. That an object has none in some frame says that it is not visible there.
-    fn mask<'s>(&self, seen: &'s Observation) -> Result<Option<&'s Mask>> {
-        match &self.object {
-            Some(name) => Ok(seen.masks().iter().find(|mask| mask.name == *name)),
-            None => chosen_mask(seen, None),
-        }
     }
 
     fn finish(self, run: Run<'_>, common: &Common) -> Result<Outcome> {
@@ -272,6 +271,16 @@ impl TrackCommand {
 }
 
 impl Run<'_> {
+    /// Says once that frames without any depth show nothing.
+    fn tell_of_no_depth(&mut self, number: usize) {
+        if !(self.quiet || self.told_of_no_depth) {
+            console::message(format_args!(
+                "frame {number}: the depth image is empty; nothing is seen in such a frame"
+            ));
+        }
+        self.told_of_no_depth = true;
+    }
+
     /// Says where the state changes, and the scale where it was found.
     fn tell(&self, record: &TrackRecord) {
         let before = self.last.as_ref().map(|last| last.state);

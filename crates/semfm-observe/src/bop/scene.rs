@@ -8,11 +8,12 @@ use semfm_geom::math::DAffine3;
 
 use super::MM;
 use super::records::{CameraRecord, ObjectRecord, SceneCameras, SceneObjects, motion};
+use crate::depth_image::read_depth_of_frame;
 use crate::intrinsics::calibration_of;
 use crate::mask::MaskedPicture;
 use crate::observation::{Observation, SeenObject};
 use crate::picture::read_picture;
-use crate::{Error, Result, read_depth_image, read_mask};
+use crate::{Error, Result, read_mask};
 
 /// A folder of images with their cameras and, where they were labelled, their objects.
 #[derive(Clone, Debug)]
@@ -70,7 +71,8 @@ impl BopScene {
     }
 
     /// Reads an image: colour and depth where there are any, the masks of what is visible of each object (named
-    /// `obj5`, and `obj5#1` for a second one), and the poses. Objects of which nothing is visible have no mask.
+    /// `obj5`, and `obj5#1` for a second one), and the poses. Objects of which nothing is visible have no mask, and a depth
+    /// image may have no depth.
     ///
     /// # Errors
     /// [`Error::Invalid`] for an image that the scene does not have; [`Error::Format`] with the file at fault.
@@ -88,7 +90,7 @@ impl BopScene {
             let (place, found) = (format!("{image}.depth_scale"), depth_scale.to_string());
             return Err(FormatError::new(path, place, "a positive number", found).into());
         }
-        let depth = depth_file.as_deref().map(|f| read_depth_image(f, Some(MM / depth_scale)));
+        let depth = depth_file.as_deref().map(|f| read_depth_of_frame(f, Some(MM / depth_scale)));
         let depth = depth.transpose()?;
         let color = self.color_file(image).as_deref().map(read_picture).transpose()?;
         let color = color.map(image::DynamicImage::into_rgb8);
