@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
+use semfm::align::DepthImage;
 use semfm::geom::math::{DAffine3, DMat3, DVec3};
 use semfm::geom::{Intrinsics, Mesh, Pinhole};
+use semfm::observe::Observation;
 use semfm::views::{RenderSettings, SurfaceColor, View, render};
 use semfm::{Region, Task};
 use semfm_synth::{Category, ObjectSettings, SynthObject, make_object};
@@ -32,6 +34,8 @@ pub struct Frame {
     pub camera: Pinhole,
     /// What is seen of it.
     pub view: View,
+    /// The camera before the object in metres, whose middle is the origin.
+    pub camera_from_object: DAffine3,
 }
 
 impl Frame {
@@ -56,7 +60,26 @@ impl Frame {
         let task = Task::default();
         let views = render(&mesh, &SurfaceColor::GREY, &[camera], &settings, &task);
         let view = views.expect("a view").remove(0);
-        Self { mesh, camera, view }
+        let camera_from_object = DAffine3::from_mat3_translation(turn, DISTANCE * DVec3::Z);
+        Self { mesh, camera, view, camera_from_object }
+    }
+
+    /// What the camera saw, a wall at 1 m included, with a mask of the object; the camera's pose is told in the frame of the
+    /// object.
+    ///
+    /// # Panics
+    /// Never, unless the view has another size than its camera.
+    pub fn observation(&self) -> Observation {
+        let is_object: Vec<bool> = self.view.triangles.iter().map(|&face| face >= 0).collect();
+        let depth = self.view.depth.iter().zip(&is_object);
+        let depth = depth.map(|(&z, &is_object)| if is_object { z } else { 1.0 }).collect();
+        let (pixels, _) = self.view.rgb.as_chunks::<3>();
+        Observation::new(self.camera)
+            .posed(self.camera_from_object)
+            .and_then(|seen| seen.with_color(pixels.to_vec()))
+            .and_then(|seen| Ok(seen.with_depth(DepthImage::new(640, 480, depth)?)?))
+            .and_then(|seen| seen.with_mask("object", is_object))
+            .expect("an observation")
     }
 
     /// Writes `c.png`, `d.png` (16 bits, millimetres; a wall at 1 m), `m.png` and `K.json` into a folder.

@@ -1,10 +1,13 @@
 //! From pictures of a depth camera to an object, and on to a region and grasps, through the binary.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
+use semfm::Mesh;
 use semfm::files::read_region;
-use semfm::geom::io::{read_mesh, write_json, write_mesh};
+use semfm::geom::io::{read_mesh, read_points, write_json, write_mesh};
 use semfm::geom::math::DVec3;
+use semfm::observe::{Observation, write_bop};
 use semfm_tests::rgbd::{Frame, container, iou};
 use semfm_tests::sample::text;
 use semfm_tests::shell::{json, run};
@@ -130,7 +133,64 @@ fn one_object_with_embeddings_is_matched_by_who_made_them() {
 }
 
 #[test]
-fn frames_of_several_sides_are_merged_and_a_frame_is_aligned() {
+fn frames_of_several_sides_are_merged() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let kettle = container(1);
+    let sides = [[1.0, 0.2, 0.3], [-1.0, -0.3, 0.2], [0.2, 1.0, -0.2], [0.1, -1.0, 0.3]];
+    let frames = sides.map(|side| Frame::new(&kettle.mesh, DVec3::from_array(side)));
+    let mut seen: Vec<Observation> = frames.iter().map(Frame::observation).collect();
+    // The object in its own frame, metres.
+    let object_from_camera = frames[0].camera_from_object.inverse();
+    let points = frames[0].mesh.vertices().iter();
+    let points = points.map(|&p| object_from_camera.transform_point3(p)).collect();
+    let truth = Mesh::new(points, kettle.mesh.faces().to_vec()).unwrap();
+    // Of one frame nobody knows where in it the object is.
+    let without_mask = Observation::new(*seen[0].camera())
+        .with_color(seen[0].color().unwrap().to_vec())
+        .and_then(|frame| frame.with_depth(seen[0].depth().unwrap().clone()))
+        .unwrap();
+    seen.insert(1, without_mask.clone());
+    write_bop(&at("scene"), &seen).unwrap();
+    let merge = |scene: &str, out: &str, more: &[&str]| {
+        let (scene, out) = (text(&at(scene)), text(&at(out)));
+        let words = ["surface", &scene, "--merge", "-o", &out, "--no-embeddings"];
+        run(&[&words[..], more].concat())
+    };
+    let made = merge("scene", "merged", &[]);
+    assert_eq!(made.code, Some(0), "{}", made.err);
+    assert!(made.err.contains("frame 1 is left out"), "{}", made.err);
+    let report = json(&at("merged/surface.json"));
+    assert!(report["pixels"].is_null() && report["cameras"].as_array().unwrap().len() == 4);
+    let merged = read_mesh(at("merged/surface.ply")).unwrap().mesh;
+    let index = semfm::geom::SurfaceIndex::new(&truth).unwrap();
+    let off = merged.vertices().iter().map(|&p| index.closest(p).unwrap().distance);
+    let off = off.fold(0.0, f64::max);
+    assert!(off < 0.006, "{off}: the wall is no object");
+    let ([low, high], [from, to]) = (<[DVec3; 2]>::from(merged.bounds()), truth.bounds().into());
+    assert!((high - low - (to - from)).length() < 0.01, "all sides of it");
+    let one = merge("scene", "one", &["--most", "1"]);
+    assert_eq!(one.code, Some(0), "{}", one.err);
+    let one = read_mesh(at("one/surface.ply")).unwrap().mesh;
+    assert!(merged.area() > 1.7 * one.area(), "{} of {}", merged.area(), one.area());
+    // No point stands twice around it, though several frames saw it.
+    let around = read_points(at("merged/around.ply")).unwrap().points;
+    let cubes = around.iter().map(|&p| (p / 0.004).floor().as_i64vec3().to_array());
+    assert_eq!(cubes.collect::<BTreeSet<_>>().len(), around.len());
+    for (scene, more, word) in [
+        ("scene", &["--object", "cup"][..], "cup"),
+        ("scene", &["--vertices", "500"], "--vertices"),
+        ("scene", &["--fixed-frame", "map"], "BOP scene"),
+        ("scene#0", &[], "without a frame's number"),
+    ] {
+        let refused = merge(scene, "x", more);
+        assert_eq!(refused.code, Some(2), "{word}: {}", refused.err);
+        assert!(refused.err.contains(word), "{word}: {}", refused.err);
+    }
+}
+
+#[test]
+fn one_frame_of_a_scene_is_a_surface_and_is_aligned() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let kettle = container(1);
@@ -165,7 +225,8 @@ fn frames_of_several_sides_are_merged_and_a_frame_is_aligned() {
         "pictures",
     ]);
     assert_eq!(merged.code, Some(0), "{}", merged.err);
-    assert!(json(&at("merged/surface.json"))["pixels"].is_object(), "one frame needs no merging");
+    let report = json(&at("merged/surface.json"));
+    assert!(report["pixels"].is_object(), "one frame needs no merging");
     let missing = run(&["surface", &format!("{folder_text}#3"), "-o", &out]);
     assert!(missing.code == Some(2) && missing.err.contains("#3"), "{}", missing.err);
     // Align reads the same frame.
@@ -199,6 +260,9 @@ fn what_is_no_surface_is_refused_with_what_to_do() {
         (vec!["--vertices", "3"], "--vertices"),
         (vec!["--views", "mesh"], "pictures"),
         (vec!["--merge"], "source"),
+        (vec!["--color-topic", "/rgb"], "--color-topic"),
+        (vec!["--max-gap", "0.1"], "--max-gap"),
+        (vec!["--most", "2"], "--merge"),
     ] {
         let refused = run(&surface(&at("mug"), &at("x"), &more));
         assert_eq!(refused.code, Some(2), "{more:?}");

@@ -58,4 +58,5 @@ pub use registration::{DepthGrid, RegistrationCheck, check_registration, registr
 #[cfg(feature = "mcap")]
 pub use source::{SourceReport, SourceSettings, read_observations};
 pub use surface::{ObservedSurface, SurfaceReport, SurfaceSettings};
+pub use surroundings::merged_surroundings;
 pub use unseen::{UnseenSettings, unseen_side};

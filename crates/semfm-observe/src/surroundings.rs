@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use semfm_geom::math::{DAffine3, DVec3, bounds};
 
+use crate::merged_surface::MaskedFrame;
 use crate::observation::{Mask, Observation};
 use crate::surface::trimmed;
 use crate::{Error, Result};
@@ -35,7 +36,7 @@ impl Observation {
         let kept = self.pixels_of_points()?.filter(|(pixel, p)| {
             let is_outside = pixel.is_some_and(|pixel| outside[pixel]);
             let is_near = p.cmpge(low).all() && p.cmple(high).all();
-            is_outside && is_near && cubes.insert((*p / SPACING).floor().as_i64vec3().to_array())
+            is_outside && is_near && cubes.insert(cube(*p))
         });
         Ok(kept.map(|(_, p)| p).collect())
     }
@@ -61,6 +62,29 @@ impl Observation {
             (on_picture.then(|| seen.v as usize * width + seen.u as usize), p)
         })))
     }
+}
+
+/// The [surroundings](Observation::surroundings) of an object that several frames saw, in the frame in which their cameras'
+/// poses are given, metres: at most one point in each cube of 4 mm, though several frames saw it. Frames without a mask of the
+/// object have none.
+///
+/// # Errors
+/// As [`Observation::surroundings`].
+pub fn merged_surroundings(frames: &[MaskedFrame<'_>]) -> Result<Vec<DVec3>> {
+    let (mut cubes, mut merged) = (BTreeSet::new(), Vec::new());
+    for MaskedFrame { seen, mask } in frames {
+        let Some(mask) = mask else { continue };
+        let world_from_camera = seen.camera().camera_from_world().inverse();
+        let points = seen.surroundings(mask)?;
+        let points = points.into_iter().map(|p| world_from_camera.transform_point3(p));
+        merged.extend(points.filter(|p| cubes.insert(cube(*p))));
+    }
+    Ok(merged)
+}
+
+/// The cube of [`SPACING`] that a point lies in.
+fn cube(p: DVec3) -> [i64; 3] {
+    (p / SPACING).floor().as_i64vec3().to_array()
 }
 
 #[cfg(test)]
@@ -98,6 +122,9 @@ mod tests {
         // 75 × 60 pixels near, less the mask with three around it (corners rounded).
         let n_outside = 75 * 60 - 26 * 26;
         assert!((n_outside..n_outside + 30).contains(&found.len()), "{}", found.len());
+        let frame = MaskedFrame { seen: &seen, mask: seen.masks().first() };
+        let unmasked = MaskedFrame { mask: None, ..frame };
+        assert_eq!(merged_surroundings(&[frame, unmasked, frame]).unwrap(), found, "each once");
         let cloud = seen.points(None).unwrap().object;
         let by_cloud = Observation::new(camera)
             .with_cloud(cloud)

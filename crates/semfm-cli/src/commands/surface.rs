@@ -10,7 +10,7 @@ use semfm::geom::ShapeCache;
 use semfm::geom::math::{DAffine3, DVec3};
 use semfm::observe::{
     Mask, MaskedFrame, MergedSurface, Observation, ObservedSurface, SourceReport, SourceSettings,
-    SurfaceReport, SurfaceSettings, merged_surface, read_observations,
+    SurfaceReport, SurfaceSettings, merged_surface, merged_surroundings, read_observations,
 };
 use semfm::observed_object::{ObservedViews, embed_observed, observed_views};
 use semfm::{Mesh, Method};
@@ -18,7 +18,7 @@ use semfm::{Mesh, Method};
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
 use super::frame_options::{
-    BagOptions, FrameFileOptions, chosen_mask, parse_source, read_source_frame,
+    BagOptions, FrameFileOptions, chosen_mask, mask_in_frame, parse_source, read_source_frame,
 };
 use crate::console;
 use crate::options::Common;
@@ -39,7 +39,7 @@ use crate::output::{check_folder, check_folder_again};
     --gripper franka --metres --scene kettle/around.ply --unseen 0.05")]
 pub struct SurfaceCommand {
     /// A bag (.mcap, or a folder of them) or the folder of a BOP scene; `#N` is its frame N [default: the first, #0]
-    #[arg(value_name = "SOURCE[#N]", conflicts_with_all = ["color", "depth"])]
+    #[arg(value_name = "SOURCE[#N]", conflicts_with_all = ["color", "depth", "depth_scale", "intrinsics", "mask", "pose"])]
     source: Option<String>,
     /// Folder for the results
     #[arg(short, long, value_name = "FOLDER")]
@@ -51,8 +51,8 @@ pub struct SurfaceCommand {
     files: FrameFileOptions,
     #[command(flatten)]
     bag: BagOptions,
-    /// Merge all frames, whose cameras' poses are known: the surface is then in the frame of the poses
-    #[arg(long, help_heading = "Merge")]
+    /// Merge all frames that show the object, whose cameras' poses are known: the surface is then in the frame of the poses
+    #[arg(long, conflicts_with = "vertices", help_heading = "Merge")]
     merge: bool,
     /// Merge the first frame and each that is so many further on
     #[arg(long, value_name = "N", default_value_t = 1, requires = "merge", help_heading = "Merge")]
@@ -120,14 +120,12 @@ impl SurfaceCommand {
         let settings = self.options.settings()?;
         let task = console::progress(common.quiet);
         let all = self.frames(source.as_ref(), common)?;
-        let frames: Vec<&Observation> = all.iter().collect();
         check_folder_again(&self.output, SURFACE_FILES)?;
-        let object = self.object.as_deref();
-        let masks: Vec<Option<&Mask>> =
-            frames.iter().map(|seen| chosen_mask(seen, object)).collect::<Result<_>>()?;
-        let Seen { mesh, colors, pixels, around } = match (&frames[..], &masks[..]) {
-            ([seen], [mask]) => seen_once(seen, *mask, &settings)?,
-            _ => seen_often(&frames, &masks, &settings)?,
+        let shown = self.shown_frames(&all, common)?;
+        let frames: Vec<&Observation> = shown.iter().map(|frame| frame.seen).collect();
+        let Seen { mesh, colors, pixels, around } = match shown[..] {
+            [MaskedFrame { seen, mask }] => seen_once(seen, mask, &settings)?,
+            _ => seen_often(&shown, &settings)?,
         };
         let embeddings = match self.no_embeddings {
             true => None,
@@ -135,21 +133,21 @@ impl SurfaceCommand {
                 let most_rolls = Method::default().info().features.rolls;
                 let encoder = self.encoder.open(most_rolls, &ShapeCache::off(), common)?;
                 let wants = encoder.encoder().wants();
-                let shown = self.shown(&frames, &wants)?;
-                let pictures = pictures(&frames, &masks)?;
-                let views = observed_views(&mesh, &pictures, shown, &wants, &task)?;
+                let kind = self.shown_views(&frames, &wants)?;
+                let pictures = pictures(&shown)?;
+                let views = observed_views(&mesh, &pictures, kind, &wants, &task)?;
                 let made = embed_observed(&views, &**encoder.encoder(), encoder.rolls(), &task)?;
-                Some((made, shown))
+                Some((made, kind))
             }
         };
         let result = SurfaceResult {
             mesh: &mesh,
             colors: colors.as_deref(),
             frames: &frames,
-            object: masks.iter().flatten().next().map(|mask| mask.name.as_str()),
+            object: shown.iter().find_map(|frame| frame.mask).map(|mask| mask.name.as_str()),
             pixels,
             around: &around,
-            embeddings: embeddings.as_ref().map(|(file, shown)| (file, *shown)),
+            embeddings: embeddings.as_ref().map(|(file, kind)| (file, *kind)),
         };
         let files = write_surface(&self.output, &result, &task)?;
         if !common.quiet {
@@ -166,7 +164,7 @@ impl SurfaceCommand {
     /// What was seen: one frame, or with --merge all of them.
     fn frames(
         &self,
-        source: Option<&(PathBuf, usize)>,
+        source: Option<&(PathBuf, Option<usize>)>,
         common: &Common,
     ) -> Result<Vec<Observation>> {
         let note = |report: &SourceReport| {
@@ -175,9 +173,13 @@ impl SurfaceCommand {
             }
         };
         match source {
-            Some((path, _)) if self.merge => {
+            Some((path, Some(number))) if self.merge => bail!(
+                "{}#{number}: expected a source without a frame's number beside --merge, found one",
+                path.display()
+            ),
+            Some((path, None)) if self.merge => {
                 let settings = SourceSettings {
-                    bag: self.bag.settings()?,
+                    bag: self.bag.settings(path)?,
                     every: self.every,
                     most: self.most,
                 };
@@ -200,7 +202,7 @@ impl SurfaceCommand {
                 Ok(all)
             }
             Some((path, number)) => {
-                let frame = read_source_frame(path, *number, &self.bag)?;
+                let frame = read_source_frame(path, number.unwrap_or(0), &self.bag)?;
                 note(&frame.report);
                 Ok(vec![frame.observation])
             }
@@ -209,15 +211,63 @@ impl SurfaceCommand {
                     "--merge: expected a source of several frames, a bag or a BOP scene, found files"
                 )
             }
-            None if self.files.is_given() => Ok(vec![self.files.read()?]),
+            None if self.files.is_given() => {
+                self.bag.check_unused()?;
+                Ok(vec![self.files.read()?])
+            }
             None => bail!(
                 "expected a bag or a BOP scene, or --depth (and --color) with --intrinsics; found neither"
             ),
         }
     }
 
+    /// The frames that show the object. Where several are merged, those without its mask, or without depth under it, are
+    /// left out; where no frame has any mask, all that was seen is the object.
+    fn shown_frames<'a>(
+        &self,
+        all: &'a [Observation],
+        common: &Common,
+    ) -> Result<Vec<MaskedFrame<'a>>> {
+        let object = self.object.as_deref();
+        let frame = |seen: &'a Observation| {
+            let mask = match self.merge {
+                true => mask_in_frame(seen, object)?,
+                false => chosen_mask(seen, object)?,
+            };
+            Ok(MaskedFrame { seen, mask })
+        };
+        let frames: Vec<MaskedFrame<'a>> = all.iter().map(frame).collect::<Result<_>>()?;
+        if frames.iter().all(|frame| frame.mask.is_none()) {
+            if let Some(name) = object {
+                bail!("--object: expected a mask of some frame, found none of the name `{name}`");
+            }
+            return Ok(frames);
+        }
+        if !self.merge {
+            return Ok(frames);
+        }
+        let mut shown = Vec::new();
+        for (number, frame) in frames.iter().enumerate() {
+            let why = match frame.mask {
+                None => "it has no mask of the object",
+                Some(mask) if frame.seen.points(Some(mask)).is_err() => "no depth under its mask",
+                Some(_) => {
+                    shown.push(*frame);
+                    continue;
+                }
+            };
+            if !common.quiet {
+                console::message(format_args!("frame {number} is left out: {why}"));
+            }
+        }
+        if shown.is_empty() {
+            bail!("--merge: expected depth under the mask of some frame, found none");
+        }
+        Ok(shown)
+    }
+
     /// What the encoder is shown.
-    fn shown(&self, frames: &[&Observation], wants: &WantedViews) -> Result<ObservedViews> {
+    fn shown_views(&self, frames: &[&Observation], wants: &WantedViews) -> Result<ObservedViews> {
         let has_color = frames.iter().all(|seen| seen.color().is_some());
         match self.views {
             Some(shown) if !has_color && shown != ObservedViews::Surface => {
@@ -238,31 +288,14 @@ fn seen_once(seen: &Observation, mask: Option<&Mask>, settings: &SurfaceSettings
 }
 
 /// The surface of several frames, in the frame in which their cameras are posed.
-fn seen_often(
-    frames: &[&Observation],
-    masks: &[Option<&Mask>],
-    settings: &SurfaceSettings,
-) -> Result<Seen> {
-    let pairs = frames.iter().zip(masks);
-    let masked: Vec<MaskedFrame<'_>> =
-        pairs.clone().map(|(&seen, &mask)| MaskedFrame { seen, mask }).collect();
-    let MergedSurface { mesh, colors, .. } = merged_surface(&masked, settings)?;
-    let mut around = Vec::new();
-    for (seen, mask) in pairs {
-        let Some(mask) = mask else { continue };
-        let world_from_camera = seen.camera().camera_from_world().inverse();
-        let points = seen.surroundings(mask)?;
-        around.extend(points.into_iter().map(|p| world_from_camera.transform_point3(p)));
-    }
-    Ok(Seen { mesh, colors, pixels: None, around })
+fn seen_often(frames: &[MaskedFrame<'_>], settings: &SurfaceSettings) -> Result<Seen> {
+    let MergedSurface { mesh, colors, .. } = merged_surface(frames, settings)?;
+    Ok(Seen { mesh, colors, pixels: None, around: merged_surroundings(frames)? })
 }
 
 /// The pictures before the mesh: of one frame in its camera's frame, of several in the world's.
-fn pictures<'a>(
-    frames: &[&'a Observation],
-    masks: &[Option<&'a Mask>],
-) -> Result<Vec<ObservedPicture<'a>>> {
-    let picture = |(seen, mask): (&&'a Observation, &Option<&'a Mask>)| {
+fn pictures<'a>(frames: &[MaskedFrame<'a>]) -> Result<Vec<ObservedPicture<'a>>> {
+    let picture = |&MaskedFrame { seen, mask }: &MaskedFrame<'a>| {
         let camera = match frames {
             [_] => seen.camera().posed(DAffine3::IDENTITY)?,
             _ => *seen.camera(),
@@ -271,7 +304,7 @@ fn pictures<'a>(
         let color = seen.color().unwrap_or_default();
         Ok(ObservedPicture { camera, color, mask: mask.map(|mask| &mask.marked[..]) })
     };
-    frames.iter().zip(masks).map(picture).collect()
+    frames.iter().map(picture).collect()
 }
 
 /// What was made of the pixels.
