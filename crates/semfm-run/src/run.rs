@@ -12,9 +12,9 @@ use semfm::files::{
 use semfm::geom::io::{FormatError, ReadFiles, StagedFolder, is_same_file, refuse_to_overwrite};
 use semfm::geom::{Error as GeomError, ShapeCache};
 
-use crate::fingerprint::{hashes, of_settings};
+use crate::fingerprint::{Begin, hashes, of_settings};
 use crate::page::{PAGE_FILE, write_run_page};
-use crate::recipe::{NamedPath, Recipe};
+use crate::recipe::{NamedPath, Recipe, RecipeFile};
 use crate::stages::{StageContext, StageEnd};
 use crate::{Error, Result, Stage};
 
@@ -80,9 +80,7 @@ impl Run {
     /// Those of [`Recipe::read`]; [`Error::Recipe`] where a result would replace a file that the recipe names, and where
     /// `output` is a file.
     pub fn open(recipe_file: &Path, output: &Path) -> Result<Self> {
-        let recipe = Recipe::read(recipe_file)?;
-        let text = fs::read_to_string(recipe_file).map_err(io(recipe_file))?;
-        let written = Recipe::parse(recipe_file, &text)?;
+        let RecipeFile { written, resolved: recipe } = RecipeFile::read(recipe_file)?;
         if output.exists() && !output.is_dir() {
             let expected = "a folder for the results";
             return Err(FormatError::new(output, "output", expected, "a file").into());
@@ -199,6 +197,7 @@ impl Run {
         let folder = self.folder(stage);
         fs::create_dir_all(&folder).map_err(io(&folder))?;
         let staged = StagedFolder::new(&folder)?;
+        let begin = Begin::of(staged.path());
         let read = ReadFiles::begin();
         let end = self.context(settings).work(stage, staged.path(), task)?;
         let StageEnd { summary, no_answer, more_inputs } = end;
@@ -209,7 +208,7 @@ impl Run {
             stage: stage.name().into(),
             version: VERSION.into(),
             settings: of_settings(&stage.settings(&self.written)),
-            inputs: hashes(inputs.chain(more_inputs), &folder),
+            inputs: begin.hashes(inputs.chain(more_inputs), &folder),
             outputs: hashes(written.iter().map(|name| staged.path().join(name)), staged.path()),
             seconds: start.elapsed().as_secs_f64(),
             summary,

@@ -42,6 +42,44 @@ pub struct Recipe {
     pub robot: Option<RobotTable>,
 }
 
+/// A recipe and its file.
+#[derive(Clone, Debug)]
+pub(crate) struct RecipeFile {
+    /// As the file has it.
+    pub written: Recipe,
+    /// With paths from the current folder.
+    pub resolved: Recipe,
+}
+
+impl RecipeFile {
+    /// Reads it, once.
+    ///
+    /// # Errors
+    /// As [`Recipe::read`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = read_file(path)?;
+        let not_text = || foreign_kind(&bytes).unwrap_or("bytes that are no UTF-8").to_owned();
+        let text = std::str::from_utf8(&bytes)
+            .map_err(|_| FormatError::new(path, "file", "TOML in UTF-8", not_text()))?;
+        let written = Recipe::parse(path, text)?;
+        let mut resolved = written.clone();
+        resolved.resolve(path.parent().unwrap_or(Path::new("")));
+        let places = KeyPlaces::of(text);
+        if let Some(fault) = resolved.fault() {
+            let place = places.place_of(&fault.key);
+            return Err(FormatError::new(path, place, fault.expected, fault.found).into());
+        }
+        for NamedPath { key, path: file } in resolved.paths() {
+            if !file.exists() {
+                let found = format!("no such file: {}", file.display());
+                let expected = "a file that is there (paths are relative to this file)";
+                return Err(FormatError::new(path, places.place_of(&key), expected, found).into());
+            }
+        }
+        Ok(Self { written, resolved })
+    }
+}
+
 impl Recipe {
     /// Reads a recipe and makes its paths, which are relative to the file, ones from the current folder.
     ///
@@ -49,25 +87,7 @@ impl Recipe {
     /// [`Error::Recipe`](crate::Error::Recipe) with the line and the key: no TOML, a key that is not known, a value of
     /// another kind, ways to say one thing that exclude each other, a file that is not there.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = read_file(path)?;
-        let not_text = || foreign_kind(&bytes).unwrap_or("bytes that are no UTF-8").to_owned();
-        let text = std::str::from_utf8(&bytes)
-            .map_err(|_| FormatError::new(path, "file", "TOML in UTF-8", not_text()))?;
-        let mut recipe = Self::parse(path, text)?;
-        recipe.resolve(path.parent().unwrap_or(Path::new("")));
-        let places = KeyPlaces::of(text);
-        if let Some(fault) = recipe.fault() {
-            let place = places.place_of(&fault.key);
-            return Err(FormatError::new(path, place, fault.expected, fault.found).into());
-        }
-        for NamedPath { key, path: file } in recipe.paths() {
-            if !file.exists() {
-                let found = format!("no such file: {}", file.display());
-                let expected = "a file that is there (paths are relative to this file)";
-                return Err(FormatError::new(path, places.place_of(&key), expected, found).into());
-            }
-        }
-        Ok(recipe)
+        Ok(RecipeFile::read(path)?.resolved)
     }
 
     /// Of a text; `path` is for messages. Nothing is checked but keys and kinds of values, and paths stay as they are.

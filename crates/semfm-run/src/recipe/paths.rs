@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use semfm::encoder::BuiltinEncoder;
 use semfm::observe::MaskFile;
+use semfm::robot::BUILTIN_GRIPPERS;
 
 use super::{Demonstration, DemonstrationFrame, GraspTable, PoseValue, Recipe, RobotTable};
 use super::{Target, TargetFrame, TransferTable};
@@ -20,15 +22,17 @@ pub struct NamedPath {
 type Each<'a> = dyn FnMut(String, &mut PathBuf) + 'a;
 
 impl Recipe {
-    /// Makes every path one from `folder`; a gripper and an encoder are paths where such a file is there.
+    /// Makes every path one from `folder`. A gripper is a path where such a file is there, an encoder where such a file or
+    /// folder is; names of what is built in are no paths, whatever stands beside the recipe.
     pub(super) fn resolve(&mut self, folder: &Path) {
         self.each_path(&mut |_, path| *path = folder.join(&*path));
-        let named = self.grasp.iter_mut().map(|grasp| &mut grasp.gripper);
-        for name in named.chain(&mut self.transfer.encoder) {
-            let path = folder.join(&*name);
-            if let Some(text) = path.to_str().filter(|_| path.exists()) {
-                *name = text.to_owned();
-            }
+        let gripper = self.grasp.iter_mut().map(|grasp| &mut grasp.gripper);
+        for name in gripper.filter(|name| BUILTIN_GRIPPERS.iter().all(|g| g.name != **name)) {
+            resolve_name(name, folder, Path::is_file);
+        }
+        let encoder = self.transfer.encoder.iter_mut();
+        for name in encoder.filter(|name| BuiltinEncoder::named(name).is_none()) {
+            resolve_name(name, folder, Path::exists);
         }
     }
 
@@ -53,6 +57,14 @@ impl Recipe {
         transfer.each_path(each);
         grasp.iter_mut().for_each(|grasp| grasp.each_path(each));
         robot.iter_mut().for_each(|robot| robot.each_path(each));
+    }
+}
+
+/// Makes a name a path from `folder`, where there is such a file.
+fn resolve_name(name: &mut String, folder: &Path, is_there: fn(&Path) -> bool) {
+    let path = folder.join(&*name);
+    if let Some(text) = path.to_str().filter(|_| is_there(&path)) {
+        *name = text.to_owned();
     }
 }
 
@@ -152,5 +164,32 @@ impl RobotTable {
                 each(format!("robot.{key}"), path);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_what_is_built_in_are_no_paths() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["franka", "builtin", "siglip", "hand"] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+        }
+        std::fs::write(folder.path().join("hand.urdf"), "").unwrap();
+        let resolved = |gripper: &str, encoder: &str| {
+            let text = format!(
+                "[demonstration]\nmesh = 'a'\n[target]\nmesh = 'b'\n[grasp]\ngripper = '{gripper}'\n\
+                 [transfer]\nencoder = '{encoder}'\n"
+            );
+            let mut recipe = Recipe::parse(Path::new("demo.toml"), &text).unwrap();
+            recipe.resolve(folder.path());
+            (recipe.grasp.unwrap().gripper, recipe.transfer.encoder.unwrap())
+        };
+        assert_eq!(resolved("franka", "builtin"), ("franka".into(), "builtin".into()));
+        let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        assert_eq!(resolved("hand.urdf", "siglip"), (at("hand.urdf"), at("siglip")));
+        assert_eq!(resolved("hand", "Org/model"), ("hand".into(), "Org/model".into()));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use semfm::encoder::{BUILTIN_ENCODERS, OpenSettings, open_encoder};
+use semfm::encoder::{BUILTIN_ENCODERS, BuiltinEncoder, OpenSettings, open_encoder};
 use semfm::files::{Provenance, Seeds, TransferInputs, TransferResult, read_region};
 use semfm::fmap::transfer_with_anchors;
 use semfm::geom::ShapeCache;
@@ -59,7 +59,7 @@ pub fn transfer(context: &StageContext<'_>, folder: &Path, task: &Task) -> Resul
             "{} (confidence {:.2}): {n} of {of} vertices of the target",
             found.verdict, found.confidence
         )],
-        more_inputs: encoder_files(&recipe.transfer),
+        more_inputs: encoder_files(&recipe.transfer)?,
         ..StageEnd::default()
     };
     end.summary.extend(found.why().map(str::to_owned));
@@ -118,7 +118,8 @@ fn features(context: &StageContext<'_>, settings: &PipelineSettings) -> Result<P
 }
 
 /// The files of an encoder that is named by a path.
-fn encoder_files(table: &TransferTable) -> Vec<PathBuf> {
-    let named = table.encoder.as_deref().map(Path::new).filter(|path| path.exists());
-    named.map_or_else(Vec::new, files_under)
+fn encoder_files(table: &TransferTable) -> Result<Vec<PathBuf>> {
+    let name = table.encoder.as_deref().filter(|name| BuiltinEncoder::named(name).is_none());
+    let named = name.map(Path::new).filter(|path| path.exists());
+    named.map_or_else(|| Ok(Vec::new()), files_under)
 }
