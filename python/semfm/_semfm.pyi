@@ -1578,6 +1578,273 @@ class MeshFile:
         """(n, 4) uint8 array, optional: RGBA of each vertex in sRGB; None where the file has none."""
         ...
 
+class Observation:
+    """What a camera saw at one moment: colour, depth and masks on one grid of pixels, and the camera.
+
+    Whatever it came from, depth is in metres, 0 is where nothing came back, and the pictures are without
+    distortion. `read` makes one of files, `read_observations` of a BOP scene or a bag.
+
+    Parameters
+    ----------
+    intrinsics : Pinhole or (3, 3) array_like
+        The camera, or the matrix of a calibration, counted as by `Pinhole.from_matrix`.
+    color : (height, width, 3) array_like, optional
+        sRGB, of dtype uint8.
+    depth : (height, width) array_like, optional
+        Depth along the camera's axis. What is 0 or not finite is no return; nor is 65535 in whole numbers.
+    depth_scale : float, optional
+        Units of `depth` to the metre; 1000 for whole numbers and 1 for floats where none is given.
+    cloud : (n, 3) array_like, optional
+        Points in the camera's frame, metres, where the sensor gave them in place of a depth image.
+    masks : dict or list of (height, width) array_like, optional
+        Which pixels show what, of dtype bool, by name; those of a list are called 0, 1 and so on.
+    distortion : (c,) array_like, optional
+        Coefficients of the lens in OpenCV's order; the pictures come out without distortion.
+    distortion_model : str, default "plumb_bob"
+        ``"plumb_bob"`` or ``"rational_polynomial"`` (4, 5 or 8 coefficients), or ``"equidistant"`` (4, a fisheye).
+    camera_from_world : (4, 4) array_like, optional
+        Where the camera stood; that of a `Pinhole`, else its own frame is the world, where none is given.
+    time_nanos : int, optional
+        When it was, in nanoseconds.
+
+    Raises
+    ------
+    InvalidInput
+        Pictures of different sizes, a mask that marks nothing, no depth at all in a depth image.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm
+    >>> depth = np.full((48, 64), 0.7)
+    >>> depth[16:32, 20:44] = 0.5
+    >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
+    >>> seen = semfm.Observation(k, depth=depth, masks={"box": depth < 0.6})
+    >>> seen
+    Observation(64 × 48, depth, 1 mask)
+    >>> seen.cloud("box").shape
+    (384, 3)
+    >>> seen.surface().mesh
+    Mesh(308 vertices, 546 triangles)
+    """
+    def __init__(self, intrinsics: Union[Pinhole, ArrayLike], *, color: Optional[ArrayLike] = None, depth: Optional[ArrayLike] = None, depth_scale: Optional[float] = None, cloud: Optional[ArrayLike] = None, masks: Optional[Union[Mapping[str, Any], Iterable[ArrayLike]]] = None, distortion: Optional[ArrayLike] = None, distortion_model: str = 'plumb_bob', camera_from_world: Optional[ArrayLike] = None, time_nanos: Optional[int] = None) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def camera(self) -> Pinhole:
+        """Pinhole: the camera, in the world that its pose says."""
+        ...
+    def cloud(self, mask: Optional[Union[str, ArrayLike]] = None) -> NDArray[numpy.float64]:
+        """The points that were seen, or those under a mask, for `align` and for scenes of `find_grasps`.
+
+        Parameters
+        ----------
+        mask : str or (height, width) array_like, optional
+            A mask by name, or an array of dtype bool; all points where none is given.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the camera's own frame (x right, y down, z forward), metres.
+        """
+        ...
+    @property
+    def color(self) -> Optional[NDArray[numpy.uint8]]:
+        """(height, width, 3) uint8 array, optional: sRGB, a read-only view; None where there is no picture."""
+        ...
+    @property
+    def depth(self) -> Optional[NDArray[numpy.float32]]:
+        """(height, width) float32 array, optional: metres along the camera's axis, 0 where nothing came back, a read-only
+        view; None where there is no depth image.
+        """
+        ...
+    @property
+    def masks(self) -> dict[str, Any]:
+        """dict: (height, width) bool arrays by name, in the order of their files, read-only views."""
+        ...
+    @property
+    def objects(self) -> list[dict[str, Any]]:
+        """list of dict: objects whose poses somebody knew, as in a BOP scene: ``id``, ``camera_from_object`` (4, 4) in
+        metres, and the name of its ``mask`` or None.
+        """
+        ...
+    def picture(self) -> bytes:
+        """The colours, or the depth where there are none, as notebooks show them by themselves.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
+    @staticmethod
+    def read(intrinsics: _Path, *, color: Optional[_Path] = None, depth: Optional[_Path] = None, depth_scale: Optional[float] = None, mask: Optional[Union[_Path, Iterable[_Path], Mapping[str, Any]]] = None, hand_mask: Optional[_Path] = None, camera_from_world: Optional[Union[_Path, ArrayLike]] = None) -> Observation:
+        """Reads an observation of single files, as ``semfm-cli frames`` does: see `docs/observations.md` for their forms.
+
+        Parameters
+        ----------
+        intrinsics : path
+            The camera (JSON); a lens that distorts is taken out of the pictures.
+        color : path, optional
+            A PNG or JPEG.
+        depth : path, optional
+            A 16-bit PNG or .npy, registered to the colour.
+        depth_scale : float, optional
+            Units of the depth to the metre; 1000 for whole numbers and 1 for floats where none is given.
+        mask : path or list of path or dict, optional
+            What the pixels show, ``FILE`` or ``FILE#LABEL``; called as its file is, or as the dict says.
+        hand_mask : path, optional
+            The pixels of a hand: one more mask, called ``hand``.
+        camera_from_world : path or (4, 4) array_like, optional
+            Where the camera stood.
+
+        Returns
+        -------
+        Observation
+        """
+        ...
+    def surface(self, mask: Optional[Union[str, ArrayLike]] = None, *, smooth_pixels: int = 3, trim_pixels: int = 1, most_vertices: int = 20000) -> ObservedObject:
+        """What the camera saw of an object as an object, in the camera's own frame, metres: what ``semfm-cli surface``
+        makes. Several frames of known poses: `merged_surface`.
+
+        Parameters
+        ----------
+        mask : str or (height, width) array_like, optional
+            The object's mask: a name, an array of dtype bool, or the only one that there is where none is given; without
+            any, all that was seen is the object.
+        smooth_pixels : int, default 3
+            Radius of the window in which depth is smoothed, 0 to 20.
+        trim_pixels : int, default 1
+            Pixels along the mask's outline that are left out, 0 to 100.
+        most_vertices : int, default 20000
+            Of a larger picture every second pixel is taken, or fewer.
+
+        Returns
+        -------
+        ObservedObject
+        """
+        ...
+    def surroundings(self, mask: Optional[Union[str, ArrayLike]] = None) -> NDArray[numpy.float64]:
+        """Points of what was seen beside an object, as obstacles of grasps: one in 4 mm, within 0.4 m of it.
+
+        Parameters
+        ----------
+        mask : str or (height, width) array_like, optional
+            The object's mask: a name, an array of dtype bool, or the only one that there is where none is given.
+
+        Returns
+        -------
+        (n, 3) float64 array
+            In the camera's own frame, metres.
+        """
+        ...
+    @property
+    def time_nanos(self) -> Optional[int]:
+        """int, optional: when it was, in nanoseconds of its recorder's clock; None where nobody said."""
+        ...
+
+class Observations:
+    """The frames of a BOP scene or of a bag, in order: an iterator of `Observation`, made by `read_observations`.
+
+    Files are read as frames are asked for, with one frame read ahead; a bag of any length needs the memory of some frames.
+    """
+    @property
+    def notes(self) -> list[str]:
+        """list of str: what was chosen or left out (topics, messages without a counterpart), known at the end."""
+        ...
+
+class ObservedObject:
+    """What a depth camera saw of an object, as an object: the surface with the pictures' colours and what lies around it.
+
+    Made by `Observation.surface` and `merged_surface`. Its mesh and the embeddings that `embed` makes are taken by
+    `transfer`, `prepare` and `find_grasps` like those of any other object.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm
+    >>> mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=800) for i in (0, 1))
+    >>> camera = semfm.rig(kettle.mesh, count=2, size=96)[0]
+    >>> view = semfm.render(kettle.mesh, [camera])[0]
+    >>> depth = np.where(np.isfinite(view.depth), view.depth, 0)
+    >>> seen = semfm.Observation(camera, depth=depth, masks={"kettle": view.triangles >= 0}).surface()
+    >>> result = semfm.transfer(mug.mesh, seen.mesh, mug.region, target_embeddings=seen.embed())
+    >>> result.region.n_vertices == seen.mesh.n_vertices
+    True
+    """
+    @property
+    def around(self) -> NDArray[numpy.float64]:
+        """(m, 3) float64 array: points of what was seen beside the object, in the frame of `mesh`, metres: obstacles for a
+        `Scene` of `find_grasps`.
+        """
+        ...
+    @property
+    def cameras(self) -> list[Pinhole]:
+        """list of Pinhole: the cameras in the frame of `mesh`."""
+        ...
+    @property
+    def colors(self) -> Optional[NDArray[numpy.uint8]]:
+        """(n, 3) uint8 array, optional: sRGB of each vertex, a read-only view; None where a frame has no colours."""
+        ...
+    def embed(self, *, encoder: str = 'builtin', rolls: Optional[int] = None, views: Optional[str] = None, progress: Optional[_Progress] = None) -> Embeddings:
+        """Embeddings for `transfer` and `prepare`: of the pictures, of the surface rendered from where it was seen, or of both.
+
+        Parameters
+        ----------
+        encoder : str, default "builtin"
+            ``builtin``, a ``.net`` file, a Hugging Face name, a local checkpoint, an ONNX encoder's JSON,
+            or ``package.module:Class``.
+        rolls : int, optional
+            Rotations of each view that are averaged, 1, 2 or 4; what the encoder wants where none is given.
+        views : str, optional
+            What the encoder is shown: ``"pictures"``, ``"surface"`` or ``"both"``; what suits it where none is given:
+            ``"surface"`` where it was trained on grey views, as the built-in one, or where there are no colours.
+        progress : progress, optional
+
+        Returns
+        -------
+        Embeddings
+        """
+        ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the surface, metres; of one frame in its camera's own frame, of several in that of their cameras' poses."""
+        ...
+    @property
+    def observations(self) -> list[Observation]:
+        """list of Observation: the frames."""
+        ...
+    def picture(self) -> bytes:
+        """A picture of the surface in its colours, which notebooks show by themselves.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: where it comes from and what became of the pixels, as `surface.json` of ``semfm-cli surface`` has it."""
+        ...
+    def write(self, folder: _Path, *, embeddings: Optional[Embeddings] = None, progress: Optional[_Progress] = None) -> list[str]:
+        """Writes the folder that ``semfm-cli surface`` writes: `surface.ply`, `surface.emb.mcap`, `surface.views.mcap`,
+        `around.ply` and `surface.json`.
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there.
+        embeddings : Embeddings, optional
+            From `embed`; without them `surface.emb.mcap` is not written.
+        progress : progress, optional
+
+        Returns
+        -------
+        list of str
+            The files.
+        """
+        ...
+
 class PatchEmbeddings:
     """What an encoder says about a view: one vector per image patch.
 
@@ -2427,6 +2694,70 @@ class Robot:
         """(n,) float64 array: greatest speed of each joint, per second."""
         ...
 
+class RunResult:
+    """How a run from pictures to grasps went, stage by stage: see `run`."""
+    def file(self, stage: str, name: str) -> str:
+        """The path of a file of a stage, such as ``file("target-pose", "aligned.json")`` or ``file("grasp", "grasps.json")``.
+
+        Parameters
+        ----------
+        stage : str
+            ``"demonstration-pose"``, ``"region"``, ``"transfer"``, ``"target-pose"``, ``"grasp"`` or ``"plan"``.
+        name : str
+            One of the stage's ``files``.
+
+        Returns
+        -------
+        str
+        """
+        ...
+    @property
+    def folder(self) -> str:
+        """str: the folder."""
+        ...
+    @property
+    def grasps(self) -> Optional[dict[str, Any]]:
+        """dict, optional: the grasps, as `grasps.json` has them; None where none were asked for, or the run did not come so
+        far. Its file (`file`) is what `plan` takes.
+        """
+        ...
+    @property
+    def no_answer(self) -> Optional[dict[str, Any]]:
+        """dict, optional: why there is no answer: ``reason``, and what to do ``next``; None where there is one."""
+        ...
+    @property
+    def page(self) -> str:
+        """str: the page that shows how it went, in the folder."""
+        ...
+    @property
+    def region(self) -> Optional[Region]:
+        """Region, optional: the region on the target; None where the run did not come so far."""
+        ...
+    @property
+    def stages(self) -> list[dict[str, Any]]:
+        """list of dict: the stages in their order, up to the first without an answer: ``stage``, its ``state``, ``seconds``
+        when it was done, ``summary`` in words, and the names of its ``files``.
+        """
+        ...
+    @property
+    def states(self) -> dict[str, Any]:
+        """dict: by stage, ``"done"`` where this run did it, ``"kept"`` where its inputs and settings were those of an earlier run."""
+        ...
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `run.json`.
+
+        Returns
+        -------
+        dict
+        """
+        ...
+    @property
+    def transfer(self) -> Optional[StoredTransfer]:
+        """StoredTransfer, optional: both objects, the region on each and how sure that is; None where the run did not come
+        so far.
+        """
+        ...
+
 class Scene:
     """What stands around an arm, in the frame of the arm's base, metres: each thing with a name of its own. A scene does not
     change; ``with_…`` gives a new one.
@@ -2832,6 +3163,151 @@ class SurfaceIndex:
     @property
     def mesh(self) -> Mesh:
         """Mesh: the mesh that was indexed."""
+        ...
+
+class TrackedPose:
+    """An object in one frame, as a line of ``semfm-cli track`` has it: see `Tracker.update`."""
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def camera_from_object(self) -> Optional[NDArray[numpy.float64]]:
+        """(4, 4) float64 array, optional: from the mesh's frame and units to the camera's frame in metres, the scale is
+        included; None while lost.
+        """
+        ...
+    @property
+    def covariance(self) -> Optional[NDArray[numpy.float64]]:
+        """(6, 6) float64 array, optional: covariance of x, y, z of the mesh's origin (metres) and of the rotation vector
+        (radians), along the camera's axes; None while lost.
+        """
+        ...
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """dict: what the image says of the pose: ``visible_share``, ``hidden_share``, ``through_share``, ``outline_share``,
+        ``residual_m`` and ``probability`` by this image alone.
+        """
+        ...
+    @property
+    def frame(self) -> int:
+        """int: number of the frame among those that the tracker was given, from 0."""
+        ...
+    @property
+    def position_std(self) -> Optional[float]:
+        """float, optional: greatest standard deviation of the object's middle, metres."""
+        ...
+    @property
+    def probability(self) -> float:
+        """float: probability that the surface stands within a tenth of its diameter of where the pose puts it."""
+        ...
+    @property
+    def region(self) -> Optional[dict[str, Any]]:
+        """dict, optional: the region in this frame: ``confidence``, ``visible_share``, ``observed_share``, ``deviation_m``
+        and its middle ``centre_m``; None without one.
+        """
+        ...
+    @property
+    def rigid(self) -> Optional[NDArray[numpy.float64]]:
+        """(4, 4) float64 array, optional: the same once the object is measured in metres, for `find_grasps`."""
+        ...
+    @property
+    def rotation_std(self) -> Optional[float]:
+        """float, optional: greatest standard deviation of the rotation, radians; π where nothing seen determines it."""
+        ...
+    @property
+    def scale(self) -> Optional[float]:
+        """float, optional: metres per unit of the mesh; None while lost."""
+        ...
+    @property
+    def state(self) -> str:
+        """str: ``"new"``, ``"tracking"``, ``"occluded"``, ``"lost"`` or ``"reacquired"``."""
+        ...
+    @property
+    def time_nanos(self) -> Optional[int]:
+        """int, optional: the frame's time, nanoseconds."""
+        ...
+    def to_dict(self) -> dict[str, Any]:
+        """The line of ``semfm-cli track`` (`semfm.track/1`).
+
+        Returns
+        -------
+        dict
+        """
+        ...
+    def to_json(self) -> str:
+        """The same as text: to the byte what the command writes, without the line's end.
+
+        Returns
+        -------
+        str
+        """
+        ...
+
+class Tracker:
+    """Follows an object of known shape through the frames of a depth camera.
+
+    Each `update` takes the next frame and says where the object is, how sure that is, and in which state tracking
+    stands; ``semfm-cli track`` does the same to a bag or a BOP scene. `docs/observations.md` tells how it works and
+    where it fails.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+        In any frame and unit.
+    init : (4, 4) array_like or Alignment or path, optional
+        The pose in the first frame (`Alignment.camera_from_object`, scale included); searched where none is given.
+    scale : float, optional
+        Metres per unit of the mesh, 1 for a mesh in metres; that of `init`, else of the first alignment, where none is
+        given.
+    region : Region or path, optional
+        A region of the mesh, whose confidence is followed, too.
+    hypotheses : int, default 96
+        Poses that are tried in a frame in which the object is not where it was.
+    seed : int, default 0
+    progress : progress, optional
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm, semfm.zoo
+    >>> ball = semfm.zoo.icosphere(3)  # of radius 1, here 5 cm
+    >>> camera = semfm.Pinhole.with_pixel_centres_at_half(160, 120, 150, 150, 80, 60)
+    >>> tracker = semfm.Tracker(ball, scale=0.05)
+    >>> for x in (0.02, 0.025, 0.03):
+    ...     posed = semfm.Mesh(0.05 * ball.vertices + [x, 0, 0.5], ball.faces)
+    ...     depth = semfm.render(posed, [camera])[0].depth
+    ...     seen = semfm.Observation(camera, depth=np.where(np.isfinite(depth), depth, 1.0))
+    ...     pose = tracker.update(seen)
+    >>> pose.state, bool(abs(pose.camera_from_object[0, 3] - 0.03) < 0.003)
+    ('tracking', True)
+    """
+    def __init__(self, mesh: _MeshLike, *, init: Optional[Union[ArrayLike, Alignment, _Path]] = None, scale: Optional[float] = None, region: Optional[Union[Region, _Path]] = None, hypotheses: int = 96, seed: int = 0, progress: Optional[_Progress] = None) -> None: ...
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh: the object."""
+        ...
+    @property
+    def refined_region(self) -> Optional[Region]:
+        """Region, optional: the region as the frames so far refined it: each weight times the confidence that surface is
+        where the mesh has it; None without a region.
+        """
+        ...
+    def update(self, observation: Observation, *, mask: Optional[Union[str, ArrayLike]] = None, progress: Optional[_Progress] = None) -> TrackedPose:
+        """The object in the next frame.
+
+        Where the call is interrupted, the frame counts as one that was seen.
+
+        Parameters
+        ----------
+        observation : Observation
+            With a depth image; later than the one before, where both say when they were.
+        mask : str or (height, width) array_like, optional
+            The object's mask, which helps to find it: a name, an array of dtype bool, or the only one that there is where
+            none is given. That a frame has no mask of the name says that the object is not visible in it.
+        progress : progress, optional
+
+        Returns
+        -------
+        TrackedPose
+        """
         ...
 
 class Transfer:
@@ -3440,6 +3916,28 @@ def lift(mesh: _MeshLike, embeddings: Union[Embeddings, _Path], *, rule: str = '
     """
     ...
 
+def merged_surface(observations: Iterable[Observation], *, mask: Optional[str] = None, smooth_pixels: int = 3, trim_pixels: int = 1) -> ObservedObject:
+    """One surface of what several frames saw from known places: ``semfm-cli surface --merge``.
+
+    Parameters
+    ----------
+    observations : list of Observation
+        Their cameras' poses are known (`Observation.camera`), and the object stands still in them.
+    mask : str, optional
+        Name of the object's mask; the only one of each frame where none is given. Frames that have none, or no depth under
+        it, are left out.
+    smooth_pixels : int, default 3
+        Radius of the window in which depth is smoothed, 0 to 20.
+    trim_pixels : int, default 1
+        Pixels along the mask's outline that are left out, 0 to 100.
+
+    Returns
+    -------
+    ObservedObject
+        In the frame of the cameras' poses, metres.
+    """
+    ...
+
 def mesh_formats(*, written: bool = False) -> list[str]:
     """The formats of mesh files, by name.
 
@@ -3507,6 +4005,23 @@ def plan(robot: Robot, grasps: Union[Grasps, _Path], *, object: Optional[_MeshLi
     Returns
     -------
     GraspPlan
+    """
+    ...
+
+def planned_stages(recipe: _Path, output: _Path) -> list[dict[str, Any]]:
+    """What `run` would do with each stage, and why: ``semfm-cli run --dry-run``.
+
+    Parameters
+    ----------
+    recipe : path
+        The recipe (TOML).
+    output : path
+        The folder of the results.
+
+    Returns
+    -------
+    list of dict
+        ``stage``, and ``why`` it is to be done; None where it is kept.
     """
     ...
 
@@ -3617,6 +4132,44 @@ def read_mesh(path: _Path, *, texture: Optional[_Path] = None) -> MeshFile:
     """
     ...
 
+def read_observations(source: _Path, *, every: int = 1, most: Optional[int] = None, color_topic: Optional[str] = None, depth_topic: Optional[str] = None, info_topic: Optional[str] = None, fixed_frame: Optional[str] = None, max_gap: float = 0.03) -> Observations:
+    """The frames of a BOP scene or of a bag, as ``semfm-cli frames`` and ``semfm-cli track`` read them.
+
+    Parameters
+    ----------
+    source : path
+        A bag (`.mcap`, or a folder of them) or the folder of a BOP scene.
+    every : int, default 1
+        Take the first frame and each that is so many further on.
+    most : int, optional
+        Take at most so many.
+    color_topic : str, optional
+        Topic of the colour in a bag, where several could be meant.
+    depth_topic : str, optional
+        Topic of the depth, or of the clouds.
+    info_topic : str, optional
+        Topic of the camera; ``camera_info`` beside the depth where none is given.
+    fixed_frame : str, optional
+        Frame in which the camera's poses are given; the camera's own where none is given.
+    max_gap : float, default 0.03
+        Farthest apart that colour, depth and transforms of one frame may be, seconds.
+
+    Returns
+    -------
+    Observations
+        Each frame is read when it is asked for; what is wrong with the source is raised by then.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import semfm, tempfile
+    >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
+    >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
+    >>> semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames) # doctest: +ELLIPSIS
+    '...seen.mcap'
+    """
+    ...
+
 def read_transfer(folder: _Path) -> StoredTransfer:
     """Reads the folder of a transfer, and checks that its files belong together.
 
@@ -3706,6 +4259,30 @@ def rig(mesh: _MeshLike, *, count: int = 14, size: int = 224, field_of_view: flo
     Returns
     -------
     list of Pinhole
+    """
+    ...
+
+def run(recipe: _Path, output: _Path, *, cache: bool = True, progress: Optional[_Progress] = None) -> RunResult:
+    """Goes from pictures of a demonstration to a grasp by one recipe: pose, region, transfer, grasps and motion.
+
+    The same as ``semfm-cli run``: each stage keeps its files in a folder of its own and is done again only when
+    something that it was made from has changed. `docs/observations.md` tells of recipes and stages.
+
+    Parameters
+    ----------
+    recipe : path
+        The recipe (TOML); ``semfm-cli run --template`` prints one with every key explained.
+    output : path
+        Folder for the results; made if it is not there.
+    cache : bool, default True
+        Whether prepared shapes and embeddings are kept between runs, where the recipe does not forbid it.
+    progress : progress, optional
+        Hears of each stage by its name, 0 of 1 when it begins and 1 of 1 when it is there, and of the steps within.
+
+    Returns
+    -------
+    RunResult
+        That a stage has no answer is no error: see `RunResult.no_answer`.
     """
     ...
 
@@ -3930,5 +4507,22 @@ def write_file(path: _Path, content: bytes) -> None:
     ----------
     path : path
     content : bytes
+    """
+    ...
+
+def write_observations(path: _Path, observations: Iterable[Observation], *, progress: Optional[_Progress] = None) -> str:
+    """Writes frames as ``semfm-cli frames`` does.
+
+    Parameters
+    ----------
+    path : path
+        A ROS 2 bag (``NAME.mcap``), or a folder, which becomes a BOP scene.
+    observations : list of Observation
+    progress : progress, optional
+
+    Returns
+    -------
+    str
+        The path.
     """
     ...

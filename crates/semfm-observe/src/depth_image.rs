@@ -4,10 +4,11 @@ use std::path::Path;
 
 use image::DynamicImage;
 use semfm_align::DepthImage;
-use semfm_geom::io::FormatError;
+use semfm_geom::io::{FormatError, read_file};
 
+use crate::exr_picture::{ExrDepth, ExrPicture, is_exr};
 use crate::numpy_array::{Numbers, NumpyArray};
-use crate::picture::read_picture;
+use crate::picture::picture_in;
 use crate::{Error, Result};
 
 /// What a sensor of 16 bits writes where nothing came back, beside 0.
@@ -16,9 +17,11 @@ pub(crate) const NO_RETURN: u16 = u16::MAX;
 /// Units to the metre where nothing is said: depth in whole numbers counts millimetres.
 const MILLIMETRES: f64 = 1000.0;
 
-/// Reads a depth image: a grey PNG of 16 bits, or a NumPy array (height, width) of whole numbers or floats.
+/// Reads a depth image: a grey PNG of 16 bits, an EXR, or a NumPy array (height, width) of whole numbers or floats.
 /// `per_metre` is the number of its units to the metre; without it whole numbers count millimetres and floats metres.
-/// Where nothing came back there is 0, in 16 bits also 65535, or a number that is not finite.
+/// Where nothing came back there is 0, in 16 bits also 65535, or a number that is not finite, in an EXR also one of 65504
+/// and more. Of an EXR with several channels the depth is the one with `depth` in its name, else `Z`, else R, G and B
+/// that are the same.
 ///
 /// # Errors
 /// [`Error::Format`] for a picture of another kind (depth in 8 bits, or in a JPEG, was thrown away when it was
@@ -34,10 +37,7 @@ pub fn read_depth_image(path: &Path, per_metre: Option<f64>) -> Result<DepthImag
 
 /// As [`read_depth_image`], of one frame of many: there may be no depth in it.
 pub(crate) fn read_depth_of_frame(path: &Path, per_metre: Option<f64>) -> Result<DepthImage> {
-    if let Some(scale) = per_metre.filter(|&scale| !(scale > 0.0 && scale.is_finite())) {
-        let expected = "a positive number of units per metre";
-        return Err(Error::invalid("depth scale", expected, scale));
-    }
+    check_scale(per_metre)?;
     let is_array = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
     let (width, height, depth) =
         if is_array { from_array(path, per_metre)? } else { from_picture(path, per_metre)? };
@@ -47,6 +47,48 @@ pub(crate) fn read_depth_of_frame(path: &Path, per_metre: Option<f64>) -> Result
         }
         other => other.into(),
     })
+}
+
+/// A depth image of an array's numbers (height × width), understood as [`read_depth_image`] does.
+///
+/// # Errors
+/// [`Error::Invalid`] for truth values and for a scale that is not positive; [`Error::Align`] for another number of pixels
+/// and where no pixel has a depth.
+pub fn depth_of_numbers(
+    width: usize,
+    height: usize,
+    numbers: Numbers,
+    per_metre: Option<f64>,
+) -> Result<DepthImage> {
+    check_scale(per_metre)?;
+    let depth = metres_of_numbers(numbers, per_metre)
+        .ok_or_else(|| Error::invalid("depth", "depths", "truth values"))?;
+    Ok(DepthImage::new(width, height, depth)?)
+}
+
+fn check_scale(per_metre: Option<f64>) -> Result<()> {
+    match per_metre.filter(|&scale| !(scale > 0.0 && scale.is_finite())) {
+        Some(scale) => {
+            let expected = "a positive number of units per metre";
+            Err(Error::invalid("depth scale", expected, scale))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Metres of an array's numbers; `None` for truth values.
+fn metres_of_numbers(numbers: Numbers, per_metre: Option<f64>) -> Option<Vec<f32>> {
+    let of_floats = |value: f64| (value / per_metre.unwrap_or(1.0)) as f32;
+    let of_whole = |value: i64| match value {
+        value if value == i64::from(NO_RETURN) => 0.0,
+        value => (value as f64 / per_metre.unwrap_or(MILLIMETRES)) as f32,
+    };
+    match numbers {
+        Numbers::Whole(values) => Some(values.into_iter().map(of_whole).collect()),
+        Numbers::F32(values) => Some(values.into_iter().map(|z| of_floats(z.into())).collect()),
+        Numbers::F64(values) => Some(values.into_iter().map(of_floats).collect()),
+        Numbers::Bool(_) => None,
+    }
 }
 
 /// Metres of depths counted in 16 bits; 0 where nothing came back.
@@ -61,7 +103,11 @@ pub(crate) fn metres_of_16_bits(values: &[u16], per_metre: f64) -> Vec<f32> {
 type Read = (usize, usize, Vec<f32>);
 
 fn from_picture(path: &Path, per_metre: Option<f64>) -> Result<Read> {
-    let picture = read_picture(path)?;
+    let bytes = read_file(path)?;
+    if is_exr(&bytes) {
+        return from_exr(path, &bytes, per_metre);
+    }
+    let picture = picture_in(path, &bytes)?;
     let DynamicImage::ImageLuma16(picture) = picture else {
         let found = match picture.color() {
             image::ColorType::L8 | image::ColorType::Rgb8 => {
@@ -76,29 +122,22 @@ fn from_picture(path: &Path, per_metre: Option<f64>) -> Result<Read> {
     Ok((width as usize, height as usize, depth))
 }
 
+fn from_exr(path: &Path, bytes: &[u8], per_metre: Option<f64>) -> Result<Read> {
+    let picture = ExrPicture::read(path, bytes)?;
+    let ExrDepth { values, is_whole } = picture.depth()?;
+    let scale = per_metre.unwrap_or(if is_whole { MILLIMETRES } else { 1.0 });
+    let metres = values.iter().map(|&value| (f64::from(value) / scale) as f32).collect();
+    Ok((picture.width, picture.height, metres))
+}
+
 fn from_array(path: &Path, per_metre: Option<f64>) -> Result<Read> {
     let array = NumpyArray::read(path)?;
     let [height, width] = array.shape[..] else {
         let found = array.shape_in_words();
         return Err(FormatError::new(path, "shape", "(height, width)", found).into());
     };
-    let depth = match array.numbers {
-        Numbers::Whole(values) => {
-            let scale = per_metre.unwrap_or(MILLIMETRES);
-            let metres = |&value: &i64| match value {
-                value if value == i64::from(NO_RETURN) => 0.0,
-                value => (value as f64 / scale) as f32,
-            };
-            values.iter().map(metres).collect()
-        }
-        Numbers::Bool(_) => {
-            return Err(FormatError::new(path, "dtype", "depths", "truth values").into());
-        }
-        Numbers::F32(_) | Numbers::F64(_) => {
-            let scale = per_metre.unwrap_or(1.0);
-            array.into_f64().iter().map(|value| (value / scale) as f32).collect()
-        }
-    };
+    let depth = metres_of_numbers(array.numbers, per_metre)
+        .ok_or_else(|| FormatError::new(path, "dtype", "depths", "truth values"))?;
     Ok((width, height, depth))
 }
 

@@ -18,6 +18,7 @@ mod depth_filter;
 mod depth_image;
 mod distortion;
 mod error;
+mod exr_picture;
 mod hand;
 mod intrinsics;
 mod mask;
@@ -37,9 +38,11 @@ mod unseen;
 #[cfg(feature = "mcap")]
 pub use bag::{BagReport, BagSettings, read_bag, write_bag};
 pub use bop::{BopModel, BopScene, read_bop_models, write_bop};
-pub use depth_image::read_depth_image;
+pub use depth_image::{depth_of_numbers, read_depth_image};
 pub use distortion::Distortion;
 pub use error::{Error, Result};
+#[cfg(any(test, feature = "test-files"))]
+pub use exr_picture::write_exr;
 pub use hand::{
     Contact, ContactFrameRecord, ContactPartRecord, ContactReport, ContactSettings, Hand,
     HandFiles, HandFrame, HandPart, HandShift, PartContact, find_contact, merge_contacts,
@@ -56,7 +59,7 @@ pub use observation::{Mask, Observation, SeenObject};
 pub use observation_files::{MaskFile, ObservationFiles};
 pub use registration::{DepthGrid, RegistrationCheck, check_registration, registration_doubt};
 #[cfg(feature = "mcap")]
-pub use source::{SourceReport, SourceSettings, read_observations};
+pub use source::{SourceReport, SourceSettings, read_observations, write_observations};
 pub use surface::{ObservedSurface, SurfaceReport, SurfaceSettings};
 pub use surroundings::merged_surroundings;
 pub use unseen::{UnseenSettings, unseen_side};

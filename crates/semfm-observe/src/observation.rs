@@ -173,6 +173,16 @@ impl Observation {
         self.depth.as_ref()
     }
 
+    /// The depth image.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where there is none.
+    pub fn depth_image(&self) -> Result<&DepthImage> {
+        let found = if self.cloud.is_some() { "a cloud of points" } else { "colour alone" };
+        let none = || Error::invalid("observation", "a depth image", found);
+        self.depth.as_ref().ok_or_else(none)
+    }
+
     /// The cloud that the sensor gave in place of a depth image.
     pub fn cloud(&self) -> Option<&[DVec3]> {
         self.cloud.as_deref()
@@ -193,6 +203,37 @@ impl Observation {
             let expected = format!("one of the {} masks: {}", names.len(), names.join(", "));
             Error::invalid("mask", expected, format!("`{name}`"))
         })
+    }
+
+    /// The mask of an object: the one of this name, or the only one that there is; `None` where nobody names one and there
+    /// is none.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a name that no mask has, and where several masks may be meant.
+    pub fn mask_of_object(&self, name: Option<&str>) -> Result<Option<&Mask>> {
+        if let Some(name) = name {
+            return self.mask(name).map(Some);
+        }
+        match &self.masks[..] {
+            [] => Ok(None),
+            [only] => Ok(Some(only)),
+            several => {
+                let names: Vec<&str> = several.iter().map(|mask| mask.name.as_str()).collect();
+                let expected = format!("one of the masks {}", names.join(", "));
+                Err(Error::invalid("mask of the object", expected, "none"))
+            }
+        }
+    }
+
+    /// The same in one of many frames. That a frame has no mask of the name says that the object is not visible there.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where nobody names one and several masks may be meant.
+    pub fn mask_where_visible(&self, name: Option<&str>) -> Result<Option<&Mask>> {
+        match name {
+            Some(name) => Ok(self.masks.iter().find(|mask| mask.name == name)),
+            None => self.mask_of_object(None),
+        }
     }
 
     /// The objects whose poses are known.
@@ -295,5 +336,11 @@ mod tests {
         let by_cloud = by_cloud.with_mask("cup", marked).unwrap();
         assert_eq!(by_cloud.points(by_cloud.mask("cup").ok()).unwrap(), points);
         assert!(by_cloud.mask("mug").unwrap_err().to_string().contains("cup"));
+        assert_eq!(by_cloud.mask_of_object(None).unwrap(), by_cloud.mask("cup").ok());
+        let two = by_cloud.with_mask("hand", vec![true; 6]).unwrap();
+        let several = two.mask_of_object(None).unwrap_err().to_string();
+        assert!(several.contains("cup, hand"), "{several}");
+        assert_eq!(two.mask_of_object(Some("hand")).unwrap().unwrap().name, "hand");
+        assert_eq!(two.mask_where_visible(Some("mug")).unwrap(), None);
     }
 }

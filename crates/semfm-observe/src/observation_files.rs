@@ -16,9 +16,9 @@ use crate::{Error, Result};
 /// registered to the colour first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObservationFiles {
-    /// A PNG or JPEG.
+    /// A PNG, JPEG or EXR.
     pub color: Option<PathBuf>,
-    /// A grey PNG of 16 bits, or an array ([`read_depth_image`]).
+    /// A grey PNG of 16 bits, an EXR, or an array ([`read_depth_image`]).
     pub depth: Option<PathBuf>,
     /// Units of the depth to the metre; 1000 for whole numbers and 1 for floats where none is given.
     pub depth_scale: Option<f64>,
@@ -37,17 +37,25 @@ pub struct MaskFile {
     pub path: PathBuf,
     /// The label that marks, in a picture of labels.
     pub label: Option<u32>,
+    /// What the mask is called, where it is not as its file is.
+    pub called: Option<String>,
 }
 
 impl MaskFile {
     /// `FILE`, or `FILE#LABEL`.
     pub fn parse(text: &str) -> Self {
+        let of = |path: &str, label| Self { path: path.into(), label, called: None };
         match text.rsplit_once('#') {
             Some((path, label)) if !path.is_empty() && label.parse::<u32>().is_ok() => {
-                Self { path: path.into(), label: label.parse().ok() }
+                of(path, label.parse().ok())
             }
-            _ => Self { path: text.into(), label: None },
+            _ => of(text, None),
         }
+    }
+
+    /// The same, under another name than its file's.
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self { called: Some(name.into()), ..self }
     }
 
     /// Reads it.
@@ -61,8 +69,11 @@ impl MaskFile {
         }
     }
 
-    /// Its file's name without extension, and the label.
+    /// What it is called: its file's name without extension, and the label, where no other name was given.
     pub fn name(&self) -> String {
+        if let Some(name) = &self.called {
+            return name.clone();
+        }
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         self.label.map_or_else(|| stem.to_string(), |label| format!("{stem}#{label}"))
     }
@@ -144,6 +155,7 @@ mod tests {
         std::fs::write(at("K.json"), r#"{"fx": 50, "fy": 50, "cx": 1.5, "cy": 1}"#).unwrap();
         let mask = MaskFile::parse(&format!("{}#5", at("ids.png").display()));
         assert_eq!((mask.name().as_str(), mask.label), ("ids#5", Some(5)));
+        assert_eq!(mask.clone().named("cup").name(), "cup");
         let files = ObservationFiles {
             color: Some(at("c.png")),
             depth: Some(at("d.png")),

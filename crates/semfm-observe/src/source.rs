@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::bag::{BagSettings, read_bag};
-use crate::bop::BopScene;
+use crate::bag::{BagSettings, read_bag, write_bag};
+use crate::bop::{BopScene, write_bop};
 use crate::observation::Observation;
 use crate::{Error, Result};
 
@@ -80,4 +80,17 @@ pub fn read_observations(
         ));
     }
     Ok(SourceReport { n_observations, notes })
+}
+
+/// Writes observations as a bag, where the name ends with `.mcap`, else as the folder of a BOP scene.
+///
+/// # Errors
+/// As [`write_bag`] and [`write_bop`].
+pub fn write_observations(path: &Path, observations: &[Observation]) -> Result<()> {
+    let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+    if is_bag {
+        write_bag(path, observations)
+    } else {
+        write_bop(path, observations).map(drop)
+    }
 }

@@ -27,6 +27,35 @@ impl Default for SurfaceSettings {
     }
 }
 
+/// A window of more than 41 × 41 pixels, or a rim of more than 100, leaves little of any object; fewer vertices are no
+/// surface to match.
+const MOST_SMOOTH: usize = 20;
+const MOST_TRIM: usize = 100;
+const LEAST_VERTICES: usize = 100;
+
+impl SurfaceSettings {
+    /// Refuses settings that no object survives.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`], naming the setting.
+    pub fn check(&self) -> Result<()> {
+        let pixels = [
+            ("smooth", self.smooth_pixels, MOST_SMOOTH),
+            ("trim", self.trim_pixels, MOST_TRIM),
+        ];
+        for (name, found, most) in pixels {
+            if found > most {
+                return Err(Error::invalid(name, format!("0 to {most} pixels"), found));
+            }
+        }
+        if self.most_vertices < LEAST_VERTICES {
+            let expected = format!("at least {LEAST_VERTICES}");
+            return Err(Error::invalid("vertices", expected, self.most_vertices));
+        }
+        Ok(())
+    }
+}
+
 /// The side of an object that one camera saw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservedSurface {

@@ -62,6 +62,11 @@ type Pickled<'py> = (
 );
 
 impl Alignment {
+    /// The pose with its scale: from the mesh's frame and units to the camera's frame in metres.
+    pub fn similarity(&self) -> Sim3 {
+        self.found.camera_from_object
+    }
+
     /// The pose as readers of `aligned.json` have it.
     pub fn pose(&self) -> semfm::Result<AlignedPose> {
         AlignedPose::of_file((*self.file).clone(), Path::new("alignment"))

@@ -8,6 +8,7 @@ use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use semfm::files::rigid_pose;
 use semfm::geom::math::DVec3;
+use semfm::observe::Numbers;
 use semfm::robot::Pose;
 
 use crate::errors;
@@ -205,6 +206,22 @@ pub fn ids(
 pub fn count(value: &Bound<'_, PyAny>, name: &str) -> PyResult<usize> {
     let number = value.call_method0("item").and_then(|number| number.extract());
     number.map_err(|_| errors::wrong_type(name, "a whole number of at least 0", value))
+}
+
+/// Numbers as they were given, floats or whole, row-major, and the shape.
+pub fn numbers(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+    axes: &[Axis],
+) -> PyResult<(Numbers, Vec<usize>)> {
+    let array = checked(value, name, REAL, axes)?;
+    let letter: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if letter == "f" {
+        let (values, shape) = contiguous(&array, name)?;
+        return Ok((Numbers::F64(values), shape));
+    }
+    let (values, shape) = contiguous(&array, name)?;
+    Ok((Numbers::Whole(values), shape))
 }
 
 /// Truth values, row-major, and the shape.

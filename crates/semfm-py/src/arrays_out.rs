@@ -7,6 +7,7 @@ use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
+use semfm::geom::math::{DAffine3, DVec3};
 
 /// A read-only view (n) of numbers inside `owner`.
 pub fn vector<'py, C: PyClass<Frozen = True> + Sync, T: Element>(
@@ -69,6 +70,23 @@ pub fn owned_rows<T: Element>(
     width: usize,
 ) -> PyResult<Bound<'_, PyAny>> {
     owned(py, values).call_method1("reshape", (-1, width))
+}
+
+/// An array (n × 3) of points.
+pub fn points<'py>(py: Python<'py>, points: &[DVec3]) -> PyResult<Bound<'py, PyAny>> {
+    owned_rows(py, points.iter().flat_map(|p| p.to_array()).collect(), 3)
+}
+
+/// A rigid motion as a homogeneous matrix (4 × 4), rows first.
+pub fn motion<'py>(py: Python<'py>, motion: &DAffine3) -> PyResult<Bound<'py, PyAny>> {
+    let DAffine3 { matrix3, translation } = motion;
+    let mut rows = Vec::with_capacity(16);
+    for i in 0..3 {
+        rows.extend(matrix3.row(i).to_array());
+        rows.push(translation[i]);
+    }
+    rows.extend([0.0, 0.0, 0.0, 1.0]);
+    owned_rows(py, rows, 4)
 }
 
 /// A matrix (rows × columns, columns together) of its own.

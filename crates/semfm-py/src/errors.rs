@@ -9,7 +9,29 @@ use semfm::geom::io::printable;
 
 /// The exception of an error of any crate, with its code and place.
 pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
-    let class = match error {
+    let (class, message) = (class_of(error), error.to_string());
+    // A traceback prints the message to a terminal, and parts of it may be a file's.
+    exception(py, class, &printable(&message), error.code(), error.place().as_deref())
+}
+
+/// The exception of a run that failed: that of its cause, which names the stage.
+pub fn raise_run(py: Python<'_>, error: &semfm_run::Error) -> PyErr {
+    let mut cause = error;
+    while let semfm_run::Error::Stage { cause: inner, .. } = cause {
+        cause = inner;
+    }
+    let (class, place) = match cause {
+        semfm_run::Error::Semfm(cause) => (class_of(cause), cause.place()),
+        semfm_run::Error::Recipe(format) => ("FormatError", Some(format.place.clone())),
+        _ => ("InvalidInput", None),
+    };
+    let message = error.to_string();
+    exception(py, class, &printable(&message), error.code(), place.as_deref())
+}
+
+/// The name of an error's class.
+fn class_of(error: &semfm::Error) -> &'static str {
+    match error {
         semfm::Error::Geom(geom::Error::InFile { .. }) => "FormatError",
         semfm::Error::Format { .. } => "FormatError",
         semfm::Error::Views(
@@ -24,10 +46,7 @@ pub fn raise(py: Python<'_>, error: &semfm::Error) -> PyErr {
             "not-converged" | "not-positive-definite" | "linear-algebra" => "ComputationError",
             _ => "InvalidInput",
         },
-    };
-    // A traceback prints the message to a terminal, and parts of it may be a file's.
-    let message = error.to_string();
-    exception(py, class, &printable(&message), error.code(), error.place().as_deref())
+    }
 }
 
 /// An argument of the right type that holds what it may not: `semfm.InvalidInput`, a ValueError.

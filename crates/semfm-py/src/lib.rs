@@ -32,6 +32,9 @@ mod laplacian;
 mod matching;
 mod memory;
 mod mesh;
+mod observation;
+mod observations;
+mod observed_object;
 mod pictures;
 mod pinhole;
 mod plan;
@@ -40,6 +43,7 @@ mod precise_map;
 mod prepared;
 mod region;
 mod robot;
+mod run;
 mod scene;
 mod settings;
 mod shape;
@@ -47,6 +51,7 @@ mod shared;
 mod stored_transfer;
 mod surface;
 mod synth;
+mod tracker;
 mod transfer;
 mod transfer_function;
 mod view;
@@ -96,6 +101,12 @@ mod _semfm {
     #[pymodule_export]
     use crate::mesh::{Mesh, MeshFile, mesh_formats, read_mesh};
     #[pymodule_export]
+    use crate::observation::{_restore_observation, Observation};
+    #[pymodule_export]
+    use crate::observations::{Observations, read_observations, write_observations};
+    #[pymodule_export]
+    use crate::observed_object::{_restore_observed_object, ObservedObject, merged_surface};
+    #[pymodule_export]
     use crate::pinhole::{Pinhole, camera_towards, rig};
     #[pymodule_export]
     use crate::plan::{GraspPlan, Segment, plan};
@@ -110,6 +121,8 @@ mod _semfm {
     #[pymodule_export]
     use crate::robot::{_restore_robot, Robot};
     #[pymodule_export]
+    use crate::run::{_restore_run_result, RunResult, planned_stages, run};
+    #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
     use crate::settings::{_restore_settings, TransferSettings};
@@ -123,6 +136,8 @@ mod _semfm {
     };
     #[pymodule_export]
     use crate::synth::{_restore_demo_object, DemoObject, demo_object};
+    #[pymodule_export]
+    use crate::tracker::{_restore_tracked_pose, TrackedPose, Tracker};
     #[pymodule_export]
     use crate::transfer::{_restore_hypothesis, _restore_transfer, Hypothesis, Transfer};
     #[pymodule_export]

@@ -5,7 +5,9 @@ use std::path::Path;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use semfm::Task;
-use semfm::views::{RenderSettings, SurfaceColor, render};
+use semfm::ObservedObject;
+use semfm::observe::Observation;
+use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, camera_towards, render};
 use semfm::weight_colors::weight_colors;
 use semfm_show::{Viewpoints, viewpoints, write_sheet};
 
@@ -47,4 +49,47 @@ pub fn write_mesh_picture(
     let paint = SurfaceColor::Vertices(&colors);
     let views = render(mesh, &paint, &[best, other], &RenderSettings::default(), task)?;
     Ok(write_sheet(path, &views, 2)?)
+}
+
+/// A surface that cameras saw, from where the first of them stood and in the pictures' colours, where there are some.
+pub fn write_observed_picture(
+    path: &Path,
+    seen: &ObservedObject,
+    task: &Task,
+) -> semfm::Result<()> {
+    let mesh = seen.mesh();
+    let (low, high) = mesh.bounds();
+    let camera = seen.cameras()?.remove(0);
+    let up = -camera.camera_from_world().matrix3.row(1);
+    let towards = camera.eye() - (low + high) / 2.0;
+    let settings = RigSettings { size: SIDE, ..RigSettings::default() };
+    let camera = camera_towards(mesh, towards, up, &settings)?;
+    let colors = seen.colors().unwrap_or_default().iter();
+    let colors: Vec<[f32; 3]> = colors.map(|c| c.map(|x| f32::from(x) / 255.0)).collect();
+    let paint =
+        if colors.is_empty() { SurfaceColor::GREY } else { SurfaceColor::Vertices(&colors) };
+    let views = render(mesh, &paint, &[camera], &RenderSettings::default(), task)?;
+    Ok(write_sheet(path, &views, 1)?)
+}
+
+/// What a camera saw as a picture: its colours, else its depth from near (dark) to far, white where nothing came back.
+pub fn view_of_observation(seen: &Observation) -> View {
+    let camera = *seen.camera();
+    let n_pixels = camera.width() as usize * camera.height() as usize;
+    let rgb = match (seen.color(), seen.depth()) {
+        (Some(color), _) => color.as_flattened().to_vec(),
+        (None, Some(depth)) => grey_of_depth(depth.metres()),
+        (None, None) => vec![255; 3 * n_pixels],
+    };
+    View { camera, rgb, depth: vec![f32::INFINITY; n_pixels], triangles: vec![-1; n_pixels] }
+}
+
+fn grey_of_depth(metres: &[f32]) -> Vec<u8> {
+    let seen = metres.iter().copied().filter(|&z| z > 0.0);
+    let (near, far) = seen.fold((f32::INFINITY, 0f32), |(a, b), z| (a.min(z), b.max(z)));
+    let grey = |&z: &f32| match z > 0.0 {
+        true => (220.0 * (z - near) / (far - near).max(f32::MIN_POSITIVE)) as u8,
+        false => 255,
+    };
+    metres.iter().map(grey).flat_map(|grey| [grey; 3]).collect()
 }

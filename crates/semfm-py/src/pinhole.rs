@@ -157,16 +157,8 @@ impl Pinhole {
         height: u32,
         camera_from_world: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let py = matrix.py();
-        let (k, _) = arrays_in::floats(matrix, "matrix", &[Axis::Is(3), Axis::Is(3)])?;
-        if [k[1], k[3], k[6], k[7], k[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
-            let rows: Vec<&[f64]> = k.chunks(3).collect();
-            let expected = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] (no skew)";
-            let found = format!("the rows {rows:?}");
-            return Err(crate::errors::invalid(py, "matrix", expected, &found));
-        }
-        let (fx, fy, cx, cy) = (k[0], k[4], k[2], k[5]);
-        Self::with_pixel_centres_at_integers(py, width, height, fx, fy, cx, cy, camera_from_world)
+        let pose = pose_of(camera_from_world)?;
+        Ok(Self { camera: camera_of_matrix(matrix, "matrix", [width, height], pose)? })
     }
 
     /// int: pixels.
@@ -208,14 +200,7 @@ impl Pinhole {
     /// (4, 4) float64 array: rigid motion from the world's frame to the camera's.
     #[getter]
     fn camera_from_world<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let DAffine3 { matrix3, translation, .. } = self.camera.camera_from_world();
-        let mut rows = Vec::with_capacity(16);
-        for i in 0..3 {
-            rows.extend(matrix3.row(i).to_array());
-            rows.push(translation[i]);
-        }
-        rows.extend([0.0, 0.0, 0.0, 1.0]);
-        arrays_out::owned_rows(py, rows, 4)
+        arrays_out::motion(py, &self.camera.camera_from_world())
     }
 
     /// (3,) float64 array: where the camera stands, in the world's frame.
@@ -333,8 +318,7 @@ impl Pinhole {
             let seen = image.points(&camera, mask)?.object.into_iter();
             Ok(seen.map(|p| world_from_camera.transform_point3(p)).collect::<Vec<_>>())
         })?;
-        let numbers = points.iter().flat_map(|p| p.to_array()).collect();
-        arrays_out::owned_rows(py, numbers, 3)
+        arrays_out::points(py, &points)
     }
 
     fn __repr__(&self) -> String {
@@ -471,8 +455,26 @@ pub fn rows_and_columns<'py>(
     PyTuple::new(py, shape)
 }
 
+/// The camera of a calibration's matrix (3 × 3), for pictures of a width and a height.
+pub fn camera_of_matrix(
+    matrix: &Bound<'_, PyAny>,
+    name: &str,
+    [width, height]: [u32; 2],
+    pose: DAffine3,
+) -> PyResult<geom::Pinhole> {
+    let (k, _) = arrays_in::floats(matrix, name, &[Axis::Is(3), Axis::Is(3)])?;
+    if [k[1], k[3], k[6], k[7], k[8]] != [0.0, 0.0, 0.0, 0.0, 1.0] {
+        let rows: Vec<&[f64]> = k.chunks(3).collect();
+        let expected = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] (no skew)";
+        let found = format!("the rows {rows:?}");
+        return Err(crate::errors::invalid(matrix.py(), name, expected, &found));
+    }
+    let intrinsics = Intrinsics { width, height, fx: k[0], fy: k[4], cx: k[2], cy: k[5] };
+    guard(matrix.py(), || Ok(geom::Pinhole::with_pixel_centres_at_integers(intrinsics, pose)?))
+}
+
 /// The pose of a camera; the camera's own frame is the world where none is given.
-fn pose_of(camera_from_world: Option<&Bound<'_, PyAny>>) -> PyResult<DAffine3> {
+pub fn pose_of(camera_from_world: Option<&Bound<'_, PyAny>>) -> PyResult<DAffine3> {
     let pose = camera_from_world.map(|pose| rigid_matrix(pose, "camera_from_world"));
     Ok(pose.transpose()?.unwrap_or(DAffine3::IDENTITY))
 }

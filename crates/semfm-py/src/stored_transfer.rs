@@ -45,7 +45,7 @@ impl StoredTransfer {
 
     /// Region: the region on the target, of the vertices that count with their weights.
     #[getter]
-    fn region(&self, py: Python<'_>) -> PyResult<Region> {
+    pub fn region(&self, py: Python<'_>) -> PyResult<Region> {
         let path = self.folder.join("region.json");
         let region = &self.inner.region.region;
         Ok(Region { inner: Shared::new(guard(py, || region.region(&path, &self.inner.target))?) })

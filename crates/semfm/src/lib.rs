@@ -69,6 +69,8 @@ pub mod memory;
 mod motion_scene;
 #[cfg(feature = "mcap")]
 pub mod object_encoder;
+#[cfg(feature = "mcap")]
+mod object_of_frames;
 mod object_place;
 mod object_size;
 pub mod observed_object;
@@ -97,6 +99,8 @@ pub use motion_scene::{
     FingerJoint, FrameOwner, MotionFrame, MotionObject, MotionObstacle, MotionRobot, MotionScene,
     MountedHand, ObstacleShape, SceneState,
 };
+#[cfg(feature = "mcap")]
+pub use object_of_frames::{ObjectFrame, ObservedEmbeddings, ObservedObject, VisibleFrames};
 pub use object_place::{ObjectPlace, pose_of_numbers};
 pub use object_size::ObjectSize;
 pub use pipeline::{

@@ -38,6 +38,13 @@ impl ObservedViews {
         if wants.reads_colors { Self::Both } else { Self::Surface }
     }
 
+    /// Those of which [`embed_observed`] made a file; `None` for embeddings of other views.
+    #[cfg(feature = "mcap")]
+    pub fn of_file(file: &EmbeddingsFile) -> Option<Self> {
+        let (shown, _) = file.metadata.views.rig.split_once(" of ")?;
+        shown.parse().ok()
+    }
+
     fn has_pictures(self) -> bool {
         self != Self::Surface
     }

@@ -46,6 +46,22 @@ impl Default for BagSettings {
     }
 }
 
+/// A gap of this many seconds or more pairs what has nothing to do with each other.
+const WIDEST_GAP: f64 = 3600.0;
+
+impl BagSettings {
+    /// With a gap in seconds.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for what is not from 0 to an hour.
+    pub fn with_max_gap(self, seconds: f64) -> Result<Self> {
+        if !(0.0..WIDEST_GAP).contains(&seconds) {
+            return Err(Error::invalid("max gap", "0 to 3600 seconds", seconds));
+        }
+        Ok(Self { max_gap_nanos: (seconds * 1e9) as u64, ..self })
+    }
+}
+
 /// What was found in a bag.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BagReport {

@@ -88,7 +88,7 @@ pub use plan::{
 };
 pub use point_map::PointMapFile;
 pub use region::{FORMAT as REGION_FORMAT, RegionFile, read_region, write_region};
-pub use rigid_pose::{read_rigid_pose, rigid_pose};
+pub use rigid_pose::{read_camera_pose, read_rigid_pose, rigid_pose};
 #[cfg(feature = "mcap")]
 pub use ros2_grasps::write_ros2_grasps;
 #[cfg(feature = "mcap")]

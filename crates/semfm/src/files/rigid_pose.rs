@@ -5,6 +5,7 @@ use std::path::Path;
 use parry3d_f64::math::Pose;
 use semfm_align::Sim3;
 use semfm_geom::io::{FormatError, read_json};
+use semfm_geom::math::{DAffine3, DMat3};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -33,6 +34,15 @@ pub fn read_rigid_pose(path: &Path, name: &str) -> Result<Pose> {
     let expected = "rows of a rotation and a translation in metres";
     let pose = rigid_pose(rows);
     Ok(pose.map_err(|found| FormatError::new(path, place, expected, found))?)
+}
+
+/// Reads where a camera stood: [`read_rigid_pose`] of `camera_from_world`.
+///
+/// # Errors
+/// As [`read_rigid_pose`].
+pub fn read_camera_pose(path: &Path) -> Result<DAffine3> {
+    let pose = read_rigid_pose(path, "camera_from_world")?;
+    Ok(DAffine3::from_mat3_translation(DMat3::from_quat(pose.rotation), pose.translation))
 }
 
 /// The rotation and translation of a 4 × 4 matrix, rows first, points as columns, whose scale is 1 to within 1e-4.

@@ -1,0 +1,195 @@
+//! `read_observations`: the frames of a BOP scene or of a bag, one after the other.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use semfm::observe::{self, BagSettings, SourceReport, SourceSettings};
+
+use crate::errors;
+use crate::interruptible::run;
+use crate::observation::{Observation, observation_of};
+
+/// Between two looks at Python's signals.
+const NAP: Duration = Duration::from_millis(40);
+/// Frames that are read ahead.
+const AHEAD: usize = 1;
+
+/// The frames of a BOP scene or of a bag, in order: an iterator of `Observation`, made by `read_observations`.
+///
+/// Files are read as frames are asked for, with one frame read ahead; a bag of any length needs the memory of some frames.
+#[pyclass(frozen, module = "semfm")]
+pub struct Observations {
+    source: PathBuf,
+    /// Taken by whoever waits for the next frame, without the interpreter's lock.
+    news: Mutex<Option<Receiver<News>>>,
+    notes: Mutex<Vec<String>>,
+}
+
+enum News {
+    Seen(Box<observe::Observation>),
+    End(semfm::Result<SourceReport>),
+}
+
+impl Observations {
+    fn open(source: PathBuf, settings: SourceSettings) -> Self {
+        let (tell, news) = sync_channel(AHEAD);
+        let path = source.clone();
+        std::thread::spawn(move || {
+            let end = observe::read_observations(&path, &settings, |seen| tell_of(&tell, seen));
+            // Nothing receives any more where the frames were left alone.
+            let _ = tell.send(News::End(end.map_err(Into::into)));
+        });
+        Self { source, news: Mutex::new(Some(news)), notes: Mutex::default() }
+    }
+
+    /// Waits for news, but not for long; `None` after the end.
+    fn nap(&self) -> Option<Result<News, RecvTimeoutError>> {
+        let news = self.news.lock().unwrap_or_else(PoisonError::into_inner);
+        news.as_ref().map(|news| news.recv_timeout(NAP))
+    }
+
+    /// Forgets the reader, which then ends.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| *self.news.lock().unwrap_or_else(PoisonError::into_inner) = None);
+    }
+}
+
+/// Hands a frame on; an error where nobody wants it any more, which ends the reader.
+fn tell_of(tell: &SyncSender<News>, seen: observe::Observation) -> observe::Result<()> {
+    let told = tell.send(News::Seen(Box::new(seen)));
+    told.map_err(|_| semfm::geom::Error::Cancelled.into())
+}
+
+#[pymethods]
+impl Observations {
+    /// list of str: what was chosen or left out (topics, messages without a counterpart), known at the end.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Observation>> {
+        loop {
+            let Some(news) = py.detach(|| self.nap()) else { return Ok(None) };
+            match news {
+                Ok(News::Seen(seen)) => return Ok(Some(Observation { inner: Arc::new(*seen) })),
+                Ok(News::End(end)) => {
+                    self.close(py);
+                    let report = end.map_err(|error| errors::raise(py, &error))?;
+                    *self.notes.lock().unwrap_or_else(PoisonError::into_inner) = report.notes;
+                    return Ok(None);
+                }
+                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.close(py);
+                    return Err(errors::internal(py, "the reader of frames vanished"));
+                }
+            }
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Observations({:?})", self.source.display().to_string())
+    }
+}
+
+/// The frames of a BOP scene or of a bag, as ``semfm-cli frames`` and ``semfm-cli track`` read them.
+///
+/// Parameters
+/// ----------
+/// source : path
+///     A bag (`.mcap`, or a folder of them) or the folder of a BOP scene.
+/// every : int, default 1
+///     Take the first frame and each that is so many further on.
+/// most : int, optional
+///     Take at most so many.
+/// color_topic : str, optional
+///     Topic of the colour in a bag, where several could be meant.
+/// depth_topic : str, optional
+///     Topic of the depth, or of the clouds.
+/// info_topic : str, optional
+///     Topic of the camera; ``camera_info`` beside the depth where none is given.
+/// fixed_frame : str, optional
+///     Frame in which the camera's poses are given; the camera's own where none is given.
+/// max_gap : float, default 0.03
+///     Farthest apart that colour, depth and transforms of one frame may be, seconds.
+///
+/// Returns
+/// -------
+/// Observations
+///     Each frame is read when it is asked for; what is wrong with the source is raised by then.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import semfm, tempfile
+/// >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
+/// >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
+/// >>> semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames) # doctest: +ELLIPSIS
+/// '...seen.mcap'
+#[pyfunction]
+#[pyo3(signature = (
+    source, *, every=1, most=None, color_topic=None, depth_topic=None, info_topic=None, fixed_frame=None, max_gap=0.03
+))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
+pub fn read_observations(
+    py: Python<'_>,
+    source: PathBuf,
+    every: usize,
+    most: Option<usize>,
+    color_topic: Option<String>,
+    depth_topic: Option<String>,
+    info_topic: Option<String>,
+    fixed_frame: Option<String>,
+    max_gap: f64,
+) -> PyResult<Observations> {
+    if every == 0 {
+        return Err(errors::invalid(py, "every", "at least 1", "0"));
+    }
+    let bag = BagSettings {
+        color: color_topic,
+        depth: depth_topic,
+        camera_info: info_topic,
+        fixed_frame,
+        ..BagSettings::default()
+    };
+    let bag = bag.with_max_gap(max_gap).map_err(|error| errors::raise(py, &error.into()))?;
+    Ok(Observations::open(source, SourceSettings { bag, every, most }))
+}
+
+/// Writes frames as ``semfm-cli frames`` does.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     A ROS 2 bag (``NAME.mcap``), or a folder, which becomes a BOP scene.
+/// observations : list of Observation
+/// progress : progress, optional
+///
+/// Returns
+/// -------
+/// str
+///     The path.
+#[pyfunction]
+#[pyo3(signature = (path, observations, *, progress=None))]
+pub fn write_observations(
+    path: PathBuf,
+    observations: &Bound<'_, PyAny>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let list = observations.try_iter();
+    let list =
+        list.map_err(|_| errors::wrong_type("observations", "Observations", observations))?;
+    let frames = list.map(|seen| Ok((*observation_of(&seen?)?.inner).clone()));
+    let frames = frames.collect::<PyResult<Vec<_>>>()?;
+    let written = path.display().to_string();
+    run(observations.py(), progress, move |_| Ok(observe::write_observations(&path, &frames)?))?;
+    Ok(written)
+}

@@ -1,0 +1,223 @@
+"""`semfm.Observation`: pictures and depth as arrays, and what the shell makes of the same, to the last byte."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from observed_frames import CAMERA, HEIGHT, K, WALL, WIDTH, in_metres, seen, shell, turned, write_files
+
+import semfm
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """A mug with its true grip, and a kettle in metres."""
+    mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=2000) for i in (0, 1))
+    return mug, in_metres(kettle.mesh)
+
+
+@pytest.fixture(scope="module")
+def kettle(pair):
+    return seen(turned(pair[1], [0.02, 0.0, 0.6], 60.0))
+
+
+def test_arrays_come_out_as_they_went_in(kettle):
+    assert (kettle.color.shape, kettle.color.dtype) == ((HEIGHT, WIDTH, 3), np.uint8)
+    assert (kettle.depth.shape, kettle.depth.dtype) == ((HEIGHT, WIDTH), np.float32)
+    mask = kettle.masks["object"]
+    assert mask.dtype == bool and list(kettle.masks) == ["object"]
+    assert np.all(kettle.depth[~mask] == np.float32(WALL)) and np.all(kettle.depth[mask] < 0.8)
+    assert kettle.camera == CAMERA and kettle.time_nanos is None and kettle.objects == []
+    for view in (kettle.color, kettle.depth, mask):
+        with pytest.raises(ValueError, match="read-only"):
+            view[0, 0] = 0
+    metres = semfm.Observation(CAMERA, depth=kettle.depth, color=kettle.color, masks=[mask])
+    assert list(metres.masks) == ["0"] and np.array_equal(metres.depth, kettle.depth)
+    feet = semfm.Observation(K, depth=kettle.depth / 0.3048, depth_scale=1 / 0.3048)
+    np.testing.assert_allclose(feet.depth, kettle.depth, rtol=1e-6)
+    assert repr(kettle) == "Observation(320 × 240, colour, depth, 1 mask)"
+    assert kettle.picture().startswith(b"\x89PNG") and kettle._repr_png_().startswith(b"\x89PNG")
+    for again in (pickle.loads(pickle.dumps(kettle)), copy.deepcopy(kettle)):
+        assert again == kettle
+    assert metres != kettle
+
+
+def test_points_lie_where_the_camera_sees_them(kettle):
+    points = kettle.cloud("object")
+    u, v, z = kettle.camera.project(points).T
+    mask = kettle.masks["object"]
+    assert len(points) == mask.sum()
+    assert mask[v.astype(int), u.astype(int)].all()
+    np.testing.assert_allclose(z, kettle.depth[mask], rtol=1e-6)
+    assert np.array_equal(kettle.cloud(mask), points)
+    assert len(kettle.cloud()) == WIDTH * HEIGHT
+    beside = kettle.surroundings()
+    assert len(beside) > 500 and np.allclose(beside[:, 2], WALL)
+    # A sensor that gives points is asked in the same way.
+    sensor = semfm.Observation(CAMERA, cloud=kettle.cloud(), masks=kettle.masks)
+    assert np.array_equal(sensor.cloud("object"), points) and sensor.depth is None
+    assert pickle.loads(pickle.dumps(sensor)) == sensor
+
+
+def test_a_lens_and_a_pose_are_taken_into_account(kettle):
+    lens = {"distortion": [0.3, 0, 0, 0, 0]}
+    bent = semfm.Observation(K, depth=kettle.depth, **lens)
+    assert bent.depth[0, 0] == 0 and bent.depth[120, 160] == kettle.depth[120, 160]
+    # A fisheye lens bends rays with coefficients of 0, too: off the middle it shows what lies farther out.
+    fisheye = semfm.Observation(K, color=kettle.color, distortion=[0] * 4, distortion_model="equidistant")
+    straight = semfm.Observation(K, color=kettle.color, distortion=[0] * 4)
+    assert np.array_equal(straight.color, kettle.color) and not np.array_equal(fisheye.color, kettle.color)
+    pose = np.eye(4)
+    pose[:3, 3] = [0.1, 0.2, 0.3]
+    posed = semfm.Observation(K, depth=kettle.depth, camera_from_world=pose, time_nanos=5)
+    assert np.array_equal(posed.camera.camera_from_world, pose) and posed.time_nanos == 5
+
+
+def test_files_are_read_as_the_shell_reads_them(kettle, tmp_path):
+    files = write_files(tmp_path, kettle)
+    read = semfm.Observation.read(**files)
+    assert read == kettle
+    named = semfm.Observation.read(**{**files, "mask": {"kettle": files["mask"]}}, hand_mask=files["mask"])
+    assert list(named.masks) == ["kettle", "hand"]
+    written = shell(
+        "frames", "--color", files["color"], "--depth", files["depth"], "--intrinsics", files["intrinsics"],
+        "--mask", files["mask"], "-o", tmp_path / "shell",
+    )  # fmt: skip
+    assert written.returncode == 0, written.stderr
+    assert semfm.write_observations(tmp_path / "python", [read]) == str(tmp_path / "python")
+    names = sorted(path.relative_to(tmp_path / "shell") for path in (tmp_path / "shell").rglob("*.*"))
+    assert names == sorted(p.relative_to(tmp_path / "python") for p in (tmp_path / "python").rglob("*.*"))
+    for name in names:
+        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+
+
+def test_a_source_hands_out_one_frame_after_the_other(pair, tmp_path):
+    frames = [
+        seen(turned(pair[1], [0.01 * i, 0, 0.6], 10.0 * i), time_nanos=10**9 + 10**8 * i) for i in range(5)
+    ]
+    for name in ("seen.mcap", "scene"):
+        semfm.write_observations(tmp_path / name, frames)
+    bag = semfm.read_observations(tmp_path / "seen.mcap")
+    first = next(bag)
+    assert np.array_equal(first.color, frames[0].color) and np.array_equal(first.depth, frames[0].depth)
+    assert first.time_nanos == frames[0].time_nanos and first.masks == {}
+    assert bag.notes == [] and len(list(bag)) == 4
+    assert any("camera from" in note for note in bag.notes)
+    assert list(bag) == []
+    scene = list(semfm.read_observations(tmp_path / "scene", every=2, most=2))
+    assert [each.time_nanos for each in scene] == [frames[0].time_nanos, frames[2].time_nanos]
+    assert np.array_equal(scene[1].masks["obj0"], frames[2].masks["object"])
+    assert scene[1].objects[0]["mask"] == "obj0" and scene[1].objects[0]["camera_from_object"].shape == (4, 4)
+    # An iterator that is left alone stops its reader.
+    for _ in semfm.read_observations(tmp_path / "seen.mcap"):
+        break
+    with pytest.raises(semfm.FileError):
+        next(semfm.read_observations(tmp_path / "nothing.mcap"))
+    with pytest.raises(semfm.InvalidInput, match="max gap"):
+        semfm.read_observations(tmp_path / "seen.mcap", max_gap=-1.0)
+
+
+@pytest.mark.parametrize("views", [None, "both"])
+def test_a_surface_is_the_same_at_the_shell(kettle, tmp_path, views):
+    files = write_files(tmp_path, kettle)
+    more = ["--views", views] if views else []
+    made = shell(
+        "surface", "--color", files["color"], "--depth", files["depth"], "--intrinsics", files["intrinsics"],
+        "--mask", files["mask"], "-o", tmp_path / "shell", *more,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    surface = semfm.Observation.read(**files).surface()
+    embeddings = surface.embed(views=views)
+    written = surface.write(tmp_path / "python", embeddings=embeddings)
+    assert len(written) == 5
+    for name in ("surface.ply", "surface.emb.mcap", "surface.views.mcap", "around.ply", "surface.json"):
+        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    assert surface.report["views"] is None and surface.report["object"] == "object"
+    assert surface.mesh == semfm.Mesh.read(tmp_path / "shell/surface.ply")
+    assert surface.colors.shape == (surface.mesh.n_vertices, 3) and surface.colors.dtype == np.uint8
+    assert surface.around.shape[1] == 3 and surface.cameras == [CAMERA]
+
+
+def test_a_region_on_what_was_seen_is_the_same_at_the_shell(pair, kettle, tmp_path):
+    mug = pair[0]
+    mug.mesh.write(tmp_path / "mug.obj")
+    mug.region.write(tmp_path / "grip.json", mug.mesh)
+    surface = kettle.surface("object")
+    embeddings = surface.embed()
+    surface.write(tmp_path / "seen", embeddings=embeddings)
+    run = shell(
+        "transfer", tmp_path / "mug.obj", tmp_path / "seen/surface.ply", "--region", tmp_path / "grip.json",
+        "--target-embeddings", tmp_path / "seen/surface.emb.mcap", "--no-cache", "-o", tmp_path / "shell",
+    )  # fmt: skip
+    assert run.returncode in (0, 1), run.stderr
+    result = semfm.transfer(
+        tmp_path / "mug.obj", surface.mesh, tmp_path / "grip.json", target_embeddings=embeddings
+    )
+    result.write(tmp_path / "python")
+    for name in ("region.json", "point_map.json", "target.ply"):
+        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    # The other way round, the observed object is the demonstrated one.
+    back = semfm.transfer(surface.mesh, mug.mesh, result.region, source_embeddings=embeddings)
+    assert back.region.n_vertices == mug.mesh.n_vertices
+
+
+def test_several_frames_become_one_surface(pair, tmp_path):
+    frames = []
+    for x in (-0.1, 0.0, 0.1):
+        pose = np.eye(4)
+        pose[0, 3] = -x
+        frames.append(seen(turned(pair[1], [-x, 0, 0.6]), camera_from_world=pose))
+    semfm.write_observations(tmp_path / "scene", frames)
+    made = shell("surface", tmp_path / "scene", "--merge", "--no-embeddings", "-o", tmp_path / "shell")
+    assert made.returncode == 0, made.stderr
+    merged = semfm.merged_surface(semfm.read_observations(tmp_path / "scene"))
+    merged.write(tmp_path / "python")
+    for name in ("surface.ply", "around.ply", "surface.json"):
+        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    assert len(merged.observations) == 3 and repr(merged).endswith("of 3 frames)")
+    assert abs(merged.mesh.bounds.mean(axis=0)[0]) < 0.02
+    with pytest.raises(semfm.InvalidInput, match="pose in each frame"):
+        semfm.merged_surface([seen(turned(pair[1], [0, 0, 0.6]))] * 2)
+
+
+def test_a_surface_is_an_object_like_others(kettle):
+    surface = kettle.surface(kettle.masks["object"], smooth_pixels=2, most_vertices=2000)
+    assert surface.mesh.n_vertices <= 2000 and surface.report["object"] == "mask"
+    again = pickle.loads(pickle.dumps(surface))
+    assert again.mesh == surface.mesh and np.array_equal(again.around, surface.around)
+    assert surface.observations[0] != kettle and surface.observations[0].depth is not None
+    assert surface.picture().startswith(b"\x89PNG") and surface._repr_png_().startswith(b"\x89PNG")
+    prepared = semfm.prepare(surface.mesh, embeddings=surface.embed(views="pictures"), k=20)
+    assert prepared.encoder["name"] == "builtin"
+
+
+def test_what_is_wrong_is_said(kettle, tmp_path):
+    depth, mask = kettle.depth, kettle.masks["object"]
+    wrong = [
+        (lambda: semfm.Observation(K), "a picture that tells the size"),
+        (lambda: semfm.Observation(np.ones((3, 3)), depth=depth), "no skew"),
+        (lambda: semfm.Observation(K, depth=depth, color=kettle.color[:-1]), "color"),
+        (lambda: semfm.Observation(K, depth=depth, masks={"cup": mask[:, 1:]}), "mask `cup`"),
+        (lambda: semfm.Observation(K, depth=depth, masks={"cup": ~np.ones_like(mask)}), "marked"),
+        (lambda: semfm.Observation(K, depth=depth, depth_scale=-1.0), "depth scale"),
+        (lambda: semfm.Observation(K, depth=depth, distortion=[1.0, 2.0]), "4, 5 or 8"),
+        (lambda: semfm.Observation(K, depth=depth, distortion=[0] * 4, distortion_model="x"), "plumb_bob"),
+        (lambda: kettle.cloud("cup"), "object"),
+        (lambda: kettle.surface(smooth_pixels=99), "smooth"),
+        (lambda: kettle.surface().embed(views="mesh"), "`mesh`"),
+        (lambda: kettle.surface().write(tmp_path, embeddings=semfm.embed(kettle.surface().mesh)), "embed"),
+        (lambda: semfm.Observation(K, depth=depth).surroundings(), "that of an object"),
+        (lambda: semfm.Observation(K, color=kettle.color).surface(), "colour alone"),
+        (lambda: semfm.Observation.read(tmp_path / "K.json", depth=tmp_path / "d.png"), "d.png"),
+    ]  # fmt: skip
+    for call, words in wrong:
+        with pytest.raises((semfm.InvalidInput, semfm.FileError), match=words):
+            call()
+    with pytest.raises(semfm.InvalidType, match="uint8"):
+        semfm.Observation(K, color=kettle.color.astype(np.int32))
+    several = semfm.Observation(K, depth=depth, masks={"a": mask, "b": ~mask})
+    with pytest.raises(semfm.InvalidInput, match="a, b"):
+        several.surface()
