@@ -16,7 +16,7 @@ use serde_json::Value;
 
 const STAGES: [&str; 5] = ["demonstration-pose", "region", "transfer", "target-pose", "grasp"];
 
-/// Pictures of a hand on a mug and of a kettle, with a recipe beside them.
+/// Pictures of a hand on a mug and of a smaller one, with a recipe beside them.
 struct Fixture {
     folder: tempfile::TempDir,
     mug: SynthObject,
@@ -110,7 +110,6 @@ fn share_in_grip(mesh: &Mesh, region: &Value, grip: &[bool]) -> f64 {
 }
 
 #[test]
-#[ignore = "its new pictures were not tried yet: cargo test -p semfm-tests --test run -- --ignored"]
 fn pictures_become_grasps_and_only_what_changed_is_done_again() {
     let fixture = Fixture::new();
     let planned = fixture.run("out", &["--dry-run"]);
@@ -181,7 +180,6 @@ fn pictures_become_grasps_and_only_what_changed_is_done_again() {
 }
 
 #[test]
-#[ignore = "its new pictures were not tried yet: cargo test -p semfm-tests --test run -- --ignored"]
 fn a_killed_run_goes_on_where_it_was() {
     let fixture = Fixture::new();
     let words =
@@ -216,10 +214,9 @@ fn walk(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "its new pictures were not tried yet: cargo test -p semfm-tests --test run -- --ignored"]
 fn a_run_without_an_answer_says_where_it_ended_and_what_to_do() {
     let fixture = Fixture::new();
-    // No part of a kettle is that thin.
+    // No part of a mug is that thin.
     fixture.write_recipe("width_range = [0.0001, 0.0002]\n");
     for state in ["done", "kept"] {
         let answer = fixture.run("out", &["--json"]);
