@@ -33,6 +33,7 @@ mod matching;
 mod memory;
 mod mesh;
 mod observation;
+mod observation_parts;
 mod observations;
 mod observed_object;
 mod pictures;

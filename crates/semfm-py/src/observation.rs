@@ -6,15 +6,13 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
 use semfm::ObjectFrame;
-use semfm::files::read_camera_pose;
-use semfm::geom::math::DAffine3;
-use semfm::observe::{
-    self, Distortion, MaskFile, ObservationFiles, SeenObject, SurfaceSettings, depth_of_numbers,
-};
+use semfm::geom::math::{DAffine3, DVec3};
+use semfm::observe::{self, ObservationFiles, SeenObject, SurfaceSettings, depth_of_numbers};
 use semfm_show::write_sheet;
 
 use crate::arrays_in::{self, Axis};
 use crate::interruptible::{guard, run};
+use crate::observation_parts::{Pictures, axes, given_pose, lens_of, mask_files, masks_of};
 use crate::observed_object::ObservedObject;
 use crate::pinhole::{Pinhole, camera_of_matrix, pose_of, rows_and_columns};
 use crate::{arrays_out, errors, pictures};
@@ -71,117 +69,6 @@ pub struct Observation {
     pub inner: Arc<observe::Observation>,
 }
 
-/// Rows and columns of the pictures, where they are known.
-type Size = Option<[usize; 2]>;
-
-fn axes(size: Size) -> [Axis; 2] {
-    match size {
-        Some([height, width]) => [Axis::Is(height), Axis::Is(width)],
-        None => [Axis::Any("height"), Axis::Any("width")],
-    }
-}
-
-/// Pictures as they were given, of one size.
-#[derive(Default)]
-struct Pictures {
-    size: Size,
-    color: Option<Vec<[u8; 3]>>,
-    depth: Option<observe::Numbers>,
-}
-
-impl Pictures {
-    fn of(
-        size: Size,
-        color: Option<&Bound<'_, PyAny>>,
-        depth: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let mut found = Self { size, ..Self::default() };
-        if let Some(depth) = depth {
-            let (numbers, shape) = arrays_in::numbers(depth, "depth", &axes(size))?;
-            found = Self { size: Some([shape[0], shape[1]]), depth: Some(numbers), ..found };
-        }
-        if let Some(color) = color {
-            let [height, width] = axes(found.size);
-            let (bytes, shape) = arrays_in::bytes(color, "color", &[height, width, Axis::Is(3)])?;
-            found.size = Some([shape[0], shape[1]]);
-            found.color = Some(bytes.as_chunks::<3>().0.to_vec());
-        }
-        Ok(found)
-    }
-}
-
-/// Masks by name, out of a dict or a list.
-fn masks_of(masks: &Bound<'_, PyAny>, size: [usize; 2]) -> PyResult<Vec<(String, Vec<bool>)>> {
-    let named: Vec<(String, Bound<'_, PyAny>)> = match masks.cast::<PyDict>() {
-        Ok(dict) => dict
-            .iter()
-            .map(|(name, mask)| {
-                let words = "text as names of masks";
-                let name = name.extract().map_err(|_| errors::wrong_type("masks", words, &name))?;
-                Ok((name, mask))
-            })
-            .collect::<PyResult<_>>()?,
-        Err(_) => {
-            let list = masks.try_iter();
-            let list = list.map_err(|_| errors::wrong_type("masks", "a dict or a list", masks))?;
-            let number = |(i, mask): (usize, PyResult<_>)| Ok((i.to_string(), mask?));
-            list.enumerate().map(number).collect::<PyResult<_>>()?
-        }
-    };
-    let checked = |(name, mask): (String, Bound<'_, PyAny>)| {
-        let marked = arrays_in::mask(&mask, &format!("mask `{name}`"), &axes(Some(size)))?.0;
-        Ok((name, marked))
-    };
-    named.into_iter().map(checked).collect()
-}
-
-/// The lens of these coefficients; `None` where it bends nothing.
-fn lens_of(
-    py: Python<'_>,
-    coefficients: Option<&Bound<'_, PyAny>>,
-    model: &str,
-) -> PyResult<Option<Distortion>> {
-    let Some(coefficients) = coefficients else { return Ok(None) };
-    let (numbers, _) = arrays_in::floats(coefficients, "distortion", &[Axis::Any("c")])?;
-    match model {
-        "plumb_bob" | "rational_polynomial" => guard(py, || Ok(Distortion::brown(&numbers)?)),
-        "equidistant" => guard(py, || Ok(Some(Distortion::equidistant(&numbers)?))),
-        other => {
-            let expected = "'plumb_bob', 'rational_polynomial' or 'equidistant'";
-            Err(errors::invalid(py, "distortion_model", expected, &format!("{other:?}")))
-        }
-    }
-}
-
-/// The files of masks that an argument names: one, several, or several by name.
-fn mask_files(masks: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<MaskFile>> {
-    let Some(masks) = masks else { return Ok(Vec::new()) };
-    let file = |path: &Bound<'_, PyAny>| -> PyResult<MaskFile> {
-        let wanted = "a path, paths, or a dict of paths by name";
-        let path: PathBuf =
-            path.extract().map_err(|_| errors::wrong_type("mask", wanted, path))?;
-        Ok(match path.to_str() {
-            Some(text) => MaskFile::parse(text),
-            None => MaskFile { path, label: None, called: None },
-        })
-    };
-    if let Ok(dict) = masks.cast::<PyDict>() {
-        let named = dict.iter().map(|(name, path)| {
-            let wanted = "text as names of masks";
-            let name: String =
-                name.extract().map_err(|_| errors::wrong_type("mask", wanted, &name))?;
-            Ok(file(&path)?.named(name))
-        });
-        return named.collect();
-    }
-    if masks.extract::<PathBuf>().is_ok() {
-        return Ok(vec![file(masks)?]);
-    }
-    let list = masks.try_iter();
-    let list = list.map_err(|_| errors::wrong_type("mask", "a path or paths", masks))?;
-    list.map(|path| file(&path?)).collect()
-}
-
 #[pymethods]
 impl Observation {
     #[new]
@@ -223,17 +110,8 @@ impl Observation {
         let masks = masks.map(|masks| masks_of(masks, size)).transpose()?.unwrap_or_default();
         let lens = lens_of(py, distortion, distortion_model)?;
         let seen = run(py, None, move |_| {
-            let mut seen = observe::Observation::new(camera);
+            let mut seen = observation(camera, color, depth, depth_scale, cloud)?;
             seen.time_nanos = time_nanos;
-            if let Some(color) = color {
-                seen = seen.with_color(color)?;
-            }
-            if let Some(numbers) = depth {
-                seen = seen.with_depth(depth_of_numbers(width, height, numbers, depth_scale)?)?;
-            }
-            if let Some(cloud) = cloud {
-                seen = seen.with_cloud(cloud)?;
-            }
             for (name, marked) in masks {
                 seen = seen.with_mask(name, marked)?;
             }
@@ -351,7 +229,10 @@ impl Observation {
         let one = |object: &SeenObject| {
             let entry = PyDict::new(py);
             entry.set_item("id", object.id)?;
-            entry.set_item("camera_from_object", arrays_out::motion(py, &object.camera_from_object)?)?;
+            entry.set_item(
+                "camera_from_object",
+                arrays_out::motion(py, &object.camera_from_object)?,
+            )?;
             let mask = object.mask.map(|mask| self.inner.masks()[mask].name.as_str());
             entry.set_item("mask", mask)?;
             Ok(entry)
@@ -492,7 +373,8 @@ impl Observation {
             Ok((mask.name.clone(), marked))
         });
         let objects = seen.objects().iter();
-        let objects = objects.map(|o| Ok((o.id, arrays_out::motion(py, &o.camera_from_object)?, o.mask)));
+        let objects =
+            objects.map(|o| Ok((o.id, arrays_out::motion(py, &o.camera_from_object)?, o.mask)));
         let pickled = (
             slf.get().camera(),
             Self::color(slf)?,
@@ -538,12 +420,12 @@ pub fn _restore_observation(
     objects: Vec<(u32, Bound<'_, PyAny>, Option<usize>)>,
     time_nanos: Option<u64>,
 ) -> PyResult<Observation> {
-    let model = "plumb_bob";
-    let seen = Observation::new(
-        camera.as_any(), color, depth, None, cloud, None, None, model, None, time_nanos,
-    )?;
-    let mut seen = (*seen.inner).clone();
-    let py = camera.py();
+    let (py, camera) = (camera.py(), camera.get().camera);
+    let size = Some([camera.height() as usize, camera.width() as usize]);
+    let Pictures { color, depth, .. } = Pictures::of(size, color, depth)?;
+    let cloud = cloud.map(|cloud| arrays_in::points(cloud, "cloud")).transpose()?;
+    let mut seen = guard(py, || observation(camera, color, depth, None, cloud))?;
+    seen.time_nanos = time_nanos;
     for (name, marked) in masks {
         let marked = arrays_in::mask(&marked, "mask", &[Axis::Any("pixels")])?.0;
         seen = guard(py, || Ok(seen.with_mask(name, marked)?))?;
@@ -553,6 +435,28 @@ pub fn _restore_observation(
         seen = guard(py, || Ok(seen.with_object(object)?))?;
     }
     Ok(Observation { inner: Arc::new(seen) })
+}
+
+/// What a camera saw, without masks.
+fn observation(
+    camera: semfm::geom::Pinhole,
+    color: Option<Vec<[u8; 3]>>,
+    depth: Option<observe::Numbers>,
+    depth_scale: Option<f64>,
+    cloud: Option<Vec<DVec3>>,
+) -> semfm::Result<observe::Observation> {
+    let (width, height) = (camera.width() as usize, camera.height() as usize);
+    let mut seen = observe::Observation::new(camera);
+    if let Some(color) = color {
+        seen = seen.with_color(color)?;
+    }
+    if let Some(numbers) = depth {
+        seen = seen.with_depth(depth_of_numbers(width, height, numbers, depth_scale)?)?;
+    }
+    if let Some(cloud) = cloud {
+        seen = seen.with_cloud(cloud)?;
+    }
+    Ok(seen)
 }
 
 impl Observation {
@@ -579,12 +483,4 @@ impl Observation {
 pub fn observation_of<'a>(value: &'a Bound<'_, PyAny>) -> PyResult<&'a Observation> {
     let seen = value.cast::<Observation>();
     Ok(seen.map_err(|_| errors::wrong_type("observation", "an Observation", value))?.get())
-}
-
-/// The pose of a camera: a matrix, or a file of one.
-fn given_pose(value: &Bound<'_, PyAny>) -> PyResult<DAffine3> {
-    match value.extract::<PathBuf>() {
-        Ok(path) => guard(value.py(), || read_camera_pose(&path)),
-        Err(_) => pose_of(Some(value)),
-    }
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use semfm::Task;
 use semfm::ObservedObject;
+use semfm::Task;
 use semfm::observe::Observation;
 use semfm::views::{RenderSettings, RigSettings, SurfaceColor, View, camera_towards, render};
 use semfm::weight_colors::weight_colors;

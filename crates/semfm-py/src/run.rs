@@ -150,10 +150,7 @@ impl RunResult {
         html
     }
 
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_run_result")?;
         Ok((restore, (self.file.to_json().to_string(), self.folder())))
     }
@@ -217,12 +214,7 @@ pub fn run(
     Ok(RunResult { file: Arc::new(file), folder })
 }
 
-fn carry_out(
-    recipe: &Path,
-    output: &Path,
-    cache: bool,
-    task: &Task,
-) -> semfm_run::Result<RunFile> {
+fn carry_out(recipe: &Path, output: &Path, cache: bool, task: &Task) -> semfm_run::Result<RunFile> {
     let settings = RunSettings { cache, ..RunSettings::default() };
     // That somebody wants it to stop is heard by the stages themselves.
     let mut tell = |progress: RunProgress<'_>| match progress {

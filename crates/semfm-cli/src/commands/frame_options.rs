@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
-use semfm::files::read_rigid_pose;
-use semfm::geom::math::{DAffine3, DMat3};
+use semfm::files::read_camera_pose;
 use semfm::observe::{
     BagSettings, BopScene, Mask, MaskFile, Observation, ObservationFiles, SourceReport,
     SourceSettings, read_observations,
@@ -15,10 +14,10 @@ use semfm::observe::{
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Files", group = ArgGroup::new("picture").multiple(true).args(["color", "depth"]))]
 pub struct FrameFileOptions {
-    /// A colour picture: PNG or JPEG
+    /// A colour picture: PNG, JPEG or EXR
     #[arg(long, value_name = "IMAGE", requires = "intrinsics")]
     pub color: Option<PathBuf>,
-    /// A depth image: 16-bit PNG or .npy
+    /// A depth image: 16-bit PNG, EXR or .npy
     #[arg(long, value_name = "DEPTH", requires = "intrinsics")]
     pub depth: Option<PathBuf>,
     /// Units of the depth image to the metre [default: 1000 for whole numbers, 1 for floats]
@@ -51,10 +50,7 @@ impl FrameFileOptions {
     /// The frame.
     pub fn read(&self) -> Result<Observation> {
         let calibration = self.intrinsics.clone().context("--intrinsics is needed")?;
-        let pose = self.pose.as_deref().map(|path| read_rigid_pose(path, "camera_from_world"));
-        let pose = pose.transpose()?.map(|pose| {
-            DAffine3::from_mat3_translation(DMat3::from_quat(pose.rotation), pose.translation)
-        });
+        let pose = self.pose.as_deref().map(read_camera_pose).transpose()?;
         let files = ObservationFiles {
             color: self.color.clone(),
             depth: self.depth.clone(),
@@ -94,17 +90,16 @@ impl BagOptions {
         if let Some(option) = self.given().filter(|_| BopScene::is_scene(source)) {
             bail!("{option}: expected a bag, found the BOP scene {}", source.display());
         }
-        let max_gap_nanos = match self.max_gap {
-            None => BagSettings::default().max_gap_nanos,
-            Some(gap) if (0.0..3600.0).contains(&gap) => (gap * 1e9) as u64,
-            Some(gap) => bail!("--max-gap: expected 0 to 3600 seconds, found {gap}"),
-        };
-        Ok(BagSettings {
+        let settings = BagSettings {
             color: self.color_topic.clone(),
             depth: self.depth_topic.clone(),
             camera_info: self.info_topic.clone(),
             fixed_frame: self.fixed_frame.clone(),
-            max_gap_nanos,
+            ..BagSettings::default()
+        };
+        Ok(match self.max_gap {
+            Some(seconds) => settings.with_max_gap(seconds).context("--max-gap")?,
+            None => settings,
         })
     }
 
@@ -196,25 +191,7 @@ pub fn read_source_frame(source: &Path, number: usize, bag: &BagOptions) -> Resu
 
 /// The mask of the object: the named one, or the only one; none where there is none.
 pub fn chosen_mask<'a>(seen: &'a Observation, object: Option<&str>) -> Result<Option<&'a Mask>> {
-    if let Some(name) = object {
-        return Ok(Some(seen.mask(name).context("--object")?));
-    }
-    match seen.masks() {
-        [] => Ok(None),
-        [only] => Ok(Some(only)),
-        several => {
-            let names: Vec<&str> = several.iter().map(|mask| mask.name.as_str()).collect();
-            bail!("--object: expected one of the masks {}, found none", names.join(", "))
-        }
-    }
-}
-
-/// The mask of the object in one of many frames. That a frame has none of the name says that the object is not visible there.
-pub fn mask_in_frame<'a>(seen: &'a Observation, object: Option<&str>) -> Result<Option<&'a Mask>> {
-    match object {
-        Some(name) => Ok(seen.masks().iter().find(|mask| mask.name == name)),
-        None => chosen_mask(seen, None),
-    }
+    seen.mask_of_object(object).context("--object")
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use semfm::geom::io::is_same_file;
-use semfm::observe::{read_observations, write_bag, write_bop};
+use semfm::observe::{read_observations, write_observations};
 
 use super::Outcome;
 use super::frame_options::{BagOptions, FrameChoice, FrameFileOptions};
@@ -65,12 +65,7 @@ impl FramesCommand {
                 vec![self.files.read()?]
             }
         };
-        let is_bag = self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-        if is_bag {
-            write_bag(&self.output, &observations)?;
-        } else {
-            write_bop(&self.output, &observations)?;
-        }
+        write_observations(&self.output, &observations)?;
         if !common.quiet {
             console::message(format_args!("{} frames", observations.len()));
         }

@@ -1,25 +1,21 @@
 //! `semfm-cli surface`: what a depth camera saw of an object, as an object.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use semfm::encoder::{ObservedPicture, WantedViews};
-use semfm::files::{SURFACE_FILES, SurfaceResult, write_surface};
+use semfm::files::SURFACE_FILES;
 use semfm::geom::ShapeCache;
-use semfm::geom::math::{DAffine3, DVec3};
 use semfm::observe::{
-    Mask, MaskedFrame, MergedSurface, Observation, ObservedSurface, SourceReport, SourceSettings,
-    SurfaceReport, SurfaceSettings, merged_surface, merged_surroundings, read_observations,
+    Observation, SourceReport, SourceSettings, SurfaceSettings, read_observations,
 };
-use semfm::observed_object::{ObservedViews, embed_observed, observed_views};
-use semfm::{Mesh, Method};
+use semfm::observed_object::ObservedViews;
+use semfm::{Method, ObjectFrame, ObservedObject, VisibleFrames};
 
 use super::Outcome;
 use super::encoder_options::EncoderOptions;
-use super::frame_options::{
-    BagOptions, FrameFileOptions, chosen_mask, mask_in_frame, parse_source, read_source_frame,
-};
+use super::frame_options::{BagOptions, FrameFileOptions, parse_source, read_source_frame};
 use crate::console;
 use crate::options::Common;
 use crate::output::{check_folder, check_folder_again};
@@ -89,25 +85,12 @@ struct SurfaceOptions {
 
 impl SurfaceOptions {
     fn settings(&self) -> Result<SurfaceSettings> {
-        for (option, found, most) in [("--smooth", self.smooth, 20), ("--trim", self.trim, 100)] {
-            if found > most {
-                bail!("{option}: expected 0 to {most} pixels, found {found}");
-            }
-        }
-        if self.vertices < 100 {
-            bail!("--vertices: expected at least 100, found {}", self.vertices);
-        }
         let Self { smooth, trim, vertices } = *self;
-        Ok(SurfaceSettings { smooth_pixels: smooth, trim_pixels: trim, most_vertices: vertices })
+        let settings =
+            SurfaceSettings { smooth_pixels: smooth, trim_pixels: trim, most_vertices: vertices };
+        settings.check().map_err(|error| anyhow!("--{error}"))?;
+        Ok(settings)
     }
-}
-
-/// A surface, whether one frame or several saw it.
-struct Seen {
-    mesh: Mesh,
-    colors: Option<Vec<[u8; 3]>>,
-    pixels: Option<SurfaceReport>,
-    around: Vec<DVec3>,
 }
 
 impl SurfaceCommand {
@@ -121,40 +104,25 @@ impl SurfaceCommand {
         let task = console::progress(common.quiet);
         let all = self.frames(source.as_ref(), common)?;
         check_folder_again(&self.output, SURFACE_FILES)?;
-        let shown = self.shown_frames(&all, common)?;
-        let frames: Vec<&Observation> = shown.iter().map(|frame| frame.seen).collect();
-        let Seen { mesh, colors, pixels, around } = match shown[..] {
-            [MaskedFrame { seen, mask }] => seen_once(seen, mask, &settings)?,
-            _ => seen_often(&shown, &settings)?,
-        };
+        let seen = ObservedObject::new(self.frames_of_object(all, common)?, &settings)?;
         let embeddings = match self.no_embeddings {
             true => None,
             false => {
                 let most_rolls = Method::default().info().features.rolls;
                 let encoder = self.encoder.open(most_rolls, &ShapeCache::off(), common)?;
-                let wants = encoder.encoder().wants();
-                let kind = self.shown_views(&frames, &wants)?;
-                let pictures = pictures(&shown)?;
-                let views = observed_views(&mesh, &pictures, kind, &wants, &task)?;
-                let made = embed_observed(&views, &**encoder.encoder(), encoder.rolls(), &task)?;
-                Some((made, kind))
+                let shown = seen.shown(self.views, &encoder.encoder().wants());
+                let shown = shown.map_err(|error| anyhow!("--{error}"))?;
+                Some(seen.embed(&encoder, Some(shown), &task)?)
             }
         };
-        let result = SurfaceResult {
-            mesh: &mesh,
-            colors: colors.as_deref(),
-            frames: &frames,
-            object: shown.iter().find_map(|frame| frame.mask).map(|mask| mask.name.as_str()),
-            pixels,
-            around: &around,
-            embeddings: embeddings.as_ref().map(|(file, kind)| (file, *kind)),
-        };
-        let files = write_surface(&self.output, &result, &task)?;
+        let embeddings = embeddings.as_ref().map(|made| (&made.file, made.shown));
+        let files = seen.write(&self.output, embeddings, &task)?;
         if !common.quiet {
-            print_surface(&result);
+            print_surface(&seen);
         }
         if common.json {
-            console::data(serde_json::to_string(&result.file())?);
+            let file = seen.with_result(embeddings, |result| result.file());
+            console::data(serde_json::to_string(&file)?);
         } else {
             files.iter().for_each(|file| console::data(file.display()));
         }
@@ -191,14 +159,6 @@ impl SurfaceCommand {
                 if all.is_empty() {
                     bail!("{}: expected at least one frame, found none", path.display());
                 }
-                let poses = all.iter().map(|seen| seen.camera().camera_from_world());
-                if all.len() > 1 && poses.clone().all(|pose| pose == DAffine3::IDENTITY) {
-                    bail!(
-                        "{}: expected the camera's pose in each frame (a BOP scene with cam_R_w2c and cam_t_w2c, a bag with \
-                         --fixed-frame), found none",
-                        path.display()
-                    );
-                }
                 Ok(all)
             }
             Some((path, number)) => {
@@ -222,104 +182,36 @@ impl SurfaceCommand {
     }
 
     /// The frames that show the object. Where several are merged, those without its mask, or without depth under it, are
-    /// left out; where no frame has any mask, all that was seen is the object.
-    fn shown_frames<'a>(
-        &self,
-        all: &'a [Observation],
-        common: &Common,
-    ) -> Result<Vec<MaskedFrame<'a>>> {
+    /// left out.
+    fn frames_of_object(&self, all: Vec<Observation>, common: &Common) -> Result<Vec<ObjectFrame>> {
         let object = self.object.as_deref();
-        let frame = |seen: &'a Observation| {
-            let mask = match self.merge {
-                true => mask_in_frame(seen, object)?,
-                false => chosen_mask(seen, object)?,
-            };
-            Ok(MaskedFrame { seen, mask })
-        };
-        let frames: Vec<MaskedFrame<'a>> = all.iter().map(frame).collect::<Result<_>>()?;
-        if frames.iter().all(|frame| frame.mask.is_none()) {
-            if let Some(name) = object {
-                bail!("--object: expected a mask of some frame, found none of the name `{name}`");
-            }
-            return Ok(frames);
-        }
+        let all = all.into_iter().map(Arc::new);
         if !self.merge {
-            return Ok(frames);
+            let frames = all.map(|seen| ObjectFrame::of(seen, object));
+            return frames.collect::<semfm::Result<_>>().context("--object");
         }
-        let mut shown = Vec::new();
-        for (number, frame) in frames.iter().enumerate() {
-            let why = match frame.mask {
-                None => "it has no mask of the object",
-                Some(mask) if frame.seen.points(Some(mask)).is_err() => "no depth under its mask",
-                Some(_) => {
-                    shown.push(*frame);
-                    continue;
-                }
-            };
-            if !common.quiet {
-                console::message(format_args!("frame {number} is left out: {why}"));
-            }
+        let VisibleFrames { frames, left_out } =
+            VisibleFrames::of(all, object).context("--merge")?;
+        if !common.quiet {
+            left_out.iter().for_each(console::message);
         }
-        if shown.is_empty() {
-            bail!("--merge: expected depth under the mask of some frame, found none");
-        }
-        Ok(shown)
+        Ok(frames)
     }
-
-    /// What the encoder is shown.
-    fn shown_views(&self, frames: &[&Observation], wants: &WantedViews) -> Result<ObservedViews> {
-        let has_color = frames.iter().all(|seen| seen.color().is_some());
-        match self.views {
-            Some(shown) if !has_color && shown != ObservedViews::Surface => {
-                bail!("--views {shown}: expected a colour picture, found depth alone")
-            }
-            Some(shown) => Ok(shown),
-            None if has_color => Ok(ObservedViews::for_encoder(wants)),
-            None => Ok(ObservedViews::Surface),
-        }
-    }
-}
-
-/// The surface of one frame, in its camera's frame.
-fn seen_once(seen: &Observation, mask: Option<&Mask>, settings: &SurfaceSettings) -> Result<Seen> {
-    let ObservedSurface { mesh, colors, report, .. } = seen.surface(mask, settings)?;
-    let around = mask.map(|mask| seen.surroundings(mask)).transpose()?.unwrap_or_default();
-    Ok(Seen { mesh, colors, pixels: Some(report), around })
-}
-
-/// The surface of several frames, in the frame in which their cameras are posed.
-fn seen_often(frames: &[MaskedFrame<'_>], settings: &SurfaceSettings) -> Result<Seen> {
-    let MergedSurface { mesh, colors, .. } = merged_surface(frames, settings)?;
-    Ok(Seen { mesh, colors, pixels: None, around: merged_surroundings(frames)? })
-}
-
-/// The pictures before the mesh: of one frame in its camera's frame, of several in the world's.
-fn pictures<'a>(frames: &[MaskedFrame<'a>]) -> Result<Vec<ObservedPicture<'a>>> {
-    let picture = |&MaskedFrame { seen, mask }: &MaskedFrame<'a>| {
-        let camera = match frames {
-            [_] => seen.camera().posed(DAffine3::IDENTITY)?,
-            _ => *seen.camera(),
-        };
-        // The surface is rendered without colours.
-        let color = seen.color().unwrap_or_default();
-        Ok(ObservedPicture { camera, color, mask: mask.map(|mask| &mask.marked[..]) })
-    };
-    frames.iter().map(picture).collect()
 }
 
 /// What was made of the pixels.
-fn print_surface(result: &SurfaceResult<'_>) {
-    let (low, high) = result.mesh.bounds();
+fn print_surface(seen: &ObservedObject) {
+    let (low, high) = seen.mesh().bounds();
     let [x, y, z] = (1e3 * (high - low)).to_array();
-    let (n, faces) = (result.mesh.n_vertices(), result.mesh.n_faces());
+    let (n, faces) = (seen.mesh().n_vertices(), seen.mesh().n_faces());
     console::message(format_args!("{n} vertices, {faces} triangles; {x:.0} × {y:.0} × {z:.0} mm"));
-    if let Some(report) = result.pixels {
+    if let Some(report) = seen.pixels() {
         console::message(format_args!(
             "of {} pixels, {} of them without depth and filled",
             report.n_pixels, report.n_filled
         ));
     }
-    if !result.around.is_empty() {
-        console::message(format_args!("{} points of what is around it", result.around.len()));
+    if !seen.around().is_empty() {
+        console::message(format_args!("{} points of what is around it", seen.around().len()));
     }
 }

@@ -14,7 +14,7 @@ use semfm::track::{DepthFrame, TrackRecord, TrackSettings, TrackState, Tracker};
 use semfm::{Mesh, Region, Task};
 
 use super::Outcome;
-use super::frame_options::{BagOptions, FrameChoice, mask_in_frame};
+use super::frame_options::{BagOptions, FrameChoice};
 use crate::console;
 use crate::options::Common;
 use crate::output::{check_distinct, check_file};
@@ -208,14 +208,11 @@ impl TrackCommand {
         bag: Option<&mut Ros2Track<'_, '_>>,
     ) -> Result<()> {
         let number = run.states.values().sum::<usize>();
-        let Some(depth) = seen.depth() else {
-            let found = if seen.cloud().is_some() { "a cloud of points" } else { "colour alone" };
-            bail!("frame {number}: expected a depth image, found {found}");
-        };
+        let depth = seen.depth_image().with_context(|| format!("frame {number}"))?;
         if !depth.has_depth() {
             run.tell_of_no_depth(number);
         }
-        let mask = mask_in_frame(seen, self.object.as_deref())?;
+        let mask = seen.mask_where_visible(self.object.as_deref()).context("--object")?;
         run.mask_seen |= mask.is_some();
         let frame = DepthFrame {
             depth,
