@@ -41,7 +41,7 @@ pub struct Reader {
 }
 
 /// All of them.
-pub const READERS: [Reader; 17] = [
+pub const READERS: [Reader; 18] = [
     Reader { name: "obj", extension: "obj", read: mesh },
     Reader { name: "off", extension: "off", read: mesh },
     Reader { name: "ply", extension: "ply", read: mesh },
@@ -59,6 +59,7 @@ pub const READERS: [Reader; 17] = [
     Reader { name: "npy", extension: "npy", read: npy },
     Reader { name: "npz", extension: "npz", read: npz },
     Reader { name: "png", extension: "png", read: picture },
+    Reader { name: "exr", extension: "exr", read: picture },
 ];
 
 /// Runs a reader on bytes, as a fuzzer has them.

@@ -75,6 +75,7 @@ pub fn own_seeds(reader: &str) -> Vec<Vec<u8>> {
         ],
         "npz" => vec![npz()],
         "png" => pngs(),
+        "exr" => exrs(),
         other => panic!("no reader `{other}`"),
     }
 }
@@ -384,6 +385,27 @@ fn crc32(bytes: &[u8]) -> u32 {
             (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
         })
     })
+}
+
+/// Depth and colours in EXR, by each way to pack them.
+fn exrs() -> Vec<Vec<u8>> {
+    use exr::prelude::*;
+    let channel = |name: &str| {
+        let values = (0..192).map(|i| 0.5 + 0.01 * i as f32).collect();
+        AnyChannel::new(name, FlatSamples::F32(values))
+    };
+    let encoded = |names: &[&str], compression: Compression| {
+        let channels = AnyChannels::sort(names.iter().map(|name| channel(name)).collect());
+        let encoding = Encoding { compression, ..Encoding::FAST_LOSSLESS };
+        let layer = Layer::new((16, 12), LayerAttributes::default(), encoding, channels);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = Image::from_layer(layer);
+        image.write().non_parallel().to_buffered(&mut bytes).expect("an EXR");
+        bytes.into_inner()
+    };
+    let all = [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::ZIP16];
+    let all = all.into_iter().chain([Compression::PIZ, Compression::PXR24, Compression::B44]);
+    all.flat_map(|packed| [encoded(&["Z"], packed), encoded(&["R", "G", "B"], packed)]).collect()
 }
 
 fn pngs() -> Vec<Vec<u8>> {

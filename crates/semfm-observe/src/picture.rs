@@ -1,4 +1,4 @@
-//! PNG and JPEG files as pixels.
+//! PNG, JPEG and EXR files as pixels.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -7,6 +7,7 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use semfm_geom::io::{FormatError, foreign_kind, read_file};
 
 use crate::Result;
+use crate::exr_picture::{ExrPicture, is_exr};
 
 /// Bytes that a colour profile or a text beside the pixels may unpack to, and those that the pixels may.
 const MOST_BESIDE: u64 = 16 << 20;
@@ -18,8 +19,16 @@ const MOST_PIXEL_BYTES: u64 = 1 << 30;
 /// [`semfm_geom::Error::Io`]; [`Error::Format`](crate::Error::Format) where it is none, or where it unpacks to more
 /// than a gigabyte.
 pub(crate) fn read_picture(path: &Path) -> Result<DynamicImage> {
-    let decoded = picture_of(&read_file(path)?);
-    decoded.map_err(|found| FormatError::new(path, "picture", "a PNG or JPEG", found).into())
+    picture_in(path, &read_file(path)?)
+}
+
+/// The same of the bytes of a file.
+pub(crate) fn picture_in(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
+    if is_exr(bytes) {
+        return Ok(ExrPicture::read(path, bytes)?.color()?.into());
+    }
+    let expected = "a PNG, JPEG or EXR";
+    picture_of(bytes).map_err(|found| FormatError::new(path, "picture", expected, found).into())
 }
 
 /// A picture out of the bytes of a PNG or JPEG; what they are instead, in words, where they are none.

@@ -65,7 +65,7 @@ struct ObservedOptions {
     /// The cloud was put together from many views: any side may be in it
     #[arg(long, requires = "cloud", conflicts_with = "viewpoint")]
     many_views: bool,
-    /// A depth image: 16-bit PNG or .npy
+    /// A depth image: 16-bit PNG, EXR or .npy
     #[arg(long, value_name = "DEPTH", requires = "intrinsics")]
     depth: Option<PathBuf>,
     /// Units of the depth image to the metre [default: 1000 for whole numbers, 1 for floats]

@@ -1,0 +1,260 @@
+//! EXR files: depth in floats, and colours in linear light.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::image::FlatSamples;
+use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
+use image::RgbImage;
+use semfm_geom::io::FormatError;
+
+/// Bytes that the pixels of a file may unpack to.
+const MOST_PIXEL_BYTES: u128 = 1 << 28;
+
+/// From here on a float says that nothing came back: no number of 16 bits is greater, and Blender writes 1e10.
+const NO_RETURN: f32 = 65504.0;
+
+/// Whether bytes begin as an EXR file does.
+pub(crate) fn is_exr(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
+}
+
+/// The channels of a file, all of the picture's size.
+pub(crate) struct ExrPicture<'a> {
+    path: &'a Path,
+    pub width: usize,
+    pub height: usize,
+    channels: Vec<Channel>,
+}
+
+/// One number for each pixel.
+struct Channel {
+    /// `Z`, or `View Layer.Depth.Z`.
+    name: String,
+    samples: FlatSamples,
+}
+
+/// A channel of depth.
+pub(crate) struct ExrDepth {
+    /// Row-major (height × width), in the file's unit; 0 where nothing came back.
+    pub values: Vec<f32>,
+    /// Whether the file counts in whole numbers.
+    pub is_whole: bool,
+}
+
+impl<'a> ExrPicture<'a> {
+    /// Of the bytes of a file; `path` is for messages.
+    ///
+    /// # Errors
+    /// A [`FormatError`] where they are damaged or unpack to more than 256 MB, for samples of several resolutions or with
+    /// depths of their own, and for pixels of a part of the picture only.
+    pub fn read(path: &'a Path, bytes: &[u8]) -> Result<Self, FormatError> {
+        let fault = |expected: &str, found: String| FormatError::new(path, "EXR", expected, found);
+        let damaged = |error: exr::error::Error| fault("a sound EXR file", error.to_string());
+        let about = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(damaged)?;
+        let of_layer = |header: &exr::meta::header::Header| {
+            header.layer_size.area() as u128 * header.channels.bytes_per_pixel as u128
+        };
+        let n_bytes: u128 = about.headers.iter().map(of_layer).sum();
+        if n_bytes > MOST_PIXEL_BYTES {
+            let expected = format!("pixels of at most {MOST_PIXEL_BYTES} bytes");
+            return Err(fault(&expected, format!("{n_bytes} bytes")));
+        }
+        let layers = read().no_deep_data().largest_resolution_level().all_channels().all_layers();
+        let layers = layers.all_attributes().pedantic().non_parallel();
+        let image = layers.from_buffered(Cursor::new(bytes)).map_err(damaged)?;
+        let window = image.attributes.display_window;
+        let (width, height) = (window.size.width(), window.size.height());
+        let mut channels = Vec::new();
+        for layer in image.layer_data {
+            if layer.size != window.size || layer.attributes.layer_position != window.position {
+                let expected = format!("pixels of the whole picture, {width} × {height}");
+                let found = format!("{} × {} of them", layer.size.width(), layer.size.height());
+                return Err(fault(&expected, found));
+            }
+            let layer_name = layer.attributes.layer_name.map(|name| format!("{name}."));
+            for channel in layer.channel_data.list {
+                let name = format!("{}{}", layer_name.as_deref().unwrap_or(""), channel.name);
+                if channel.sample_data.len() != width * height {
+                    let found = format!("{} in `{name}`", channel.sample_data.len());
+                    return Err(fault("a sample of each channel at each pixel", found));
+                }
+                channels.push(Channel { name, samples: channel.sample_data });
+            }
+        }
+        Ok(Self { path, width, height, channels })
+    }
+
+    /// The depth: a channel with `depth` in its name, else `Z`, else the only one, else R, G and B that are the same.
+    ///
+    /// # Errors
+    /// A [`FormatError`] with the names of the channels where none or several are meant.
+    pub fn depth(&self) -> Result<ExrDepth, FormatError> {
+        let has_depth = |channel: &&Channel| {
+            channel.name.split('.').any(|part| part.eq_ignore_ascii_case("depth"))
+        };
+        let found = only(self.channels.iter().filter(has_depth))
+            .or_else(|| only(self.channels.iter().filter(|channel| channel.is_of("z"))))
+            .or_else(|| only(self.channels.iter()))
+            .or_else(|| self.grey());
+        let Some(Channel { samples, .. }) = found else {
+            let expected = "one channel of depth: a single one, or one of the name `Z` or `depth`";
+            return Err(self.other_channels(expected));
+        };
+        let depth = |z: f32| if z < NO_RETURN { z } else { 0.0 };
+        Ok(ExrDepth {
+            values: samples.values_as_f32().map(depth).collect(),
+            is_whole: matches!(samples, FlatSamples::U32(_)),
+        })
+    }
+
+    /// The colours as sRGB: R, G and B, or one channel as grey.
+    ///
+    /// # Errors
+    /// A [`FormatError`] with the names of the channels where there are others.
+    pub fn color(&self) -> Result<RgbImage, FormatError> {
+        let grey = || only(self.channels.iter()).map(|channel| [channel; 3]);
+        let Some(rgb) = self.rgb().or_else(grey) else {
+            return Err(self.other_channels("channels R, G and B, or a single one"));
+        };
+        let rgb = rgb.map(|channel| channel.samples.values_as_f32().map(srgb).collect::<Vec<u8>>());
+        let pixel = |x: u32, y: u32| {
+            let at = y as usize * self.width + x as usize;
+            image::Rgb([0, 1, 2].map(|c| rgb[c][at]))
+        };
+        Ok(RgbImage::from_fn(self.width as u32, self.height as u32, pixel))
+    }
+
+    /// The first R, G and B of one layer.
+    fn rgb(&self) -> Option<[&Channel; 3]> {
+        self.channels.iter().filter(|channel| channel.is_of("r")).find_map(|red| {
+            let of = |name: &str| {
+                let mut all = self.channels.iter();
+                all.find(|other| other.is_of(name) && other.layer() == red.layer())
+            };
+            Some([red, of("g")?, of("b")?])
+        })
+    }
+
+    /// R, where G and B are the same.
+    fn grey(&self) -> Option<&Channel> {
+        let [red, green, blue] = self.rgb()?;
+        let same = |other: &Channel| {
+            let bits = |channel: &Channel| {
+                channel.samples.values_as_f32().map(f32::to_bits).collect::<Vec<u32>>()
+            };
+            bits(red) == bits(other)
+        };
+        (same(green) && same(blue)).then_some(red)
+    }
+
+    fn other_channels(&self, expected: &str) -> FormatError {
+        let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
+        FormatError::new(self.path, "channels", expected, names.join(", "))
+    }
+}
+
+impl Channel {
+    /// Whether it has this name behind that of its layer.
+    fn is_of(&self, name: &str) -> bool {
+        self.name.rsplit('.').next().is_some_and(|own| own.eq_ignore_ascii_case(name))
+    }
+
+    fn layer(&self) -> &str {
+        self.name.rsplit_once('.').map_or("", |(layer, _)| layer)
+    }
+}
+
+/// The item of an iterator that has one.
+fn only<T>(mut items: impl Iterator<Item = T>) -> Option<T> {
+    let first = items.next();
+    first.filter(|_| items.next().is_none())
+}
+
+/// Linear light, 0 to 1, as sRGB of 8 bits (IEC 61966-2-1).
+fn srgb(linear: f32) -> u8 {
+    let linear = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
+    let encoded =
+        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * encoded).round() as u8
+}
+
+/// Writes an EXR of 32-bit floats with these channels, for tests.
+#[cfg(any(test, feature = "test-files"))]
+pub fn write_exr(path: &Path, [width, height]: [usize; 2], channels: &[(&str, Vec<f32>)]) {
+    use exr::prelude::*;
+    let channels = channels
+        .iter()
+        .map(|(name, values)| AnyChannel::new(*name, FlatSamples::F32(values.clone())));
+    let channels = AnyChannels::sort(channels.collect());
+    let layer =
+        Layer::new((width, height), LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
+    Image::from_layer(layer).write().non_parallel().to_file(path).unwrap();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::read_picture;
+    use crate::read_depth_image;
+    use semfm_align::DepthImage;
+
+    #[test]
+    fn depth_is_in_metres_and_what_is_not_finite_is_no_return() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let values = vec![0.5, f32::NAN, f32::INFINITY, 1e10, 0.0, 1.25];
+        let image = DepthImage::new(3, 2, vec![0.5, 0.0, 0.0, 0.0, 0.0, 1.25]).unwrap();
+        write_exr(&at("z.exr"), [3, 2], &[("Z", values.clone())]);
+        assert_eq!(read_depth_image(&at("z.exr"), None).unwrap(), image);
+        let mm = values.iter().map(|z| z * 1000.0).collect();
+        write_exr(&at("mm.exr"), [3, 2], &[("anything", mm)]);
+        assert_eq!(read_depth_image(&at("mm.exr"), Some(1000.0)).unwrap(), image);
+        // As Blender's compositor writes a single pass, and a file of many passes.
+        let grey = ["R", "G", "B"].map(|name| (name, values.clone()));
+        write_exr(&at("grey.exr"), [3, 2], &grey);
+        assert_eq!(read_depth_image(&at("grey.exr"), None).unwrap(), image);
+        let passes = ["V.Combined.R", "V.Combined.G", "V.Combined.B", "V.Normal.Z"];
+        let mut passes: Vec<_> = passes.map(|name| (name, vec![0.1; 6])).into();
+        passes.push(("V.Depth.Z", values));
+        write_exr(&at("passes.exr"), [3, 2], &passes);
+        assert_eq!(read_depth_image(&at("passes.exr"), None).unwrap(), image);
+        let color = read_picture(&at("passes.exr")).unwrap().into_rgb8();
+        assert_eq!(color.get_pixel(2, 1).0, [srgb(0.1); 3]);
+    }
+
+    #[test]
+    fn colours_are_brought_from_linear_light_to_srgb() {
+        assert_eq!(
+            [-1.0, f32::NAN, 0.0, 0.002, 0.2140, 1.0, 9.0].map(srgb),
+            [0, 0, 0, 7, 127, 255, 255]
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.exr");
+        let rgb = [("R", vec![1.0, 0.0]), ("G", vec![0.214, 0.0]), ("B", vec![0.0, 1.0])];
+        write_exr(&path, [2, 1], &rgb);
+        let color = read_picture(&path).unwrap().into_rgb8();
+        assert_eq!(
+            (color.get_pixel(0, 0).0, color.get_pixel(1, 0).0),
+            ([255, 127, 0], [0, 0, 255])
+        );
+        write_exr(&path, [2, 1], &[("mask", vec![0.0, 1.0])]);
+        let of = crate::MaskedPicture { width: 2, height: 1, name: "the view" };
+        assert_eq!(crate::read_mask(&path, of).unwrap(), [false, true]);
+    }
+
+    #[test]
+    fn other_files_are_refused_with_what_they_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let words = |name: &str| read_depth_image(&at(name), None).unwrap_err().to_string();
+        write_exr(&at("xy.exr"), [2, 1], &[("X", vec![1.0; 2]), ("Y", vec![1.0; 2])]);
+        assert!(words("xy.exr").contains("X, Y") && words("xy.exr").contains("`Z`"));
+        assert!(read_picture(&at("xy.exr")).unwrap_err().to_string().contains("R, G and B"));
+        write_exr(&at("none.exr"), [2, 1], &[("Z", vec![f32::NAN; 2])]);
+        assert!(words("none.exr").contains("2 pixels without"));
+        let bytes = std::fs::read(at("none.exr")).unwrap();
+        std::fs::write(at("cut.exr"), &bytes[..bytes.len() - 3]).unwrap();
+        assert!(words("cut.exr").contains("a sound EXR file"), "{}", words("cut.exr"));
+    }
+}
