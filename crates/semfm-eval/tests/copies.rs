@@ -41,6 +41,8 @@ fn check(name: &str, mesh: &Mesh, region: &[bool]) {
             transfer(&source.object, &target.object, &region, &settings, &Task::default()).unwrap();
         let reached = iou(&found.region, &Region::from_mask(&copy.region)).unwrap();
         assert!(reached >= least, "{name}, {}: IoU {reached}", change.name());
+        let same = found.report.same_surface;
+        assert!(same.is_some_and(|share| share > 0.8), "{name}, {}: {same:?}", change.name());
         assert!(found.confidence > 0.5, "{name}, {}: {}", change.name(), found.confidence);
     }
 }

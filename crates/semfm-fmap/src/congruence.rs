@@ -146,6 +146,11 @@ impl Congruence {
         Ok(Some(Self { certainty, places, others: laid.map(|other| other.places).collect() }))
     }
 
+    /// The share of the target's vertices that lie on the source, each by how certain that is.
+    pub fn share(&self) -> f64 {
+        self.certainty.iter().sum::<f64>() / self.certainty.len().max(1) as f64
+    }
+
     /// Weights on the target's vertices as read (n_target) where they are certain replaced by those of the source's
     /// region (`inside`, n_source vertices as read).
     pub fn mixed_into(&self, weights: &mut [f64], inside: &[bool]) {

@@ -7,6 +7,7 @@ use semfm_geom::{Shape, Task};
 use crate::confidence::{
     Answer, Evidence, MOST_WITHOUT_FEATURES, probability_by_agreement, verdict,
 };
+use crate::congruence::Congruence;
 use crate::hypotheses::{Hypothesis, hypotheses, is_connected};
 use crate::method::Method;
 use crate::methods::{ConfidenceRule, Matched, Pair, at_threshold, by_map, mask, on_points};
@@ -209,6 +210,7 @@ impl Matching {
                 agreement,
                 evidence,
                 one_kind,
+                same_surface: self.matched.congruence.as_ref().map(Congruence::share),
                 source_area_share: area_share(&voted.inside, &source.basis().mass),
                 target_area_share: area_share(&answer, areas),
                 anchors: Vec::new(),

@@ -76,6 +76,10 @@ pub struct TransferReport {
     /// confidence is that of the answer times this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub one_kind: Option<f64>,
+    /// Where the target is the source's surface once more, whatever its place, size or tessellation: the share of the
+    /// target's vertices that lie on it. They have the source's region as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub same_surface: Option<f64>,
     /// Share of the source's area in the region.
     pub source_area_share: f64,
     /// Share of the target's area in the region.

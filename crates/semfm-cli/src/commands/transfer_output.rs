@@ -169,6 +169,12 @@ impl TransferOutput<'_> {
         } else if region.is_empty() {
             console::data(format_args!("why         {}", self.why_empty()));
         }
+        if let Some(share) = self.transfer.report.same_surface {
+            let share = 100.0 * share;
+            console::data(format_args!(
+                "surface     the source's once more: {share:.0} % of the target's vertices lie on it"
+            ));
+        }
         if hypotheses.len() > 1 {
             let shares: Vec<String> =
                 hypotheses.iter().map(|h| format!("{:.0} %", 100.0 * h.probability)).collect();
