@@ -100,7 +100,7 @@ impl Steps<'_> {
 
     fn pytest(&self, tests: &str, more: &[&str], samples: Option<&Path>) -> Result<Tally> {
         let python = self.workspace.root.join(".venv/bin/python");
-        let arguments = [&["-m", "pytest", "-ra", tests], more].concat();
+        let arguments = [&["-m", "pytest", "-ra", "--durations=10", tests], more].concat();
         let mut process = self.with_settings(program(self.workspace, &python, &arguments))?;
         if let Some(samples) = samples {
             process = process.env("SEMFM_SAMPLES", samples);
