@@ -1023,6 +1023,69 @@ class Gripper:
         """tuple of float, float: the pads' sides across (x) and along (z) the approach, metres."""
         ...
 
+class Hand:
+    """A hand: a surface, open at the wrist or not, or points alone, in metres.
+
+    Made by `read_hand` of what programs reconstruct, by `from_mask` of what a depth camera saw, or of arrays.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        In metres, in the frame of a camera (x right, y down, z forward) or of a mesh.
+    faces : (m, 3) array_like, optional
+        Ids of points; a cloud where none are given. Fingers are known for MANO's 778 points.
+    joints : (21, 3) array_like, optional
+        The wrist, then four joints of each finger from the thumb on, its tip last: tells fingers for other hands.
+
+    Examples
+    --------
+    >>> import semfm, semfm.zoo
+    >>> ball = semfm.zoo.icosphere(4)
+    >>> mug = semfm.Mesh(0.05 * ball.vertices, ball.faces)
+    >>> fist = semfm.Hand(0.04 * ball.vertices + [0.089, 0, 0], ball.faces)
+    >>> touched = semfm.find_contact(mug, fist)
+    >>> bool((mug.vertices[touched.region.vertices, 0] > 0.035).all())
+    True
+    """
+    def __init__(self, points: ArrayLike, faces: Optional[ArrayLike] = None, *, joints: Optional[ArrayLike] = None) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def faces(self) -> NDArray[numpy.uint32]:
+        """(m, 3) uint32 array: the faces, a read-only view; none for points alone."""
+        ...
+    @staticmethod
+    def from_mask(observation: Observation, mask: Optional[Union[str, ArrayLike]] = None) -> Hand:
+        """A hand of which a camera saw one side: the points under its mask, with the thickness of a finger behind them.
+
+        Parameters
+        ----------
+        observation : Observation
+        mask : str or (height, width) array_like, optional
+            The hand's mask: a name, an array of dtype bool, or the only one that there is where none is given.
+
+        Returns
+        -------
+        Hand
+            In the camera's frame.
+        """
+        ...
+    @property
+    def parts(self) -> Optional[list[str]]:
+        """list of str, optional: what each point belongs to: ``thumb``, ``index``, ``middle``, ``ring``, ``little`` or
+        ``palm``; None where that is not known.
+        """
+        ...
+    @property
+    def points(self) -> NDArray[numpy.float64]:
+        """(n, 3) float64 array: the points, metres."""
+        ...
+    @property
+    def shift(self) -> Optional[dict[str, Any]]:
+        """dict, optional: how `read_hand` brought it to its measured depth: ``along_axis`` and ``residual`` in metres, the
+        ``scale`` by which its width changed, and ``n_measured`` points; None where it did not.
+        """
+        ...
+
 class HeatGeodesics:
     """Geodesic distances on one mesh (Crane, Weischedel & Wardetzky 2013): two matrices are factorised
     once, then every question costs two triangular solves. Distances are those of the surface: vertices
@@ -3165,6 +3228,30 @@ class SurfaceIndex:
         """Mesh: the mesh that was indexed."""
         ...
 
+class TouchedRegion:
+    """The region that hands touch, and how sure that is: see `find_contact`."""
+    @property
+    def lines(self) -> list[str]:
+        """list of str: the same in words."""
+        ...
+    def picture(self) -> bytes:
+        """A picture of the mesh with the region, which notebooks show by themselves.
+
+        Returns
+        -------
+        bytes
+            PNG.
+        """
+        ...
+    @property
+    def region(self) -> Region:
+        """Region: the region, with smooth weights."""
+        ...
+    @property
+    def report(self) -> dict[str, Any]:
+        """dict: for each of the ``frames`` what was touched, by which finger, and what is doubtful (`semfm.contact/1`)."""
+        ...
+
 class TrackedPose:
     """An object in one frame, as a line of ``semfm-cli track`` has it: see `Tracker.update`."""
     def __eq__(self, other: object) -> bool: ...
@@ -3731,6 +3818,34 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
+def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_from_object: Optional[Union[ArrayLike, Alignment, _Path, Iterable[Alignment]]] = None, progress: Optional[_Progress] = None) -> TouchedRegion:
+    """Finds where a hand touches a mesh: ``semfm-cli region --hand``.
+
+    The hand is moved by what makes it rest on the surface, within what it may be off; weights are averaged over the places
+    that are likely, and over frames.
+
+    Parameters
+    ----------
+    mesh : mesh_like
+    hands : Hand or list of Hand
+        Several are frames of one grasp.
+    camera_from_object : (4, 4) array_like or Alignment or path or list of Alignment, optional
+        How the mesh stands before the camera, scale included (`Alignment.camera_from_object`): the hands are then in the
+        camera's frame. One for all frames, or a list with one for each. Without it mesh and hands are in one frame, in
+        metres.
+    progress : progress, optional
+
+    Returns
+    -------
+    TouchedRegion
+
+    Raises
+    ------
+    InvalidInput
+        A hand that touches nothing, with its distance, and one that cannot be a hand in metres.
+    """
+    ...
+
 def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: Optional[float] = None, camera_from_object: Optional[ArrayLike] = None, alignment: Optional[Union[Alignment, _Path]] = None, use_refused: Optional[bool] = False, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, working_vertices: Optional[int] = None, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
@@ -4113,6 +4228,32 @@ def read_file(path: _Path) -> bytes:
     Returns
     -------
     bytes
+    """
+    ...
+
+def read_hand(path: _Path, *, vertices: Optional[Union[ArrayLike, _Path]] = None, mirrored: bool = False, observation: Optional[Observation] = None, mask: Optional[Union[str, ArrayLike]] = None, focal: Optional[float] = None) -> Hand:
+    """Reads a hand as ``semfm-cli region --hand`` does: a mesh or cloud (HaMeR, WiLoR, SAM 3D Body), or .npz of vertices and
+    joints, in metres.
+
+    Parameters
+    ----------
+    path : path
+        OpenGL's axes (y up, z towards the viewer) are seen and turned.
+    vertices : (v,) array_like or path, optional
+        Ids of the hand's vertices, where the file is a whole body.
+    mirrored : bool, default False
+        The hand stands in the file as in a mirror: a left one that was not turned back.
+    observation : Observation, optional
+        What the camera saw: the mask cuts the hand out of a whole body, and a depth image tells how far away it is: each
+        point keeps its pixel.
+    mask : str or (height, width) array_like, optional
+        The hand's mask in it: a name, an array of dtype bool, or the only one that there is where none is given.
+    focal : float, optional
+        Focal length in pixels that the hand was made with, where it is not the camera's.
+
+    Returns
+    -------
+    Hand
     """
     ...
 

@@ -296,6 +296,14 @@ def ordinary_objects(folder: Path) -> list[Any]:
     points = semfm.sample_uniform(mug.mesh, 200)[0] * 0.1 + np.array([0, 0, 1.0])
     alignment = semfm.align(mug.mesh, points, viewpoint=None, n_starts=4)
     robot = semfm.Robot.from_urdf(write_arm(folder))
+    depth = np.full((24, 32), 1.0)
+    depth[8:16, 8:24] = 0.5
+    seen = semfm.Observation(
+        [[30, 0, 15.5], [0, 30, 11.5], [0, 0, 1]], depth=depth, masks={"box": depth < 0.8}
+    )
+    tracker = semfm.Tracker(ball, scale=0.05, hypotheses=4)
+    small = semfm.Mesh(0.05 * ball.vertices, ball.faces)
+    hand = semfm.Hand(0.04 * ball.vertices + [0.08, 0, 0], ball.faces)
     shape, basis = source.shape, source.shape.basis
     triangle = semfm.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     flat = semfm.Mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
@@ -312,6 +320,7 @@ def ordinary_objects(folder: Path) -> list[Any]:
         result.hypotheses, semfm.TransferSettings("nearest"), camera, view, patches, embeddings,
         semfm.ViewsFile(ball, [view]), gripper, grasps, list(grasps), alignment, robot,
         semfm.SurfaceIndex(ball), semfm.HeatGeodesics(ball),
+        seen, seen.surface(), tracker, tracker.update(seen), hand, semfm.find_contact(small, hand),
         huge, tiny, alone,
     ]  # fmt: skip
 

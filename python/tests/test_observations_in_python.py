@@ -197,7 +197,8 @@ def test_a_surface_is_an_object_like_others(kettle):
 def test_what_is_wrong_is_said(kettle, tmp_path):
     depth, mask = kettle.depth, kettle.masks["object"]
     wrong = [
-        (lambda: semfm.Observation(K), "a picture that tells the size"),
+        (lambda: semfm.Observation(K), "color, depth or cloud"),
+        (lambda: semfm.Observation(K, cloud=[[0, 0, 1]]), "a picture that tells the size"),
         (lambda: semfm.Observation(np.ones((3, 3)), depth=depth), "no skew"),
         (lambda: semfm.Observation(K, depth=depth, color=kettle.color[:-1]), "color"),
         (lambda: semfm.Observation(K, depth=depth, masks={"cup": mask[:, 1:]}), "mask `cup`"),

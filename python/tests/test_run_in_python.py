@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 
 import numpy as np
@@ -69,7 +70,9 @@ def test_stages_and_answers_are_those_of_the_shell(folder, result):
     for stage in found.stages:
         for name in stage["files"]:
             shells, ours = ((folder / side / stage["stage"] / name).read_bytes() for side in ("shell", "python"))
-            if not name.endswith((".mcap", "report.json")):  # these say when, how long, or name the folder
+            if name == "aligned.json":
+                shells, ours = ({**json.loads(text), "stages_ms": None} for text in (shells, ours))
+            if not name.endswith((".mcap", "report.json")):  # these say how long it took
                 assert shells == ours, f"{stage['stage']}/{name}"
     assert list(found.states) == [stage["stage"] for stage in found.stages]
     assert set(found.states.values()) == {"done"}
@@ -102,7 +105,7 @@ def test_only_what_changed_is_done_again_whoever_did_it(folder, result):
     assert set(again.states.values()) == {"kept"} and again.no_answer == found.no_answer
     # The shell keeps what Python did, and Python what the shell did.
     dry = shell("run", folder / "demo.toml", "-o", folder / "python", "--dry-run")
-    assert dry.stdout.count("keep") == len(found.stages) or found.no_answer is not None, dry.stdout
+    assert dry.stdout.count("keep") == len(found.stages), dry.stdout
     planned = semfm.planned_stages(folder / "demo.toml", folder / "shell")
     assert [stage["stage"] for stage in planned] == STAGES
     assert all(stage["why"] is None for stage in planned[: len(found.stages)])

@@ -26,6 +26,7 @@ mod grasp;
 mod grasp_pickle;
 mod grasps;
 mod gripper;
+mod hand;
 mod interruptible;
 mod json;
 mod laplacian;
@@ -87,6 +88,8 @@ mod _semfm {
     use crate::grasps::{_restore_grasps, Grasps, find_grasps};
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
+    #[pymodule_export]
+    use crate::hand::{_restore_touched_region, Hand, TouchedRegion, find_contact, read_hand};
     #[pymodule_export]
     use crate::interruptible::{_work_for_tests, get_num_threads, set_num_threads};
     #[pymodule_export]

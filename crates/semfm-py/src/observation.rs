@@ -93,11 +93,20 @@ impl Observation {
         let given = intrinsics.cast::<Pinhole>().ok().map(|pinhole| pinhole.get().camera);
         let size = given.map(|camera| [camera.height() as usize, camera.width() as usize]);
         let Pictures { size, color, depth } = Pictures::of(size, color, depth)?;
+        if color.is_none() && depth.is_none() && cloud.is_none() {
+            return Err(errors::invalid(
+                py,
+                "observation",
+                "color, depth or cloud",
+                "none of them",
+            ));
+        }
         let Some(size) = size else {
             let expected = "a picture that tells the size, or a Pinhole";
             return Err(errors::invalid(py, "intrinsics", expected, "neither"));
         };
         let [height, width] = size;
+        arrays_in::within_memory(py, "pixels of the camera", height * width, 3)?;
         let camera = match given {
             Some(camera) => camera,
             None => {

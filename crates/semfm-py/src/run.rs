@@ -98,7 +98,7 @@ impl RunResult {
     /// Parameters
     /// ----------
     /// stage : str
-    ///     ``"demonstration-pose"``, ``"region"``, ``"transfer"``, ``"target-pose"``, ``"grasp"`` or ``"plan"``.
+    ///     Its name as `stages` has it, such as ``"region"`` or ``"grasp"``.
     /// name : str
     ///     One of the stage's ``files``.
     ///

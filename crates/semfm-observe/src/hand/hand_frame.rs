@@ -10,6 +10,7 @@ use super::files::named;
 use super::{
     Contact, ContactSettings, Hand, HandShift, LARGEST, find_contact, read_hand, read_vertex_ids,
 };
+use crate::observation::{Mask, Observation};
 use crate::observation_files::ObservationFiles;
 use crate::{Error, Result};
 
@@ -58,39 +59,53 @@ impl HandFiles {
     pub fn read(&self) -> Result<HandFrame> {
         let seen = self.seen.as_ref().map(ObservationFiles::read).transpose()?;
         let with_mask = seen.as_ref().and_then(|seen| Some((seen, seen.masks().first()?)));
-        let mut shift = None;
-        let hand = match &self.hand {
-            Some(path) => {
-                let mut hand = read_hand(path)?;
-                if self.is_mirrored {
-                    hand = hand.mirrored();
-                }
-                if let Some(ids) = &self.vertices {
-                    let ids_of = |error| named(ids, error);
-                    hand = hand.cut_to(&read_vertex_ids(ids)?).map_err(ids_of)?;
-                } else if let Some((seen, mask)) = with_mask
-                    && hand.diagonal() > LARGEST
-                    && self.focal.is_none()
-                {
-                    hand = hand.cut_by(seen, mask).map_err(|error| named(path, error))?;
-                }
-                if let Some((seen, mask)) = with_mask
-                    && seen.depth().is_some()
-                {
-                    let moved = hand.at_measured_depth(seen, mask, self.focal);
-                    let (moved, by) = moved.map_err(|error| named(path, error))?;
-                    (hand, shift) = (moved, Some(by));
-                }
-                hand
+        let (hand, shift) = match (&self.hand, with_mask) {
+            (Some(path), None) => (self.hand_of(path)?, None),
+            (Some(path), Some((seen, mask))) => {
+                let (hand, is_cut) = (self.hand_of(path)?, self.vertices.is_some());
+                let placed = hand.before_camera(seen, mask, self.focal, is_cut);
+                placed.map_err(|error| named(path, error))?
             }
-            None => {
-                let (seen, mask) = with_mask.ok_or_else(|| {
-                    Error::invalid("hand", "a file, or a mask with depth", "neither")
-                })?;
-                Hand::from_mask(seen, mask)?
+            (None, Some((seen, mask))) => (Hand::from_mask(seen, mask)?, None),
+            (None, None) => {
+                return Err(Error::invalid("hand", "a file, or a mask with depth", "neither"));
             }
         };
         Ok(HandFrame { hand, camera_from_object: self.camera_from_object, shift })
+    }
+
+    /// The hand of a file, turned back and cut out of a body where that was asked for.
+    fn hand_of(&self, path: &Path) -> Result<Hand> {
+        let hand = read_hand(path)?;
+        let hand = if self.is_mirrored { hand.mirrored() } else { hand };
+        match &self.vertices {
+            Some(ids) => hand.cut_to(&read_vertex_ids(ids)?).map_err(|error| named(ids, error)),
+            None => Ok(hand),
+        }
+    }
+}
+
+impl Hand {
+    /// The hand as a camera saw it under its mask: cut out of a whole body, unless it `is_cut` already, and brought to its
+    /// measured depth where the observation has depth. `focal` is the focal length in pixels that the hand was made with,
+    /// where it is not the camera's.
+    ///
+    /// # Errors
+    /// As [`Hand::cut_by`] and [`Hand::at_measured_depth`].
+    pub fn before_camera(
+        self,
+        seen: &Observation,
+        mask: &Mask,
+        focal: Option<f64>,
+        is_cut: bool,
+    ) -> Result<(Self, Option<HandShift>)> {
+        let is_body = !is_cut && focal.is_none() && self.diagonal() > LARGEST;
+        let hand = if is_body { self.cut_by(seen, mask)? } else { self };
+        if seen.depth().is_none() {
+            return Ok((hand, None));
+        }
+        let (hand, shift) = hand.at_measured_depth(seen, mask, focal)?;
+        Ok((hand, Some(shift)))
     }
 }
 
