@@ -28,7 +28,8 @@ def main() -> None:
 
 def seen(mesh: semfm.Mesh) -> semfm.Observation:
     """A mesh in the camera's frame, a metre before a wall, with its mask."""
-    camera = semfm.Pinhole.from_matrix([[300, 0, 159.5], [0, 300, 119.5], [0, 0, 1]], 320, 240)
+    k = [[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]]
+    camera = semfm.Pinhole.from_matrix(k, 320, 240)
     view = semfm.render(mesh, [camera])[0]
     depth = np.where(np.isfinite(view.depth), view.depth, 1.0)
     return semfm.Observation(camera, color=view.rgb, depth=depth, masks={"kettle": view.triangles >= 0})

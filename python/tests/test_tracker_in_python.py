@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -108,3 +110,44 @@ def test_threads_and_errors_leave_a_tracker_as_it_should_be(mug, frames):
         semfm.Tracker(mug, hypotheses=0)
     with pytest.raises(semfm.InvalidInput, match="scale"):
         semfm.Tracker(mug, scale=-1.0)
+
+
+INTERRUPTED = """
+import os, signal, threading, time
+import numpy as np
+import semfm, semfm.zoo
+
+ball = semfm.zoo.icosphere(4)
+rng = np.random.default_rng(0)
+k = [[300, 0, 319.5], [0, 300, 239.5], [0, 0, 1]]
+# A heap without any ball in it: sought all over the picture, for seconds.
+heap = 1.0 - 0.3 * rng.random((12, 16)).repeat(40, axis=0).repeat(40, axis=1)
+frames = [semfm.Observation(k, depth=heap, time_nanos=i + 1) for i in range(200)]
+tracker = semfm.Tracker(ball, scale=0.05, hypotheses=10000)
+
+def interrupt():
+    time.sleep(0.5)
+    global sent
+    sent = time.monotonic()
+    os.kill(os.getpid(), signal.SIGINT)
+
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    for frame in frames:
+        tracker.update(frame)
+except KeyboardInterrupt:
+    print("interrupted", time.monotonic() - sent)
+    after = semfm.Observation(k, depth=np.ones((480, 640)), time_nanos=1000)
+    print(tracker.update(after).state)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_an_interrupted_tracker_goes_on_with_the_next_frame():
+    run = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == 0, run.stderr
+    first, state = run.stdout.splitlines()
+    assert first.startswith("interrupted") and float(first.split()[1]) < 1.0
+    assert state == "lost"
