@@ -2765,7 +2765,7 @@ class RunResult:
         Parameters
         ----------
         stage : str
-            ``"demonstration-pose"``, ``"region"``, ``"transfer"``, ``"target-pose"``, ``"grasp"`` or ``"plan"``.
+            Its name as `stages` has it, such as ``"region"`` or ``"grasp"``.
         name : str
             One of the stage's ``files``.
 
@@ -4559,7 +4559,8 @@ def transfer(source: Union[_MeshLike, MeshFile, PreparedObject], target: Union[_
         A feature vector per vertex, from any network.
     target_features : (n_target, d) array_like, optional
     source_embeddings : Embeddings or path, optional
-        Patch embeddings of rendered views.
+        Patch embeddings of rendered views, or of what a camera saw (`ObservedObject.embed`). Where one object alone has
+        some, the other is shown to the encoder that made them.
     target_embeddings : Embeddings or path, optional
     source_cloud : SemanticCloud, optional
         Surface points with features, made by the caller.

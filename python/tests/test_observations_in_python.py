@@ -159,6 +159,17 @@ def test_a_region_on_what_was_seen_is_the_same_at_the_shell(pair, kettle, tmp_pa
     result.write(tmp_path / "python")
     for name in ("region.json", "point_map.json", "target.ply"):
         assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    # The other object is shown to the encoder that made these, at their rotations; the named one must be it.
+    turned_views = surface.embed(views="both", rolls=2)
+    both = semfm.transfer(mug.mesh, surface.mesh, mug.region, target_embeddings=turned_views)
+    made = semfm.embed(mug.mesh, rolls=2, colors=True)
+    same = semfm.transfer(
+        mug.mesh, surface.mesh, mug.region, source_embeddings=made, target_embeddings=turned_views
+    )
+    named = semfm.transfer(
+        mug.mesh, surface.mesh, mug.region, target_embeddings=turned_views, encoder="builtin"
+    )
+    assert np.array_equal(both.weights, same.weights) and np.array_equal(both.weights, named.weights)
     # The other way round, the observed object is the demonstrated one.
     back = semfm.transfer(surface.mesh, mug.mesh, result.region, source_embeddings=embeddings)
     assert back.region.n_vertices == mug.mesh.n_vertices

@@ -164,6 +164,8 @@ pub fn _restore_prepared(
 /// Where an object's features come from, owned.
 pub enum OwnedFeatures {
     Encoder(ObjectEncoder),
+    /// An encoder that joins the embeddings of the other object of a pair.
+    Beside(ObjectEncoder, Arc<EmbeddingsFile>),
     Views(Arc<EmbeddingsFile>),
     PerVertex(Vec<f32>),
     Cloud(Arc<Cloud>),
@@ -180,7 +182,7 @@ impl OwnedFeatures {
         given: &GivenFeatures<'_, '_>,
         settings: &PipelineSettings,
     ) -> PyResult<Self> {
-        let GivenFeatures { features, embeddings, cloud, encoder } = *given;
+        let GivenFeatures { features, embeddings, cloud, encoder, beside } = *given;
         if encoder.is_some() && (features.is_some() || embeddings.is_some() || cloud.is_some()) {
             let expected = "one of features, embeddings, cloud and encoder";
             return Err(errors::invalid(py, "encoder", expected, "several"));
@@ -202,6 +204,11 @@ impl OwnedFeatures {
             }
             (None, None, Some(cloud)) => Ok(Self::Cloud(cloud.get().inner.clone())),
             (None, None, None) => {
+                if let Some(other) = beside {
+                    let open = OpenSettings { quiet: true, ..OpenSettings::default() };
+                    let made = ObjectEncoder::beside(other, encoder, &open, &settings.cache);
+                    return Ok(Self::Beside(guard(py, || made)?, Arc::clone(other)));
+                }
                 let method = settings.transfer.method.info();
                 if !method.reads_features && encoder.is_none() {
                     return Ok(Self::Geometry);
@@ -231,6 +238,11 @@ impl OwnedFeatures {
                 let prepared = encoded.prepare((**mesh).clone(), settings, task)?;
                 return Ok(PreparedObject::new(prepared));
             }
+            Self::Beside(encoder, other) => {
+                let encoded = encoder.embed_beside(other, object.drawable(), task)?;
+                let prepared = encoded.prepare((**mesh).clone(), settings, task)?;
+                return Ok(PreparedObject::new(prepared));
+            }
             Self::Views(file) => FeatureSource::from(&**file),
             Self::PerVertex(features) => FeatureSource::PerVertex(features),
             Self::Cloud(cloud) => FeatureSource::Cloud(Arc::clone(cloud)),
@@ -248,6 +260,15 @@ pub struct GivenFeatures<'a, 'py> {
     pub embeddings: Option<&'a Bound<'py, PyAny>>,
     pub cloud: Option<&'a Bound<'py, SemanticCloud>>,
     pub encoder: Option<&'a str>,
+    /// The embeddings of the other object of a pair, where it alone has some.
+    pub beside: Option<&'a Arc<EmbeddingsFile>>,
+}
+
+impl GivenFeatures<'_, '_> {
+    /// Whether something says what the features are, but for an encoder.
+    pub fn has_any(&self) -> bool {
+        self.features.is_some() || self.embeddings.is_some() || self.cloud.is_some()
+    }
 }
 
 /// The encoder of this name, the built-in one where none is given, for a method that asks for up to
@@ -349,7 +370,7 @@ pub fn prepare(
     }
     let object = GivenObject::of(mesh, "mesh")?;
     check_shape_size(py, object.mesh.n_vertices(), &settings.shape)?;
-    let given = GivenFeatures { features, embeddings, cloud, encoder };
+    let given = GivenFeatures { features, embeddings, cloud, encoder, beside: None };
     let features = OwnedFeatures::of(py, "", &object.mesh, &given, &settings)?;
     run(py, progress, move |task| features.prepare(&object, &settings, task))
 }

@@ -29,9 +29,8 @@ impl Side {
         settings: &PipelineSettings,
     ) -> PyResult<Self> {
         let py = value.py();
-        let GivenFeatures { features, embeddings, cloud, .. } = given;
         if let Ok(prepared) = value.cast::<PreparedObject>() {
-            if features.is_some() || embeddings.is_some() || cloud.is_some() {
+            if given.has_any() {
                 let argument = format!("{name}_features");
                 let expected = "nothing beside a PreparedObject, which has its features";
                 return Err(errors::invalid(py, &argument, expected, "more"));
@@ -62,6 +61,46 @@ impl Side {
             Self::Raw(object, features) => features.prepare(&object, settings, task),
         }
     }
+}
+
+/// An object with what is said of its features.
+type Given<'a, 'py> = (&'a Bound<'py, PyAny>, &'a GivenFeatures<'a, 'py>);
+
+/// Both objects. Where one alone has embeddings, the other is shown to the encoder that made them, or to the named one.
+fn sides(
+    source: Given<'_, '_>,
+    target: Given<'_, '_>,
+    settings: &PipelineSettings,
+) -> PyResult<(Side, Side)> {
+    let is_bare =
+        |(value, given): Given<'_, '_>| !given.has_any() && value.cast::<PreparedObject>().is_err();
+    if source.1.embeddings.is_some() && is_bare(target) {
+        let [source, target] = one_encoded((source, "source"), (target, "target"), settings)?;
+        return Ok((source, target));
+    }
+    if target.1.embeddings.is_some() && is_bare(source) {
+        let [target, source] = one_encoded((target, "target"), (source, "source"), settings)?;
+        return Ok((source, target));
+    }
+    let source = Side::of(source.0, "source", source.1, settings)?;
+    Ok((source, Side::of(target.0, "target", target.1, settings)?))
+}
+
+/// An object with embeddings, and another that joins it.
+fn one_encoded(
+    (with, name): (Given<'_, '_>, &str),
+    (without, other_name): (Given<'_, '_>, &str),
+    settings: &PipelineSettings,
+) -> PyResult<[Side; 2]> {
+    let given = GivenFeatures { encoder: None, ..*with.1 };
+    let with = Side::of(with.0, name, &given, settings)?;
+    let beside = match &with {
+        Side::Raw(_, OwnedFeatures::Views(file)) => Some(file.clone()),
+        _ => None,
+    };
+    let given = GivenFeatures { beside: beside.as_ref(), ..*without.1 };
+    let without = Side::of(without.0, other_name, &given, settings)?;
+    Ok([with, without])
 }
 
 /// Both sides prepared, side by side. Two objects that an encoder is to be shown are encoded as a
@@ -108,7 +147,8 @@ fn prepare_both(
 ///     A feature vector per vertex, from any network.
 /// target_features : (n_target, d) array_like, optional
 /// source_embeddings : Embeddings or path, optional
-///     Patch embeddings of rendered views.
+///     Patch embeddings of rendered views, or of what a camera saw (`ObservedObject.embed`). Where one object alone has
+///     some, the other is shown to the encoder that made them.
 /// target_embeddings : Embeddings or path, optional
 /// source_cloud : SemanticCloud, optional
 ///     Surface points with features, made by the caller.
@@ -183,20 +223,20 @@ pub fn transfer(
     let options =
         Options { method, rule, seed, second_opinion, settings, k, working_vertices, cache };
     let settings = options.pipeline(py)?;
-    let given = GivenFeatures {
+    let of_source = GivenFeatures {
         features: source_features,
         embeddings: source_embeddings,
         cloud: source_cloud,
         encoder,
+        beside: None,
     };
-    let source = Side::of(source, "source", &given, &settings)?;
-    let given = GivenFeatures {
+    let of_target = GivenFeatures {
         features: target_features,
         embeddings: target_embeddings,
         cloud: target_cloud,
-        encoder,
+        ..of_source
     };
-    let target = Side::of(target, "target", &given, &settings)?;
+    let (source, target) = sides((source, &of_source), (target, &of_target), &settings)?;
     let region = region_of(region, &source.mesh())?;
     let n = source.mesh().n_vertices();
     if region.n_vertices() != n {

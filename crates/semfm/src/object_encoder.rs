@@ -193,6 +193,26 @@ impl ObjectEncoder {
         Ok(Self::new(encoder, cache).with_rolls(file.metadata.rolls))
     }
 
+    /// The encoder for the other object of a pair, at the file's rotations: the one of this name, else the one that made the
+    /// file.
+    ///
+    /// # Errors
+    /// As [`of_file`](Self::of_file).
+    pub fn beside(
+        file: &EmbeddingsFile,
+        name: Option<&str>,
+        settings: &OpenSettings,
+        cache: &ShapeCache,
+    ) -> Result<Self> {
+        match name {
+            Some(name) => {
+                let encoder = open_encoder(name, settings)?;
+                Ok(Self::new(encoder, cache).with_rolls(file.metadata.rolls))
+            }
+            None => Self::of_file(file, settings, cache),
+        }
+    }
+
     /// The embeddings of an object beside those of another that are there already: in its own colours where the other was
     /// shown in its own.
     ///
@@ -328,6 +348,9 @@ mod tests {
         let mut file = encoder.embed(&cup, Coloring::Grey, &task).unwrap().embeddings;
         let beside = ObjectEncoder::of_file(&file, &settings, &ShapeCache::off()).unwrap();
         assert_eq!(beside.rolls(), 2);
+        let off = ShapeCache::off();
+        let named = ObjectEncoder::beside(&file, Some("builtin"), &settings, &off).unwrap();
+        assert_eq!(named.rolls(), 2);
         let made = beside.embed_beside(&file, &kettle, &task).unwrap();
         assert_eq!(
             made.embeddings,

@@ -43,13 +43,10 @@ impl EncoderOptions {
         cache: &ShapeCache,
         common: &Common,
     ) -> Result<ObjectEncoder> {
-        if self.encoder.is_some() {
-            return Ok(self
-                .open(file.metadata.rolls, cache, common)?
-                .with_rolls(file.metadata.rolls));
-        }
         let settings = OpenSettings { threads: common.threads, quiet: common.quiet };
-        Ok(ObjectEncoder::of_file(file, &settings, cache)?)
+        let name = self.encoder.as_deref();
+        let encoder = ObjectEncoder::beside(file, name, &settings, cache);
+        if name.is_some() { encoder.context("--encoder") } else { Ok(encoder?) }
     }
 }
 
