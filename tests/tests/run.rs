@@ -234,6 +234,112 @@ fn a_run_without_an_answer_says_where_it_ended_and_what_to_do() {
 }
 
 #[test]
+fn a_target_without_a_mesh_is_what_the_camera_saw() {
+    let fixture = Fixture::new();
+    let text = recipe("unseen = 0.05\n").replace("mesh = 'other.obj'\n", "");
+    std::fs::write(fixture.at("demo.toml"), text).unwrap();
+    let stages = ["demonstration-pose", "region", "target-surface", "transfer"];
+    for state in ["done", "kept"] {
+        let answer = fixture.run("out", &["--json"]);
+        // One camera sees one side: the region may be refused, and there may be no grasp.
+        assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.err);
+        let told: Value = serde_json::from_str(&answer.out).unwrap();
+        let expected = stages.map(|stage| format!("{stage} {state}"));
+        assert_eq!(states_of(&told)[..4], expected, "{}", answer.err);
+    }
+    let seen = read_mesh(fixture.at("out/target-surface/surface.ply")).unwrap().mesh;
+    assert!(seen.vertices().iter().all(|p| p.z > 0.1), "before the camera");
+    for file in ["target-surface/surface.emb.mcap", "transfer/source.emb.mcap"] {
+        assert!(fixture.at("out").join(file).is_file(), "{file}");
+    }
+    let page = std::fs::read_to_string(fixture.at("out/index.html")).unwrap();
+    assert!(page.contains("what the camera saw:") && page.contains("target-surface"));
+    // A mask that shows less makes the surface anew, and what comes after it.
+    let mask = image::open(fixture.at("target/object.png")).unwrap().into_luma8();
+    let middle = mask.height() / 2;
+    let less = image::GrayImage::from_fn(mask.width(), mask.height(), |x, y| {
+        if y == middle { image::Luma([0]) } else { *mask.get_pixel(x, y) }
+    });
+    less.save(fixture.at("target/object.png")).unwrap();
+    let planned = fixture.run("out", &["--dry-run"]);
+    assert!(planned.out.contains("object.png has changed"), "{}", planned.out);
+    assert!(planned.out.contains("target-surface comes before it"), "{}", planned.out);
+}
+
+#[test]
+fn neither_object_needs_a_mesh() {
+    let fixture = Fixture::new();
+    let frame =
+        "depth = 'target/depth.png'\nintrinsics = 'target/K.json'\nmask = 'target/object.png'\n";
+    let write = |near: DVec3| {
+        let text = format!(
+            "[demonstration]\nnear = [{}, {}, {}]\nradius = 0.03\n[[demonstration.frames]]\n{frame}\
+             [target]\n[target.frame]\n{frame}[grasp]\ngripper = 'franka'\nsamples = 100\nunseen = 0.05\n",
+            near.x, near.y, near.z
+        );
+        std::fs::write(fixture.at("demo.toml"), text).unwrap();
+    };
+    // A contact far from the object is refused, once the surface is there.
+    write(DVec3::ZERO);
+    let refused = fixture.run("out", &[]);
+    assert!(refused.code == Some(2) && refused.err.contains("stage region"), "{}", refused.err);
+    let seen = read_mesh(fixture.at("out/demonstration-surface/surface.ply")).unwrap().mesh;
+    write(seen.vertices()[seen.n_vertices() / 2]);
+    let answer = fixture.run("out", &["--json"]);
+    assert!(matches!(answer.code, Some(0 | 1)), "{}", answer.err);
+    let told: Value = serde_json::from_str(&answer.out).unwrap();
+    let expected = [
+        "demonstration-surface kept",
+        "region done",
+        "target-surface done",
+        "transfer done",
+        "grasp done",
+    ];
+    assert_eq!(states_of(&told), expected, "{}", answer.err);
+    let grasps = json(&fixture.at("out/grasp/grasps.json"));
+    assert!(grasps["camera_from_object"].is_array(), "grasps are before the camera");
+}
+
+#[test]
+fn a_pose_that_is_refused_ends_the_run_unless_the_recipe_goes_on() {
+    let fixture = Fixture::new();
+    // The mask shows what is around the object in its place.
+    let open = |name: &str| image::open(fixture.at(name)).unwrap();
+    let (mask, depth) =
+        (open("target/object.png").into_luma8(), open("target/depth.png").into_luma16());
+    let around = image::GrayImage::from_fn(mask.width(), mask.height(), |x, y| {
+        let is_around = mask.get_pixel(x, y).0[0] == 0 && depth.get_pixel(x, y).0[0] > 0;
+        image::Luma([if is_around { 255 } else { 0 }])
+    });
+    around.save(fixture.at("target/object.png")).unwrap();
+    // Of any size it might lie in the table somewhere.
+    let with = |more: &str| {
+        let text = recipe("").replace(
+            "mesh = 'other.obj'\n",
+            &format!("mesh = 'other.obj'\n{more}[target.align]\nscale_range = [0.19, 0.21]\n"),
+        );
+        std::fs::write(fixture.at("demo.toml"), text).unwrap();
+    };
+    with("");
+    for state in ["done", "kept"] {
+        let answer = fixture.run("out", &["--json"]);
+        assert_eq!(answer.code, Some(1), "{}", answer.err);
+        let told: Value = serde_json::from_str(&answer.out).unwrap();
+        assert_eq!(states_of(&told).last().unwrap(), &format!("target-pose {state}"));
+        let (reason, next) = (&told["no_answer"]["reason"], &told["no_answer"]["next"]);
+        assert!(reason.as_str().unwrap().contains("not found in the depth image"), "{told}");
+        assert!(next.as_str().unwrap().contains("target.use_refused = true"), "{told}");
+        let page = std::fs::read_to_string(fixture.at("out/index.html")).unwrap();
+        assert!(page.contains("without an answer, at the stage target-pose"));
+        assert!(!fixture.at("out/grasp/stage.json").exists());
+    }
+    with("use_refused = true\n");
+    let answer = fixture.run("out", &["--json"]);
+    let told: Value = serde_json::from_str(&answer.out).unwrap();
+    assert_eq!(states_of(&told).last().unwrap(), "grasp done", "{}", answer.err);
+}
+
+#[test]
 fn what_is_wrong_with_a_recipe_is_named_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -6,6 +6,9 @@
 //!
 //! > demonstration-pose → region → transfer, target-pose → grasp → plan
 //!
+//! An object without a mesh is what the camera saw of it: demonstration-surface and target-surface stand in the place of its
+//! pose.
+//!
 //! A stage that was done is kept while everything that it was made from (settings, files read, files written, version)
 //! is as `stage.json` beside it says. A stage without an answer (a pose with the verdict `refuse`, no grasp) ends the
 //! run. Either way one page, `index.html`, shows how it went.

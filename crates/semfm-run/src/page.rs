@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use semfm::align::Sim3;
 use semfm::files::{
     GraspsFile, NoAnswerRecord, PointMapFile, RunStageRecord, StageState, TransferredRegionFile,
     read_pose, read_region,
@@ -16,7 +17,7 @@ use semfm_show::{
 use serde_json::Value;
 
 use crate::stages::{
-    CONTACT_FILE, HAND_FILE, StageContext, aligned_of_frame, observation_of_frame,
+    CONTACT_FILE, HAND_FILE, SURFACE_FILE, StageContext, aligned_of_frame, observation_of_frame,
     observation_of_target,
 };
 use crate::{Result, Stage};
@@ -124,11 +125,13 @@ impl Page<'_> {
 
     /// The mesh where it was found in a picture of the demonstration, with the region.
     fn found_in(&self, photo: &Photo, frame: usize) -> Result<Option<Figure>> {
-        let Some(aligned) = aligned_of_frame(self.context, frame) else { return Ok(None) };
-        if aligned.is_made_here && !aligned.path.is_file() {
-            return Ok(None);
-        }
-        let pose = read_pose(&aligned.path)?;
+        let pose = match aligned_of_frame(self.context, frame) {
+            // An object without a mesh stands in its camera's frame.
+            None if self.has(Stage::DemonstrationSurface, SURFACE_FILE) => Sim3::IDENTITY,
+            None => return Ok(None),
+            Some(aligned) if aligned.is_made_here && !aligned.path.is_file() => return Ok(None),
+            Some(aligned) => read_pose(&aligned.path)?,
+        };
         let mesh = self.source()?;
         let weights = match self.record(Stage::Region) {
             Some(_) => self.region(Stage::Region, &mesh)?.weights().to_vec(),
@@ -139,7 +142,7 @@ impl Page<'_> {
     }
 
     fn source(&self) -> Result<Mesh> {
-        Ok(read_mesh(&self.context.recipe.demonstration.mesh)?.mesh)
+        Ok(read_mesh(self.context.source_mesh())?.mesh)
     }
 
     fn region(&self, stage: Stage, mesh: &Mesh) -> Result<Region> {
@@ -209,7 +212,7 @@ impl Page<'_> {
         if let Some(picture) = self.png(Stage::Grasp, "grasps.png")? {
             figures.push(figure("the best grasps on the mesh", picture));
         }
-        let notes = [Stage::TargetPose, Stage::Grasp];
+        let notes = [Stage::TargetSurface, Stage::TargetPose, Stage::Grasp];
         let notes = notes.iter().filter_map(|&stage| self.record(stage));
         let notes: Vec<String> = notes.flat_map(|record| record.summary.clone()).collect();
         let title = "The target".into();
@@ -230,13 +233,14 @@ impl Page<'_> {
         let recipe = self.context.recipe;
         let pose = match &recipe.target.aligned {
             Some(path) => Some(read_pose(path)?),
+            None if self.has(Stage::TargetSurface, SURFACE_FILE) => Some(Sim3::IDENTITY),
             None if self.has(Stage::TargetPose, "aligned.json") => {
                 Some(read_pose(&self.context.file(Stage::TargetPose, "aligned.json"))?)
             }
             None => None,
         };
         let Some(pose) = pose else { return Ok(vec![masked]) };
-        let mesh = read_mesh(&recipe.target.mesh)?.mesh;
+        let mesh = read_mesh(self.context.target_mesh())?.mesh;
         let weights = match self.record(Stage::Transfer) {
             Some(_) => self.transferred_weights(&mesh)?,
             None => vec![0.0; mesh.n_vertices()],
@@ -282,7 +286,6 @@ impl Page<'_> {
 
     /// The same in three dimensions: contact, transfer, grasps, motion.
     fn groups(&self) -> Result<Vec<Group>> {
-        let recipe = self.context.recipe;
         let mut groups = Vec::new();
         let mut add = |title: &str, paths: &[std::path::PathBuf], first: usize| -> Result<()> {
             let found = groups_of_paths(paths, self.task)?;
@@ -293,7 +296,7 @@ impl Page<'_> {
         };
         if self.has(Stage::Region, "region.json") {
             let region = self.context.file(Stage::Region, "region.json");
-            add("What was touched", &[recipe.demonstration.mesh.clone(), region], 0)?;
+            add("What was touched", &[self.context.source_mesh(), region], 0)?;
         }
         // A region without a vertex is none of a file that is shown.
         let region = self.context.file(Stage::Transfer, "region.json");
@@ -307,7 +310,7 @@ impl Page<'_> {
             let region = self.context.file(Stage::Transfer, "region.json");
             let grasps = self.context.file(Stage::Grasp, "grasps.json");
             // The mesh with its region alone is shown beside the source already.
-            add("Grasps", &[recipe.target.mesh.clone(), region, grasps], 1)?;
+            add("Grasps", &[self.context.target_mesh(), region, grasps], 1)?;
         }
         if self.has(Stage::Plan, "trajectory.json") {
             add("The motion", &[self.context.file(Stage::Plan, "trajectory.json")], 0)?;

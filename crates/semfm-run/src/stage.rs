@@ -2,15 +2,19 @@
 
 use serde_json::{Value, json};
 
-use crate::recipe::{DemonstrationFrame, Recipe};
+use crate::recipe::{Demonstration, DemonstrationFrame, Recipe, Target};
 
 /// A stage. Its name is that of its folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
+    /// What the camera saw of a demonstrated object without a mesh (`surface`).
+    DemonstrationSurface,
     /// The demonstrated mesh found in the pictures (`align`).
     DemonstrationPose,
     /// Where it was touched (`region`).
     Region,
+    /// What the camera saw of a target without a mesh (`surface`).
+    TargetSurface,
     /// The region on the target (`transfer`).
     Transfer,
     /// The target found in its picture (`align`).
@@ -23,9 +27,11 @@ pub enum Stage {
 
 impl Stage {
     /// All, in the order in which they are done.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
+        Self::DemonstrationSurface,
         Self::DemonstrationPose,
         Self::Region,
+        Self::TargetSurface,
         Self::Transfer,
         Self::TargetPose,
         Self::Grasp,
@@ -35,8 +41,10 @@ impl Stage {
     /// Its name in files, folders and messages.
     pub fn name(self) -> &'static str {
         match self {
+            Self::DemonstrationSurface => "demonstration-surface",
             Self::DemonstrationPose => "demonstration-pose",
             Self::Region => "region",
+            Self::TargetSurface => "target-surface",
             Self::Transfer => "transfer",
             Self::TargetPose => "target-pose",
             Self::Grasp => "grasp",
@@ -47,21 +55,26 @@ impl Stage {
     /// The stages whose files it reads, where they are part of the run.
     pub fn reads(self) -> &'static [Self] {
         match self {
-            Self::DemonstrationPose | Self::TargetPose => &[],
-            Self::Region => &[Self::DemonstrationPose],
-            Self::Transfer => &[Self::Region],
-            Self::Grasp => &[Self::Transfer, Self::TargetPose],
-            Self::Plan => &[Self::Grasp],
+            Self::DemonstrationSurface
+            | Self::DemonstrationPose
+            | Self::TargetSurface
+            | Self::TargetPose => &[],
+            Self::Region => &[Self::DemonstrationSurface, Self::DemonstrationPose],
+            Self::Transfer => &[Self::DemonstrationSurface, Self::Region, Self::TargetSurface],
+            Self::Grasp => &[Self::TargetSurface, Self::Transfer, Self::TargetPose],
+            Self::Plan => &[Self::TargetSurface, Self::Grasp],
         }
     }
 
     /// The stages that a recipe asks for, in their order.
     pub fn of(recipe: &Recipe) -> Vec<Self> {
         let is_asked = |stage: &Self| match stage {
+            Self::DemonstrationSurface => recipe.demonstration.mesh.is_none(),
             Self::DemonstrationPose => {
                 let mut frames = recipe.demonstration.frames.iter();
-                frames.any(DemonstrationFrame::is_aligned_here)
+                frames.any(|frame| recipe.demonstration.is_aligned_in(frame))
             }
+            Self::TargetSurface => recipe.target.mesh.is_none(),
             Self::Region | Self::Transfer => true,
             Self::TargetPose => recipe.aligns_target(),
             Self::Grasp => recipe.grasp.is_some(),
@@ -74,9 +87,30 @@ impl Stage {
     /// page shows are no part of it.
     pub(crate) fn settings(self, recipe: &Recipe) -> Value {
         let Recipe { demonstration, target, transfer, grasp, robot, seed, .. } = recipe;
+        let encoder =
+            json!([transfer.method.info().reads_features, transfer.encoder, transfer.rolls]);
         match self {
+            Self::DemonstrationSurface => {
+                let frame = demonstration.frames.first().filter(|_| demonstration.mesh.is_none());
+                let frame = frame.map(|frame| {
+                    let DemonstrationFrame { color, depth, depth_scale, intrinsics, mask, .. } =
+                        frame;
+                    json!([color, depth, depth_scale, intrinsics, mask])
+                });
+                json!([frame, encoder])
+            }
+            Self::TargetSurface => {
+                let frame = target.frame.as_ref().filter(|_| target.mesh.is_none());
+                let frame = frame.map(|frame| {
+                    let crate::TargetFrame { color, depth, depth_scale, intrinsics, mask, .. } =
+                        frame;
+                    json!([color, depth, depth_scale, intrinsics, mask])
+                });
+                json!([frame, encoder])
+            }
             Self::DemonstrationPose => {
-                let frames = demonstration.frames.iter().filter(|frame| frame.is_aligned_here());
+                let frames = demonstration.frames.iter();
+                let frames = frames.filter(|frame| demonstration.is_aligned_in(frame));
                 let frames: Vec<Value> = frames
                     .map(|frame| {
                         let DemonstrationFrame {
@@ -95,7 +129,7 @@ impl Stage {
                     DemonstrationFrame { color, mask: None, init: None, ..frame.clone() }
                 });
                 let frames: Vec<DemonstrationFrame> = frames.collect();
-                let crate::Demonstration { mesh, region, near, radius, grow, .. } = demonstration;
+                let Demonstration { mesh, region, near, radius, grow, .. } = demonstration;
                 json!([mesh, region, near, radius, grow, frames])
             }
             Self::Transfer => json!([demonstration.mesh, target.mesh, transfer, seed]),
@@ -115,11 +149,19 @@ impl Stage {
     }
 }
 
+impl Demonstration {
+    /// Whether the mesh is looked for in the depth of a frame.
+    pub(crate) fn is_aligned_in(&self, frame: &DemonstrationFrame) -> bool {
+        self.mesh.is_some() && frame.is_aligned_here()
+    }
+}
+
 impl Recipe {
     /// Whether the target is looked for in a depth image.
     pub fn aligns_target(&self) -> bool {
-        let has_depth = self.target.frame.as_ref().is_some_and(|frame| frame.depth.is_some());
-        self.target.aligned.is_none() && has_depth
+        let Target { mesh, aligned, frame, .. } = &self.target;
+        let has_depth = frame.as_ref().is_some_and(|frame| frame.depth.is_some());
+        mesh.is_some() && aligned.is_none() && has_depth
     }
 }
 
@@ -140,7 +182,14 @@ mod tests {
         assert_eq!(Stage::of(&recipe("")), [Stage::Region, Stage::Transfer]);
         let all = "[target.frame]\ndepth = 'd'\n[[demonstration.frames]]\ndepth = 'd'\nhand = 'h'\n[grasp]\ngripper = 'g'\n\
                    [robot]\nurdf = 'u'\n";
-        assert_eq!(Stage::of(&recipe(all)), Stage::ALL);
+        let with_meshes = Stage::ALL.into_iter().filter(|stage| !stage.name().ends_with("surface"));
+        assert_eq!(Stage::of(&recipe(all)), with_meshes.collect::<Vec<_>>());
+        let frame = "depth = 'd'\nmask = 'm'\nintrinsics = 'K'\n";
+        let observed =
+            format!("[demonstration]\n[[demonstration.frames]]\n{frame}[target.frame]\n{frame}");
+        let observed = Recipe::parse(Path::new("demo.toml"), &observed).unwrap();
+        let stages = ["demonstration-surface", "region", "target-surface", "transfer"];
+        assert_eq!(Stage::of(&observed).iter().map(|s| s.name()).collect::<Vec<_>>(), stages);
     }
 
     #[test]

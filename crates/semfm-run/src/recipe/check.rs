@@ -19,11 +19,66 @@ impl Fault {
 impl Recipe {
     /// The first fault, in the order of the tables.
     pub(super) fn fault(&self) -> Option<Fault> {
-        self.region_fault()
+        self.observed_fault()
+            .or_else(|| self.region_fault())
             .or_else(|| self.frame_faults())
             .or_else(|| self.target_fault())
             .or_else(|| self.transfer_fault())
             .or_else(|| self.robot_fault())
+    }
+
+    /// An object without a mesh is seen in one frame, and its features come of that.
+    fn observed_fault(&self) -> Option<Fault> {
+        let Self { demonstration, target, transfer, .. } = self;
+        const SEEN: &str = "`mesh`, or one frame with `depth`, `mask` and `intrinsics`, in which the object is what the \
+                            camera saw";
+        const ITS_OWN: &str =
+            "none beside an object without `mesh`, which is in its camera's frame, in metres";
+        if demonstration.mesh.is_none() {
+            let [frame] = &demonstration.frames[..] else {
+                let found = match demonstration.frames.len() {
+                    0 => "none".to_owned(),
+                    n => format!("{n} frames"),
+                };
+                return Some(Fault::new("demonstration.mesh", SEEN, &found));
+            };
+            if frame.depth.is_none() || frame.mask.is_none() || frame.intrinsics.is_none() {
+                return Some(Fault::new("demonstration.mesh", SEEN, "neither"));
+            }
+            let poses = [("aligned", frame.aligned.is_some()), ("init", frame.init.is_some())];
+            if let Some((key, _)) = poses.into_iter().find(|(_, is_given)| *is_given) {
+                let key = format!("demonstration.frames[0].{key}");
+                return Some(Fault::new(key, ITS_OWN, "one"));
+            }
+        }
+        if target.mesh.is_none() {
+            let Some(frame) = &target.frame else {
+                return Some(Fault::new("target.mesh", SEEN, "neither"));
+            };
+            if frame.depth.is_none() || frame.mask.is_none() || frame.intrinsics.is_none() {
+                return Some(Fault::new("target.mesh", SEEN, "neither"));
+            }
+            let poses = [
+                ("target.scale", target.scale.is_some()),
+                ("target.aligned", target.aligned.is_some()),
+                ("target.frame.init", frame.init.is_some()),
+            ];
+            if let Some((key, _)) = poses.into_iter().find(|(_, is_given)| *is_given) {
+                return Some(Fault::new(key, ITS_OWN, "one"));
+            }
+        }
+        let given = [
+            ("source_embeddings", &transfer.source_embeddings),
+            ("source_features", &transfer.source_features),
+        ];
+        let given = given.into_iter().find(|(_, file)| file.is_some());
+        match given {
+            Some((key, _)) if demonstration.mesh.is_none() || target.mesh.is_none() => {
+                let expected = "an encoder where an object has no `mesh`: its features come of what the camera saw";
+                Some(Fault::new(format!("transfer.{key}"), expected, "a file"))
+            }
+            _ => None,
+        }
     }
 
     /// One way to a region.
@@ -192,7 +247,7 @@ impl DemonstrationFrame {
         self.hand.is_some() || self.hand_mask.is_some()
     }
 
-    /// Whether the mesh is looked for in its depth: where something that is told in the camera's frame is to be marked on it.
+    /// Whether a mesh is looked for in its depth: where something that is told in the camera's frame is to be marked on it.
     pub fn is_aligned_here(&self) -> bool {
         let is_marked = self.has_hand() || self.region_mask.is_some();
         is_marked && self.aligned.is_none() && self.depth.is_some()
@@ -212,6 +267,35 @@ mod tests {
     /// The fault of a text.
     fn fault(text: &str) -> Option<Fault> {
         Recipe::parse(Path::new("demo.toml"), text).unwrap().fault()
+    }
+
+    #[test]
+    fn an_object_without_a_mesh_is_seen_in_one_frame() {
+        let frame = "depth = 'd'\nmask = 'm'\nintrinsics = 'K'\n";
+        let target = format!("[target.frame]\n{frame}");
+        let observed = format!("[demonstration]\nregion = 'r'\n[[demonstration.frames]]\n{frame}");
+        assert_eq!(fault(&format!("{MUG}region = 'r'\n[target]\n{target}")), None);
+        assert_eq!(fault(&format!("{observed}{KETTLE}")), None);
+        for (text, key, word) in [
+            (format!("{MUG}region = 'r'\n[target]\n"), "target.mesh", "one frame"),
+            (format!("{MUG}region = 'r'\n[target]\nscale = 1\n{target}"), "target.scale", "metres"),
+            (format!("[demonstration]\nregion = 'r'\n{KETTLE}"), "demonstration.mesh", "one frame"),
+            (
+                format!("{observed}aligned = 'a'\n{KETTLE}"),
+                "demonstration.frames[0].aligned",
+                "frame",
+            ),
+            (
+                format!(
+                    "{observed}{KETTLE}[transfer]\nsource_features = 'a'\ntarget_features = 'b'\n"
+                ),
+                "transfer.source_features",
+                "encoder",
+            ),
+        ] {
+            let found = fault(&text).unwrap_or_else(|| panic!("no fault in {text}"));
+            assert!(found.key == key && found.expected.contains(word), "{found:?} of {text}");
+        }
     }
 
     const MUG: &str = "[demonstration]\nmesh = 'mug.obj'\n";

@@ -81,8 +81,7 @@ fn optional<'a>(
 
 impl Demonstration {
     fn each_path(&mut self, each: &mut Each<'_>) {
-        each("demonstration.mesh".into(), &mut self.mesh);
-        optional("demonstration", [("region", &mut self.region)], each);
+        optional("demonstration", [("mesh", &mut self.mesh), ("region", &mut self.region)], each);
         for (i, frame) in self.frames.iter_mut().enumerate() {
             frame.each_path(&format!("demonstration.frames[{i}]"), each);
         }
@@ -109,8 +108,7 @@ impl DemonstrationFrame {
 
 impl Target {
     fn each_path(&mut self, each: &mut Each<'_>) {
-        each("target.mesh".into(), &mut self.mesh);
-        optional("target", [("aligned", &mut self.aligned)], each);
+        optional("target", [("mesh", &mut self.mesh), ("aligned", &mut self.aligned)], each);
         let Some(TargetFrame { color, depth, intrinsics, mask, init, .. }) = &mut self.frame else {
             return;
         };

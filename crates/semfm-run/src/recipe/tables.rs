@@ -12,8 +12,8 @@ use super::values::{PoseValue, StartValue, TableValue};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Demonstration {
-    /// The mesh of the demonstrated object.
-    pub mesh: PathBuf,
+    /// The mesh of the demonstrated object; without one the object is what the camera saw of it under the mask of its frame.
+    pub mesh: Option<PathBuf>,
     /// A region that is there already.
     pub region: Option<PathBuf>,
     /// A contact in the mesh's frame and units, with `radius`.
@@ -71,8 +71,8 @@ pub struct DemonstrationFrame {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// Its mesh.
-    pub mesh: PathBuf,
+    /// Its mesh; without one the object is what the camera saw of it under the mask of its frame.
+    pub mesh: Option<PathBuf>,
     /// Metres per unit of the mesh, where there is no picture of it.
     pub scale: Option<f64>,
     /// How it stands before a camera, where that is known.
@@ -197,6 +197,8 @@ pub struct GraspTable {
     pub pad_in_region: Option<f64>,
     /// The table below the object.
     pub table: Option<TableValue>,
+    /// Metres behind a surface that one camera saw which the gripper keeps out of.
+    pub unseen: Option<f64>,
     /// What stands around: meshes and point clouds.
     #[serde(default)]
     pub scene: Vec<PathBuf>,

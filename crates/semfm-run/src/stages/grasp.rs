@@ -8,12 +8,14 @@ use semfm::files::{read_aligned, read_obstacle, read_region};
 use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
 use semfm::grasp::{ApproachCone, GraspSettings, Grasps};
+use semfm::motion::Pose;
 use semfm::robot::{Gripper, GripperSettings};
 use semfm::{GraspProblem, GraspRequest, Mesh, Table, Task};
 use semfm_show::write_grasp_picture;
 
 use super::pose::ALIGNED_FILE;
 use super::region::REGION_FILE;
+use super::surface::AROUND_FILE;
 use super::{StageContext, StageEnd, no_answer};
 use crate::recipe::{GraspTable, TableValue};
 use crate::{Result, Stage};
@@ -28,7 +30,7 @@ const APPROACH_CONE: f64 = 45.0;
 /// Finds grasps.
 pub fn grasp(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let Some(table) = &context.recipe.grasp else { return Ok(StageEnd::default()) };
-    let mesh = read_mesh(&context.recipe.target.mesh)?.mesh;
+    let mesh = read_mesh(context.target_mesh())?.mesh;
     let region = read_region(&context.file(Stage::Transfer, REGION_FILE), &mesh)?;
     let mut request = request(context, &mesh)?;
     let pose_margin = request.settings.pose_margin;
@@ -39,6 +41,9 @@ pub fn grasp(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<S
     });
     for path in &table.scene {
         request.obstacles.push(read_obstacle(path)?);
+    }
+    if let Some(depth) = table.unseen {
+        request.obstacles.extend(request.hidden_behind(&mesh, DVec3::ZERO, depth)?);
     }
     let packages = table.packages.clone();
     let settings = GripperSettings { packages, ..Default::default() };
@@ -60,6 +65,9 @@ pub fn grasp(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<S
 /// A request with metres, and the pose before the camera where there is one.
 fn request(context: &StageContext<'_>, mesh: &Mesh) -> Result<GraspRequest> {
     let target = &context.recipe.target;
+    if target.mesh.is_none() {
+        return observed_request(context);
+    }
     let aligned = match (&target.aligned, context.recipe.aligns_target()) {
         (Some(path), _) => Some(path.clone()),
         (None, true) => Some(context.file(Stage::TargetPose, ALIGNED_FILE)),
@@ -69,6 +77,17 @@ fn request(context: &StageContext<'_>, mesh: &Mesh) -> Result<GraspRequest> {
         Some(path) => GraspRequest::at_pose(&read_aligned(&path, Some(mesh))?, mesh),
         None => GraspRequest::new(target.scale.unwrap_or(1.0)),
     })
+}
+
+/// A request for a surface that the camera saw, which is in the camera's frame; what it saw beside the object is in the way.
+fn observed_request(context: &StageContext<'_>) -> Result<GraspRequest> {
+    let mut request = GraspRequest::new(1.0);
+    request.camera_from_object = Some(Pose::IDENTITY);
+    let around = context.file(Stage::TargetSurface, AROUND_FILE);
+    if around.is_file() {
+        request.obstacles.push(read_obstacle(&around)?);
+    }
+    Ok(request)
 }
 
 fn settings(table: &GraspTable, seed: u64) -> GraspSettings {

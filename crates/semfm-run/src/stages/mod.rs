@@ -4,6 +4,7 @@ mod grasp;
 mod plan;
 mod pose;
 mod region;
+mod surface;
 mod transfer;
 
 use std::path::{Path, PathBuf};
@@ -46,11 +47,25 @@ impl StageContext<'_> {
         self.output.join(stage.name()).join(name)
     }
 
+    /// The demonstrated object: the recipe's mesh, or the surface that was seen.
+    pub fn source_mesh(&self) -> PathBuf {
+        let seen = || self.file(Stage::DemonstrationSurface, surface::MESH_FILE);
+        self.recipe.demonstration.mesh.clone().unwrap_or_else(seen)
+    }
+
+    /// The target, likewise.
+    pub fn target_mesh(&self) -> PathBuf {
+        let seen = || self.file(Stage::TargetSurface, surface::MESH_FILE);
+        self.recipe.target.mesh.clone().unwrap_or_else(seen)
+    }
+
     /// Does a stage and writes its files into `folder`, from where they go to the stage's own.
     pub fn work(&self, stage: Stage, folder: &Path, task: &Task) -> Result<StageEnd> {
         match stage {
+            Stage::DemonstrationSurface => surface::demonstration(self, folder, task),
             Stage::DemonstrationPose => pose::demonstration(self, folder, task),
             Stage::Region => region::region(self, folder),
+            Stage::TargetSurface => surface::target(self, folder, task),
             Stage::Transfer => transfer::transfer(self, folder, task),
             Stage::TargetPose => pose::target(self, folder, task),
             Stage::Grasp => grasp::grasp(self, folder, task),
@@ -66,3 +81,4 @@ fn no_answer(reason: impl Into<String>, next: impl Into<String>) -> Option<NoAns
 
 pub use pose::{aligned_of_frame, observation_of_frame, observation_of_target};
 pub use region::{CONTACT_FILE, HAND_FILE};
+pub use surface::MESH_FILE as SURFACE_FILE;

@@ -22,8 +22,8 @@ use crate::{Error, Result, Stage};
 /// Plans the motion.
 pub fn plan(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let Some(table) = &context.recipe.robot else { return Ok(StageEnd::default()) };
-    let target = &context.recipe.target.mesh;
-    let mesh = read_mesh(target)?.mesh;
+    let target = context.target_mesh();
+    let mesh = read_mesh(&target)?.mesh;
     let grasps = GraspsFile::read(&context.file(Stage::Grasp, GRASPS_FILE), &mesh)?;
     let files = ArmFiles {
         urdf: table.urdf.clone(),
@@ -37,7 +37,7 @@ pub fn plan(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<St
     let request = PlanRequest {
         base_from_object: place(table)?.base_from_object(&grasps)?,
         grasps,
-        object: Some(PlanObject { mesh: Arc::new(mesh), file: Some(target.clone()) }),
+        object: Some(PlanObject { mesh: Arc::new(mesh), file: Some(target) }),
         tip_from_tcp: pose("tip_from_tcp", table.tip_from_tcp.as_ref())?,
         start: start(table, &arm)?,
         scene: SceneContents::read(&table.scene)?,

@@ -21,10 +21,10 @@ pub struct AlignedFrame {
 /// Every frame of the demonstration whose pose is not told.
 pub fn demonstration(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let demonstration = &context.recipe.demonstration;
-    let mesh = read_mesh(&demonstration.mesh)?.mesh;
+    let mesh = read_mesh(context.source_mesh())?.mesh;
     let mut end = StageEnd::default();
     for (i, frame) in demonstration.frames.iter().enumerate() {
-        if !frame.is_aligned_here() {
+        if !demonstration.is_aligned_in(frame) {
             continue;
         }
         let seen = files_of_frame(frame, frame.mask.as_deref());
@@ -45,7 +45,7 @@ pub fn demonstration(context: &StageContext<'_>, folder: &Path, task: &Task) -> 
 /// The target.
 pub fn target(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let target = &context.recipe.target;
-    let mesh = read_mesh(&target.mesh)?.mesh;
+    let mesh = read_mesh(context.target_mesh())?.mesh;
     let frame = target.frame.clone().unwrap_or_default();
     let seen = files_of_target(&frame, false);
     let search = Search { table: &target.align, init: frame.init.as_deref() };
@@ -69,14 +69,15 @@ fn aligned_name(frame: usize, n_frames: usize) -> String {
 
 /// The pose of the demonstrated mesh in a frame, told or found; `None` where there is none.
 pub fn aligned_of_frame(context: &StageContext<'_>, frame: usize) -> Option<AlignedFrame> {
-    let frames = &context.recipe.demonstration.frames;
+    let demonstration = &context.recipe.demonstration;
+    let frames = &demonstration.frames;
     let of_frame = frames.get(frame)?;
     if let Some(path) = &of_frame.aligned {
         return Some(AlignedFrame { path: path.clone(), is_made_here: false });
     }
     let name = aligned_name(frame, frames.len());
     let path = context.file(Stage::DemonstrationPose, &name);
-    of_frame.is_aligned_here().then_some(AlignedFrame { path, is_made_here: true })
+    demonstration.is_aligned_in(of_frame).then_some(AlignedFrame { path, is_made_here: true })
 }
 
 /// The files of a frame of the demonstration with one of its masks.
@@ -91,7 +92,7 @@ pub fn files_of_frame(frame: &DemonstrationFrame, mask: Option<&Path>) -> Observ
     }
 }
 
-fn files_of_target(frame: &TargetFrame, with_color: bool) -> ObservationFiles {
+pub fn files_of_target(frame: &TargetFrame, with_color: bool) -> ObservationFiles {
     ObservationFiles {
         color: frame.color.clone().filter(|_| with_color),
         depth: frame.depth.clone(),

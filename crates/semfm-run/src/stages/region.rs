@@ -27,7 +27,7 @@ pub const REGION_FILE: &str = "region.json";
 /// Marks the region.
 pub fn region(context: &StageContext<'_>, folder: &Path) -> Result<StageEnd> {
     let demonstration = &context.recipe.demonstration;
-    let mesh = read_mesh(&demonstration.mesh)?.mesh;
+    let mesh = read_mesh(context.source_mesh())?.mesh;
     let mut end = StageEnd::default();
     let mut region = if let Some(path) = &demonstration.region {
         read_region(path, &mesh)?

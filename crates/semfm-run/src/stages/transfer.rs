@@ -3,17 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use semfm::encoder::{BUILTIN_ENCODERS, BuiltinEncoder, OpenSettings, open_encoder};
-use semfm::files::{Provenance, Seeds, TransferInputs, TransferResult, read_region};
+use semfm::files::{
+    Provenance, Seeds, TransferInputs, TransferResult, read_embeddings, read_region,
+};
 use semfm::fmap::transfer_with_anchors;
 use semfm::geom::ShapeCache;
-use semfm::geom::io::read_mesh;
+use semfm::geom::io::{MeshFile, read_mesh};
 use semfm::object_encoder::ObjectEncoder;
+use semfm::views::mcap::Dtype;
 use semfm::{
     NamedMesh, PairFeatures, PairFiles, PipelineSettings, PreparedPair, Task, Verdict, prepare_pair,
 };
 use semfm_show::{TransferFiles, write_transfer};
 
 use super::region::REGION_FILE;
+use super::surface::EMBEDDINGS_FILE;
 use super::{StageContext, StageEnd, no_answer};
 use crate::fingerprint::files_under;
 use crate::recipe::TransferTable;
@@ -22,13 +26,14 @@ use crate::{Result, Stage};
 /// Carries the region over.
 pub fn transfer(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let recipe = context.recipe;
-    let (source_path, target_path) = (&recipe.demonstration.mesh, &recipe.target.mesh);
-    let source = NamedMesh { path: source_path, file: read_mesh(source_path)? };
-    let target = NamedMesh { path: target_path, file: read_mesh(target_path)? };
+    let (source_path, target_path) = (context.source_mesh(), context.target_mesh());
+    let source = NamedMesh { path: &source_path, file: read_mesh(&source_path)? };
+    let target = NamedMesh { path: &target_path, file: read_mesh(&target_path)? };
     let region_path = context.file(Stage::Region, REGION_FILE);
     let region = read_region(&region_path, &source.file.mesh)?;
     let settings = settings(&recipe.transfer, recipe.seed, context.cache);
-    let features = features(context, &settings)?;
+    let pair = Pair { source: &source.file, target: &target.file };
+    let features = features(context, &settings, &pair, folder, task)?;
     let PreparedPair { source, target, notes } =
         prepare_pair(source, target, &features, &settings, task)?;
     let found =
@@ -78,7 +83,7 @@ pub fn transfer(context: &StageContext<'_>, folder: &Path, task: &Task) -> Resul
     Ok(end)
 }
 
-fn settings(table: &TransferTable, seed: u64, cache: bool) -> PipelineSettings {
+pub fn settings(table: &TransferTable, seed: u64, cache: bool) -> PipelineSettings {
     let mut settings = PipelineSettings::of(table.method);
     settings.transfer.rule = table.rule;
     if let Some(n) = table.working_vertices {
@@ -93,8 +98,20 @@ fn settings(table: &TransferTable, seed: u64, cache: bool) -> PipelineSettings {
     settings.with_seed(seed)
 }
 
+/// The meshes of a transfer.
+struct Pair<'a> {
+    source: &'a MeshFile,
+    target: &'a MeshFile,
+}
+
 /// Where the features come from.
-fn features(context: &StageContext<'_>, settings: &PipelineSettings) -> Result<PairFeatures> {
+fn features(
+    context: &StageContext<'_>,
+    settings: &PipelineSettings,
+    meshes: &Pair<'_>,
+    folder: &Path,
+    task: &Task,
+) -> Result<PairFeatures> {
     let table = &context.recipe.transfer;
     let pair = |source: &Option<PathBuf>, target: &Option<PathBuf>| {
         let (source, target) = (source.clone()?, target.clone()?);
@@ -106,15 +123,55 @@ fn features(context: &StageContext<'_>, settings: &PipelineSettings) -> Result<P
     if let Some(files) = pair(&table.source_embeddings, &table.target_embeddings) {
         return Ok(PairFeatures::Embeddings(files));
     }
-    let method = table.method.info();
-    if !method.reads_features && table.encoder.is_none() && table.rolls.is_none() {
+    if !reads_views(table) {
         return Ok(PairFeatures::Geometry);
     }
+    let encoder = object_encoder(context, settings)?;
+    // What was seen of an object has its embeddings; those of the other one are made to match.
+    let seen = |stage: Stage, mesh: &Option<PathBuf>| {
+        mesh.is_none().then(|| context.file(stage, EMBEDDINGS_FILE))
+    };
+    let seen_source = seen(Stage::DemonstrationSurface, &context.recipe.demonstration.mesh);
+    let seen_target = seen(Stage::TargetSurface, &context.recipe.target.mesh);
+    let beside = |seen: &Path, of: &MeshFile, mesh: &MeshFile, name: &str| -> Result<PathBuf> {
+        let path = folder.join(name);
+        let made = encoder.embed_beside(&read_embeddings(seen, &of.mesh)?, mesh, task)?;
+        made.embeddings.write(&path, Dtype::F32).map_err(semfm::Error::from)?;
+        Ok(path)
+    };
+    let Pair { source: a, target: b } = *meshes;
+    let files = match (seen_source, seen_target) {
+        (None, None) => return Ok(PairFeatures::Encoder(encoder)),
+        (Some(source), Some(target)) => PairFiles { source, target },
+        (Some(source), None) => {
+            let target = beside(&source, a, b, "target.emb.mcap")?;
+            PairFiles { source, target }
+        }
+        (None, Some(target)) => {
+            let source = beside(&target, b, a, "source.emb.mcap")?;
+            PairFiles { source, target }
+        }
+    };
+    Ok(PairFeatures::Embeddings(files))
+}
+
+/// The encoder of the recipe.
+pub fn object_encoder(
+    context: &StageContext<'_>,
+    settings: &PipelineSettings,
+) -> Result<ObjectEncoder> {
+    let table = &context.recipe.transfer;
     let name = table.encoder.as_deref().unwrap_or(BUILTIN_ENCODERS[0].name);
     let open = OpenSettings { threads: context.threads, quiet: context.quiet };
     let encoder = open_encoder(name, &open).map_err(semfm::Error::from)?;
-    let rolls = table.rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(method.features.rolls));
-    Ok(PairFeatures::Encoder(ObjectEncoder::new(encoder, &settings.cache).with_rolls(rolls)))
+    let most = table.method.info().features.rolls;
+    let rolls = table.rolls.unwrap_or_else(|| encoder.wants().rolls_up_to(most));
+    Ok(ObjectEncoder::new(encoder, &settings.cache).with_rolls(rolls))
+}
+
+/// Whether the transfer reads features of views.
+pub fn reads_views(table: &TransferTable) -> bool {
+    table.method.info().reads_features || table.encoder.is_some() || table.rolls.is_some()
 }
 
 /// The files of an encoder that is named by a path.
