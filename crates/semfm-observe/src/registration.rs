@@ -275,4 +275,29 @@ mod tests {
         let refused = check_registration(&registered, &dot, &color, &own, DAffine3::IDENTITY);
         assert!(refused.unwrap_err().to_string().contains("outline"));
     }
+
+    #[cfg(feature = "mcap")]
+    #[test]
+    fn a_camera_info_that_is_not_that_of_the_depth_is_told() {
+        use crate::{BagSettings, Observation, read_bag, write_bag};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("seen.mcap");
+        let (color, own) = (camera(150.0, 80.0), camera(140.0, 86.0));
+        let (registered, mask) = disc(&color);
+        // Depth on the colour's pixels, recorded with the CameraInfo of one camera or of the other.
+        let doubt = |info: &Pinhole| {
+            let mut seen = Observation::new(*info).with_depth(registered.clone()).unwrap();
+            seen.time_nanos = Some(1_000_000_000);
+            write_bag(&path, &[seen]).unwrap();
+            let mut read = Vec::new();
+            let keep = |seen| {
+                read.push(seen);
+                Ok(())
+            };
+            read_bag(&path, &BagSettings::default(), keep).unwrap();
+            registration_doubt(read[0].depth().unwrap(), &mask, read[0].camera(), Some(&color))
+        };
+        assert_eq!(doubt(&color), None);
+        assert!(doubt(&own).unwrap().contains("colour's intrinsics every point"));
+    }
 }

@@ -3,7 +3,7 @@
 mod scenes;
 
 use scenes::{FRAMES, Moment, Scene, Script};
-use semfm_geom::math::{DQuat, DVec3};
+use semfm_geom::math::{DAffine3, DQuat, DVec3};
 use semfm_geom::{Mesh, Task};
 use semfm_synth::{Category, ObjectSettings, make_object};
 use semfm_track::{DepthFrame, TrackRecord, TrackSettings, TrackState, Tracker};
@@ -124,6 +124,59 @@ fn what_is_taken_away_is_lost_and_what_comes_back_is_found() {
     assert_eq!(n_false(&scene, &frames), 0);
     assert_eq!(frames[25].1.state, TrackState::Occluded);
     assert_eq!(frames[FRAMES - 1].1.state, TrackState::Lost);
+}
+
+#[test]
+fn a_moving_camera_takes_what_is_hidden_along() {
+    let scene = Scene::new(&object(Category::Containers), SIZE, WIDTH).in_the_air();
+    let world_from_object = Script::Still.moment(&scene, rotation(), 0).pose.unwrap();
+    // 5 mm and 1° a frame: half a turn of a screw around the object.
+    let camera_from_world = |frame: usize| {
+        let t = frame as f64;
+        let turn = DQuat::from_axis_angle(DVec3::Y, 1f64.to_radians() * t);
+        let aside = DVec3::new(0.0, 0.002 * t, 0.001 * t);
+        let middle = DVec3::new(0.0, 0.0, 0.62);
+        DAffine3::from_rotation_translation(turn, middle - turn * middle + aside)
+    };
+    let settings = TrackSettings { init: Some(world_from_object), ..Default::default() };
+    let mut tracker = Tracker::new(&scene.mesh, &settings, &Task::default()).unwrap();
+    for frame in 0..40 {
+        let pose = camera_from_world(frame);
+        let camera = scene.camera.posed(pose).unwrap();
+        let (_, rotation, translation) = pose.to_scale_rotation_translation();
+        let moved = semfm_align::Sim3 { scale: 1.0, rotation, translation };
+        let truth = moved * world_from_object;
+        let hidden = if (15..25).contains(&frame) { 1.0 } else { 0.0 };
+        let depth = scene.depth(&Moment { pose: Some(truth), hidden }, frame as u64);
+        let seen = DepthFrame { depth: &depth, camera: &camera, mask: None, time_nanos: None };
+        let record = tracker.step(&seen, &Task::default()).unwrap();
+        let expected = match frame {
+            0 => TrackState::New,
+            _ if hidden > 0.0 => TrackState::Occluded,
+            _ => TrackState::Tracking,
+        };
+        assert_eq!(record.state, expected, "frame {frame}");
+        // Hidden it stands where it stood in the world, which is elsewhere before the camera.
+        let off = scene.surface_error(&record.camera_from_object.unwrap(), &truth);
+        assert!(off < 0.003, "frame {frame}: {off}");
+    }
+}
+
+#[test]
+fn a_small_object_is_followed_too() {
+    // 5 cm at 62 cm: some 40 pixels of 640.
+    let scene = Scene::new(&object(Category::Containers), 0.05, 640);
+    for script in [Script::Still, Script::Hidden(0.5)] {
+        let frames = run(&scene, script, &TrackSettings::default());
+        assert_eq!(n_false(&scene, &frames), 0, "{script:?}");
+        assert_eq!(frames[0].1.state, TrackState::New);
+        for (moment, record) in &frames {
+            let found = record.camera_from_object.expect("never lost");
+            let off = scene.surface_error(&found, &moment.pose.unwrap());
+            assert!(off < 0.003, "{script:?}, frame {}: {off}", record.frame);
+        }
+        assert_eq!(frames[FRAMES - 1].1.state, TrackState::Tracking);
+    }
 }
 
 #[test]
