@@ -281,6 +281,7 @@ fn place_of(seen: &Observation, mask: Option<&Mask>) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use semfm_align::DepthImage;
+    use semfm_encoder::Encoder;
     use semfm_geom::Intrinsics;
 
     use super::*;
