@@ -200,7 +200,6 @@ impl SeenHand {
 /// Hand
 #[pyfunction]
 #[pyo3(signature = (path, *, vertices=None, mirrored=false, observation=None, mask=None, focal=None))]
-#[expect(clippy::too_many_arguments, reason = "keyword arguments, one for each option")]
 pub fn read_hand(
     py: Python<'_>,
     path: PathBuf,

@@ -419,7 +419,6 @@ type Pickled<'py> = (
 /// An observation out of a pickle.
 #[pyfunction]
 #[pyo3(signature = (camera, color, depth, cloud, masks, objects, time_nanos))]
-#[expect(clippy::too_many_arguments, reason = "what a pickle holds")]
 pub fn _restore_observation(
     camera: &Bound<'_, Pinhole>,
     color: Option<&Bound<'_, PyAny>>,

@@ -128,7 +128,6 @@ impl Tracker {
 impl Tracker {
     #[new]
     #[pyo3(signature = (mesh, *, init=None, scale=None, region=None, hypotheses=96, seed=0, progress=None))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments, one per setting")]
     fn new(
         mesh: &Bound<'_, PyAny>,
         init: Option<&Bound<'_, PyAny>>,

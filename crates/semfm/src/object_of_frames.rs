@@ -148,7 +148,8 @@ impl ObservedObject {
                                     whose fixed frame is named)";
                     return Err(Error::invalid("frames", expected, "none"));
                 }
-                let masked: Vec<MaskedFrame<'_>> = several.iter().map(ObjectFrame::masked).collect();
+                let masked: Vec<MaskedFrame<'_>> =
+                    several.iter().map(ObjectFrame::masked).collect();
                 let MergedSurface { mesh, colors, .. } = merged_surface(&masked, settings)?;
                 let around = merged_surroundings(&masked)?;
                 Ok(Self { frames, mesh, colors, pixels: None, around })
@@ -185,7 +186,11 @@ impl ObservedObject {
     ///
     /// # Errors
     /// [`Error::Invalid`] where pictures are asked for and a frame has no colours.
-    pub fn shown(&self, views: Option<ObservedViews>, wants: &WantedViews) -> Result<ObservedViews> {
+    pub fn shown(
+        &self,
+        views: Option<ObservedViews>,
+        wants: &WantedViews,
+    ) -> Result<ObservedViews> {
         let has_color = self.frames.iter().all(|frame| frame.seen.color().is_some());
         match views {
             Some(views) if !has_color && views != ObservedViews::Surface => {
@@ -211,8 +216,7 @@ impl ObservedObject {
         let shown = self.shown(views, &wants)?;
         let pictures = self.frames.iter().map(|frame| self.picture(frame));
         let pictures: Vec<ObservedPicture<'_>> = pictures.collect::<Result<_>>()?;
-        let views: RenderedObject<'_> =
-            observed_views(&self.mesh, &pictures, shown, &wants, task)?;
+        let views: RenderedObject<'_> = observed_views(&self.mesh, &pictures, shown, &wants, task)?;
         let file = embed_observed(&views, &**encoder.encoder(), encoder.rolls(), task)?;
         Ok(ObservedEmbeddings { file, shown })
     }
