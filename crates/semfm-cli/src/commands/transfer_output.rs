@@ -172,7 +172,7 @@ impl TransferOutput<'_> {
         if let Some(share) = self.transfer.report.same_surface {
             let share = 100.0 * share;
             console::data(format_args!(
-                "surface     the source's once more: {share:.0} % of the target's vertices lie on it"
+                "surface     the source's once more: {share:.0} % of the target lies on it"
             ));
         }
         if hypotheses.len() > 1 {
