@@ -1,5 +1,5 @@
-//! Follows meshes through rendered depth sequences with noise and prints what came of it: a table of the scripts, then how
-//! often poses of each probability were right.
+//! Follows meshes through rendered depth sequences with noise and prints what came of it: a table of the scripts, how often
+//! poses of each probability were right, and how the told uncertainty compares with the true errors.
 //!
 //! `RAYON_NUM_THREADS=2 cargo run --release -p semfm-track --example bench_track -- [--records FILE] [--poses FILE] MESH...`
 //!
@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use nalgebra::{Matrix3, Matrix6, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use scenes::{FRAMES, Moment, Scene, Script};
@@ -49,14 +50,26 @@ const SCRIPTS: [Script; 9] = [
 
 /// One frame of a run.
 struct Measured {
-    moment: Moment,
     record: TrackRecord,
     /// Whether the pose is right; `None` where there is none.
     right: Option<bool>,
     /// Mean distance of its surface from where it is, metres.
     surface: Option<f64>,
+    /// How far its middle is from where it is, metres.
+    middle: Option<DVec3>,
+    /// The errors against the told covariance.
+    normalized: Option<NormalizedError>,
     cpu_ms: f64,
     wall_ms: f64,
+}
+
+/// Squared errors in units of the told covariance C about the object's middle, eᵀ C⁻¹ e: of position and rotation (3 degrees
+/// of freedom each), and of both (6). Chi-squared where C is right.
+#[derive(Clone, Copy)]
+struct NormalizedError {
+    position: f64,
+    rotation: f64,
+    pose: f64,
 }
 
 fn main() -> Result<()> {
@@ -79,9 +92,9 @@ fn main() -> Result<()> {
     let mut runs: Vec<Vec<Vec<Measured>>> = SCRIPTS.iter().map(|_| Vec::new()).collect();
     for (number, path) in meshes.iter().enumerate() {
         let mesh = read_mesh(path)?.mesh;
-        let scene = Scene::new(&mesh, SIZE, WIDTH);
         let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
         let rotation = any_rotation(&mut rng);
+        let scene = Scene::new(&mesh, SIZE, WIDTH).standing(rotation);
         if let Some(file) = &mut poses {
             examine(file, &scene, rotation, &mut rng)?;
         }
@@ -104,6 +117,7 @@ fn main() -> Result<()> {
     }
     print_scripts(&runs);
     print_calibration(&runs);
+    print_uncertainty(&runs);
     Ok(())
 }
 
@@ -132,16 +146,48 @@ fn follow(scene: &Scene, script: Script, rotation: DQuat) -> Result<Vec<Measured
             .camera_from_object
             .zip(moment.pose)
             .map(|(found, truth)| scene.surface_error(&found, &truth));
+        let normalized = moment.pose.and_then(|truth| normalized_error(scene, &record, &truth));
+        let middle = record
+            .camera_from_object
+            .zip(moment.pose)
+            .map(|(found, truth)| found.apply(scene.centre()) - truth.apply(scene.centre()));
         run.push(Measured {
-            moment,
             record,
             right,
             surface,
+            middle,
+            normalized: normalized.filter(|_| right == Some(true)),
             cpu_ms: 1e3 * cpu,
             wall_ms: 1e3 * wall,
         });
     }
     Ok(run)
+}
+
+/// The error of a pose that was seen in this frame; `None` for another.
+fn normalized_error(scene: &Scene, record: &TrackRecord, truth: &Sim3) -> Option<NormalizedError> {
+    let found = record.camera_from_object.filter(|_| record.state.is_seen())?;
+    let about_origin = Matrix6::from_row_slice(record.covariance?.as_flattened());
+    // The middle moves by v + ω × r where the origin moves by v and the object turns by ω.
+    let r = found.rotation * scene.centre();
+    let mut to_middle = Matrix6::identity();
+    let cross = Matrix3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0);
+    to_middle.fixed_view_mut::<3, 3>(0, 3).copy_from(&cross);
+    let covariance = to_middle * about_origin * to_middle.transpose();
+    let shift = found.apply(scene.centre()) - truth.apply(scene.centre());
+    let turn = found.rotation * truth.rotation.inverse();
+    let turn = if turn.w < 0.0 { -turn } else { turn }.to_scaled_axis();
+    let error = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
+    let of_block = |at: usize| -> Option<f64> {
+        let block = covariance.fixed_view::<3, 3>(at, at).into_owned();
+        let error = error.fixed_rows::<3>(at).into_owned();
+        Some(error.dot(&block.cholesky()?.solve(&error)))
+    };
+    Some(NormalizedError {
+        position: of_block(0)?,
+        rotation: of_block(3)?,
+        pose: error.dot(&covariance.cholesky()?.solve(&error)),
+    })
 }
 
 /// Poses at all distances from the truth, partly hidden, made better and examined.
@@ -215,12 +261,7 @@ fn print_scripts(runs: &[Vec<Vec<Measured>>]) {
         for run in runs {
             let mut last: Option<DVec3> = None;
             for frame in run.iter().filter(|frame| frame.record.state.is_seen()) {
-                let (Some(found), Some(truth)) =
-                    (frame.record.camera_from_object, frame.moment.pose)
-                else {
-                    continue;
-                };
-                let off = found.translation - truth.translation;
+                let Some(off) = frame.middle else { continue };
                 middles.push(1e3 * off.length());
                 jumps.extend(last.map(|last| 1e3 * off.distance(last)));
                 last = Some(off);
@@ -303,4 +344,41 @@ fn print_calibration(runs: &[Vec<Vec<Measured>>]) {
         println!("| {low} to {:.2} | {n} | {mean:.3} | {right:.3} |", high.min(1.0));
     }
     println!("\nexpected calibration error {error:.3} over {} poses", all.len());
+}
+
+/// Median of chi-squared, and the value that 95 % of it do not exceed, with 3 and with 6 degrees of freedom.
+const CHI_SQUARED: [[f64; 2]; 2] = [[2.366, 7.815], [5.348, 12.592]];
+
+/// How many times larger the covariance should have been (by the median), and how many errors lie within its 95 % bound.
+fn print_uncertainty(runs: &[Vec<Vec<Measured>>]) {
+    println!("\n| uncertainty of | poses | covariance too small by | within the 95 % bound |");
+    println!("| --- | --- | --- | --- |");
+    for (script, runs) in SCRIPTS.iter().zip(runs) {
+        let frames: Vec<&Measured> = runs.iter().flatten().collect();
+        print_uncertainty_of(&script.name(), &frames);
+    }
+    let all: Vec<&Measured> = runs.iter().flatten().flatten().collect();
+    print_uncertainty_of("all", &all);
+}
+
+fn print_uncertainty_of(name: &str, frames: &[&Measured]) {
+    let errors: Vec<NormalizedError> = frames.iter().filter_map(|f| f.normalized).collect();
+    if errors.is_empty() {
+        return;
+    }
+    let of = |value: fn(&NormalizedError) -> f64, [median, bound]: [f64; 2]| {
+        let mut values: Vec<f64> = errors.iter().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        let within = values.iter().filter(|v| **v <= bound).count();
+        let share = 100.0 * within as f64 / values.len() as f64;
+        (values[values.len() / 2] / median, share)
+    };
+    let rows = [
+        of(|e| e.position, CHI_SQUARED[0]),
+        of(|e| e.rotation, CHI_SQUARED[0]),
+        of(|e| e.pose, CHI_SQUARED[1]),
+    ];
+    let factors = rows.map(|(factor, _)| format!("{factor:.2}")).join(" / ");
+    let shares = rows.map(|(_, share)| format!("{share:.0} %")).join(" / ");
+    println!("| {name}: position / rotation / both | {} | {factors} | {shares} |", errors.len());
 }

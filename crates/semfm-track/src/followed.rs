@@ -56,7 +56,7 @@ const CONTRADICTED: f64 = 0.4;
 const STAYS: f64 = 0.99;
 
 /// Poses of the search that are looked at closely in a frame.
-const LOOKED_AT: usize = 2;
+const LOOKED_AT: usize = 3;
 
 /// An object whose size is known.
 pub(crate) struct Followed {
@@ -126,8 +126,8 @@ impl Followed {
         let near = expected.and_then(|expected| self.look_near(view, &expected));
         let seen = near.filter(|attempt| {
             let evidence = &attempt.evidence;
-            let follows = self.state.is_seen() || self.state == TrackState::Occluded;
-            let is_enough = match follows {
+            // What comes back from behind something may have moved there.
+            let is_enough = match self.state.is_seen() {
                 true => evidence.visible_share() >= SEEN_SHARE,
                 false => is_distinct(evidence),
             };
@@ -216,11 +216,14 @@ impl Followed {
         };
         let poses = self.search.frame(&at);
         let width = (0.5 * WIDTH * self.model.diameter()).max(LEAST_WIDTH);
-        let attempts =
-            poses.iter().take(LOOKED_AT).filter_map(|pose| self.attempt(view, pose, width));
-        let best = attempts.max_by(|a, b| a.probability.total_cmp(&b.probability))?;
-        let is_found = best.probability >= FOUND && is_distinct(&best.evidence);
-        is_found.then_some(best)
+        let looked_at = &poses[..poses.len().min(LOOKED_AT)];
+        let attempts = looked_at.iter().filter_map(|pose| self.attempt(view, pose, width));
+        let is_found = |found: &Attempt| found.probability >= FOUND && is_distinct(&found.evidence);
+        let best = attempts.filter(is_found).max_by(|a, b| a.probability.total_cmp(&b.probability));
+        if best.is_none() {
+            looked_at.iter().for_each(|pose| self.search.refute(pose));
+        }
+        best
     }
 
     /// How far a motion takes the farthest points of the object, metres.

@@ -30,6 +30,8 @@ pub struct Scene {
     centre: DVec3,
     /// Upward normal of the table in the camera's frame; `None` for an object in the air.
     table: Option<DVec3>,
+    /// How far the table is below the object's middle, metres.
+    height: f64,
     /// A box beside the object.
     distractor: bool,
 }
@@ -63,12 +65,25 @@ impl Scene {
         let surface = SurfaceIndex::new(&mesh).unwrap();
         let (centre, radius) = mesh.bounding_sphere();
         let up = DVec3::new(0.0, -(35f64.to_radians().cos()), -(35f64.to_radians().sin()));
-        Self { mesh, camera, surface, radius, centre, table: Some(up), distractor: true }
+        let (table, height) = (Some(up), 0.45 * radius);
+        Self { mesh, camera, surface, radius, centre, table, height, distractor: true }
+    }
+
+    /// The same with the table right below an object of this rotation, so that nothing of it is in the table.
+    pub fn standing(self, rotation: DQuat) -> Self {
+        let below = |p: &DVec3| -(rotation * (*p - self.centre)).dot(self.up());
+        let height = self.mesh.vertices().iter().map(below).fold(0.0, f64::max);
+        Self { height, ..self }
     }
 
     /// The same without table and box.
     pub fn in_the_air(self) -> Self {
         Self { table: None, distractor: false, ..self }
+    }
+
+    /// Middle of the mesh.
+    pub fn centre(&self) -> DVec3 {
+        self.centre
     }
 
     pub fn diameter(&self) -> f64 {
@@ -122,7 +137,7 @@ impl Scene {
         let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
         let object = moment.pose.map(|pose| self.rendered(&pose));
         // The table stays where the object stood on it in the first place.
-        let place = DVec3::new(0.0, 0.02, 0.62) - self.up() * 0.45 * self.radius;
+        let place = DVec3::new(0.0, 0.02, 0.62) - self.up() * self.height;
         let mut depth: Vec<f64> = (0..width * height)
             .map(|at| {
                 let (u, v) = ((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
