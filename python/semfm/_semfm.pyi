@@ -1836,8 +1836,8 @@ class ObservedObject:
     """
     @property
     def around(self) -> NDArray[numpy.float64]:
-        """(m, 3) float64 array: points of what was seen beside the object, in the frame of `mesh`, metres: obstacles for a
-        `Scene` of `find_grasps`.
+        """(m, 3) float64 array: points of what was seen beside the object, in the frame of `mesh`, metres: obstacles
+        (``scene_points``) of `find_grasps`.
         """
         ...
     @property
@@ -3818,7 +3818,7 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_from_object: Optional[Union[ArrayLike, Alignment, _Path, Iterable[Alignment]]] = None, progress: Optional[_Progress] = None) -> TouchedRegion:
+def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_from_object: Optional[Union[ArrayLike, Alignment, _Path, Iterable[Alignment]]] = None) -> TouchedRegion:
     """Finds where a hand touches a mesh: ``semfm-cli region --hand``.
 
     The hand is moved by what makes it rest on the surface, within what it may be off; weights are averaged over the places
@@ -3833,7 +3833,6 @@ def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_
         How the mesh stands before the camera, scale included (`Alignment.camera_from_object`): the hands are then in the
         camera's frame. One for all frames, or a list with one for each. Without it mesh and hands are in one frame, in
         metres.
-    progress : progress, optional
 
     Returns
     -------
@@ -3846,7 +3845,7 @@ def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_
     """
     ...
 
-def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: Optional[float] = None, camera_from_object: Optional[ArrayLike] = None, alignment: Optional[Union[Alignment, _Path]] = None, use_refused: Optional[bool] = False, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, top: Optional[int] = 20, n_samples: Optional[int] = 1000, working_vertices: Optional[int] = None, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
+def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gripper, _Path], *, scale: Optional[float] = None, camera_from_object: Optional[ArrayLike] = None, alignment: Optional[Union[Alignment, _Path]] = None, use_refused: Optional[bool] = False, table: Optional[Any] = None, scene_meshes: Optional[Iterable[_MeshLike]] = None, scene_points: Optional[ArrayLike] = None, scene_margin: Optional[float] = 0.005, unseen: Optional[float] = None, seen_from: Optional[ArrayLike] = None, top: Optional[int] = 20, n_samples: Optional[int] = 1000, working_vertices: Optional[int] = None, friction: Optional[float] = 0.5, diversity: Optional[float] = 0.1, mass: Optional[float] = None, grip_force: Optional[float] = 30.0, width_range: Optional[tuple[float, float]] = None, approach: Optional[ArrayLike] = None, approach_cone: Optional[float] = None, demonstrated_approach: Optional[ArrayLike] = None, clearance: Optional[float] = 0.0, pad_in_region: Optional[float] = 0.5, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Grasps:
     """Parallel-jaw grasps whose pads close inside a region.
 
     Every grasp that comes back was checked: the open gripper on its way in and where it closes meets
@@ -3878,6 +3877,11 @@ def find_grasps(mesh: _MeshLike, region: Union[Region, _Path], gripper: Union[Gr
     scene_points : (p, 3) array_like, optional
         Points that it must keep `scene_margin` away from, metres.
     scene_margin : float, optional
+    unseen : float, optional
+        The mesh is what one camera saw (`ObservedObject.mesh`): keep out of what it hides, the volume behind it up to so
+        many metres or down to the table, of which nothing is known.
+    seen_from : (3,) array_like, optional
+        Where that camera stood, metres, in the frame of the mesh; its origin where none is given.
     top : int, optional
         Grasps to return.
     n_samples : int, optional
@@ -4306,8 +4310,11 @@ def read_observations(source: _Path, *, every: int = 1, most: Optional[int] = No
     >>> import semfm, tempfile
     >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
     >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
-    >>> semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames) # doctest: +ELLIPSIS
-    '...seen.mcap'
+    >>> path = semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames)
+    >>> for seen in semfm.read_observations(path, every=2):
+    ...     print(seen, round(float(seen.depth[0, 0]), 3))
+    Observation(64 × 48, depth) 0.5
+    Observation(64 × 48, depth) 0.7
     """
     ...
 
@@ -4652,7 +4659,7 @@ def write_file(path: _Path, content: bytes) -> None:
     """
     ...
 
-def write_observations(path: _Path, observations: Iterable[Observation], *, progress: Optional[_Progress] = None) -> str:
+def write_observations(path: _Path, observations: Iterable[Observation]) -> str:
     """Writes frames as ``semfm-cli frames`` does.
 
     Parameters
@@ -4660,7 +4667,6 @@ def write_observations(path: _Path, observations: Iterable[Observation], *, prog
     path : path
         A ROS 2 bag (``NAME.mcap``), or a folder, which becomes a BOP scene.
     observations : list of Observation
-    progress : progress, optional
 
     Returns
     -------

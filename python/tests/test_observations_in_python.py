@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import pickle
 
 import numpy as np
@@ -173,6 +174,29 @@ def test_a_region_on_what_was_seen_is_the_same_at_the_shell(pair, kettle, tmp_pa
     # The other way round, the observed object is the demonstrated one.
     back = semfm.transfer(surface.mesh, mug.mesh, result.region, source_embeddings=embeddings)
     assert back.region.n_vertices == mug.mesh.n_vertices
+
+
+def test_grasps_of_what_was_seen_are_those_of_the_shell(kettle, tmp_path):
+    surface = kettle.surface()
+    surface.write(tmp_path / "seen")
+    top = surface.mesh.vertices[:, 1] < np.quantile(surface.mesh.vertices[:, 1], 0.3)
+    region = semfm.Region.from_mask(top)
+    region.write(tmp_path / "region.json", surface.mesh)
+    run = shell(
+        "grasp", tmp_path / "seen/surface.ply", "--region", tmp_path / "region.json", "--gripper", "franka",
+        "--metres", "--scene", tmp_path / "seen/around.ply", "--unseen", 0.05, "-o", tmp_path / "shell.json",
+    )  # fmt: skip
+    assert run.returncode in (0, 1), run.stderr
+    given = {"scale": 1.0, "scene_points": surface.around}
+    grasps = semfm.find_grasps(surface.mesh, region, "franka", unseen=0.05, **given)
+    told = json.loads((tmp_path / "shell.json").read_text())
+    del told["settings"]
+    assert {name: value for name, value in grasps.to_dict().items() if name != "settings"} == told
+    assert sum(told["rejected"].values()) > 100
+    # Without it the gripper may close behind the surface, on the back of a sheet that is none.
+    assert len(semfm.find_grasps(surface.mesh, region, "franka", **given)) >= len(grasps)
+    with pytest.raises(semfm.InvalidInput, match="gap"):
+        semfm.find_grasps(surface.mesh, region, "franka", unseen=0.001, **given)
 
 
 def test_several_frames_become_one_surface(pair, tmp_path):

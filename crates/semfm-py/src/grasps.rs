@@ -312,6 +312,11 @@ pub fn _restore_grasps(
 /// scene_points : (p, 3) array_like, optional
 ///     Points that it must keep `scene_margin` away from, metres.
 /// scene_margin : float, optional
+/// unseen : float, optional
+///     The mesh is what one camera saw (`ObservedObject.mesh`): keep out of what it hides, the volume behind it up to so
+///     many metres or down to the table, of which nothing is known.
+/// seen_from : (3,) array_like, optional
+///     Where that camera stood, metres, in the frame of the mesh; its origin where none is given.
 /// top : int, optional
 ///     Grasps to return.
 /// n_samples : int, optional
@@ -357,8 +362,8 @@ pub fn _restore_grasps(
 /// True
 #[pyfunction]
 #[pyo3(signature = (mesh, region, gripper, *, scale=None, camera_from_object=None, alignment=None,
-    use_refused=false, table=None, scene_meshes=None, scene_points=None, scene_margin=0.005, top=20,
-    n_samples=1000, working_vertices=None, friction=0.5,
+    use_refused=false, table=None, scene_meshes=None, scene_points=None, scene_margin=0.005, unseen=None,
+    seen_from=None, top=20, n_samples=1000, working_vertices=None, friction=0.5,
     diversity=0.1, mass=None, grip_force=30.0, width_range=None, approach=None, approach_cone=None,
     demonstrated_approach=None, clearance=0.0, pad_in_region=0.5, seed=0, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
@@ -375,6 +380,8 @@ pub fn find_grasps(
     scene_meshes: Option<&Bound<'_, PyList>>,
     scene_points: Option<&Bound<'_, PyAny>>,
     scene_margin: f64,
+    unseen: Option<f64>,
+    seen_from: Option<&Bound<'_, PyAny>>,
     top: usize,
     n_samples: usize,
     working_vertices: Option<usize>,
@@ -450,11 +457,16 @@ pub fn find_grasps(
     let points =
         scene_points.map(|points| arrays_in::points(points, "scene_points")).transpose()?;
     request.obstacles.push(Obstacle::Points(points.unwrap_or_default()));
+    let eye = vector(seen_from, "seen_from")?.unwrap_or(DVec3::ZERO);
     let camera_from_object = request.camera_from_object;
     let region = region_of(region, &mesh)?;
     let (weights, object) = (region.clone(), mesh.clone());
     let fingers = gripper.get().inner.clone();
     let (found, table) = run(py, progress, move |task| {
+        if let Some(depth) = unseen {
+            let hidden = request.hidden_behind(&object, eye, depth)?;
+            request.obstacles.extend(hidden);
+        }
         let problem = request.prepare(Arc::new((*object).clone()), (*fingers).clone())?;
         Ok((problem.find(weights.weights(), task)?, problem.table()))
     })?;

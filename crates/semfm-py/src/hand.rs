@@ -332,7 +332,6 @@ pub fn _restore_touched_region(
 ///     How the mesh stands before the camera, scale included (`Alignment.camera_from_object`): the hands are then in the
 ///     camera's frame. One for all frames, or a list with one for each. Without it mesh and hands are in one frame, in
 ///     metres.
-/// progress : progress, optional
 ///
 /// Returns
 /// -------
@@ -343,12 +342,11 @@ pub fn _restore_touched_region(
 /// InvalidInput
 ///     A hand that touches nothing, with its distance, and one that cannot be a hand in metres.
 #[pyfunction]
-#[pyo3(signature = (mesh, hands, *, camera_from_object=None, progress=None))]
+#[pyo3(signature = (mesh, hands, *, camera_from_object=None))]
 pub fn find_contact(
     mesh: &Bound<'_, PyAny>,
     hands: &Bound<'_, PyAny>,
     camera_from_object: Option<&Bound<'_, PyAny>>,
-    progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<TouchedRegion> {
     let py = mesh.py();
     let hands = hands_of(hands)?;
@@ -360,7 +358,7 @@ pub fn find_contact(
     }
     let mesh = from_any(mesh, "mesh")?;
     let touched_mesh = mesh.clone();
-    let touched = run(py, progress, move |_| {
+    let touched = run(py, None, move |_| {
         let pose = |i: usize| poses.get(i).or(poses.first()).copied();
         let frames = hands.into_iter().enumerate().map(|(i, (hand, shift))| HandFrame {
             hand: (*hand).clone(),

@@ -132,8 +132,11 @@ impl Observations {
 /// >>> import semfm, tempfile
 /// >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
 /// >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
-/// >>> semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames) # doctest: +ELLIPSIS
-/// '...seen.mcap'
+/// >>> path = semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames)
+/// >>> for seen in semfm.read_observations(path, every=2):
+/// ...     print(seen, round(float(seen.depth[0, 0]), 3))
+/// Observation(64 × 48, depth) 0.5
+/// Observation(64 × 48, depth) 0.7
 #[pyfunction]
 #[pyo3(signature = (
     source, *, every=1, most=None, color_topic=None, depth_topic=None, info_topic=None, fixed_frame=None, max_gap=0.03
@@ -171,25 +174,19 @@ pub fn read_observations(
 /// path : path
 ///     A ROS 2 bag (``NAME.mcap``), or a folder, which becomes a BOP scene.
 /// observations : list of Observation
-/// progress : progress, optional
 ///
 /// Returns
 /// -------
 /// str
 ///     The path.
 #[pyfunction]
-#[pyo3(signature = (path, observations, *, progress=None))]
-pub fn write_observations(
-    path: PathBuf,
-    observations: &Bound<'_, PyAny>,
-    progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<String> {
+pub fn write_observations(path: PathBuf, observations: &Bound<'_, PyAny>) -> PyResult<String> {
     let list = observations.try_iter();
     let list =
         list.map_err(|_| errors::wrong_type("observations", "Observations", observations))?;
     let frames = list.map(|seen| Ok((*observation_of(&seen?)?.inner).clone()));
     let frames = frames.collect::<PyResult<Vec<_>>>()?;
     let written = path.display().to_string();
-    run(observations.py(), progress, move |_| Ok(observe::write_observations(&path, &frames)?))?;
+    run(observations.py(), None, move |_| Ok(observe::write_observations(&path, &frames)?))?;
     Ok(written)
 }

@@ -77,8 +77,8 @@ impl ObservedObject {
         arrays_out::rows(slf, 3, bytes).map(Some)
     }
 
-    /// (m, 3) float64 array: points of what was seen beside the object, in the frame of `mesh`, metres: obstacles for a
-    /// `Scene` of `find_grasps`.
+    /// (m, 3) float64 array: points of what was seen beside the object, in the frame of `mesh`, metres: obstacles
+    /// (``scene_points``) of `find_grasps`.
     #[getter]
     fn around<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         arrays_out::points(py, self.inner.around())
