@@ -3615,20 +3615,24 @@ class ViewsFile:
         """
         ...
 
-def align(mesh: _MeshLike, points: ArrayLike, *, viewpoint: Optional[tuple[float, float, float]] = (0.0, 0.0, 0.0), init: Optional[ArrayLike] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
+def align(mesh: _MeshLike, points: Union[ArrayLike, Observation], *, mask: Optional[Union[str, ArrayLike]] = None, viewpoint: Optional[tuple[float, float, float]] = (0.0, 0.0, 0.0), init: Optional[Union[ArrayLike, Alignment, _Path]] = None, scale_range: Optional[tuple[float, float]] = None, n_starts: Optional[int] = 400, seed: Optional[int] = 0, progress: Optional[_Progress] = None) -> Alignment:
     """Finds pose and scale of a mesh in an observed partial cloud (a robust Sim(3)).
 
     Parameters
     ----------
     mesh : mesh_like
         In any units.
-    points : (n, 3) array_like
-        What the camera saw of the object, metres, in the camera's frame.
+    points : (n, 3) array_like or Observation
+        What the camera saw of the object, metres, in the camera's frame; or all that it saw, of which the points beside the
+        object tell where it is not.
+    mask : str or (height, width) array_like, optional
+        The object's mask in an `Observation`: a name, an array of dtype bool, or the only one that there is where none is
+        given.
     viewpoint : tuple of float, float, float, optional
-        Where the camera stands. The origin says that the frame is the camera's own (x right, y down,
+        Where the camera of points stands. The origin says that the frame is the camera's own (x right, y down,
         z forward), in which nothing it sees lies behind it. None for a cloud merged from many views, of which nothing can be
         said about what should have been seen.
-    init : (4, 4) array_like, optional
+    init : (4, 4) array_like or Alignment or path, optional
         A guess of `Alignment.camera_from_object`.
     scale_range : tuple of float, float, optional
         Least and greatest scale, metres per unit.

@@ -199,6 +199,27 @@ def test_grasps_of_what_was_seen_are_those_of_the_shell(kettle, tmp_path):
         semfm.find_grasps(surface.mesh, region, "franka", unseen=0.001, **given)
 
 
+def test_a_pose_in_what_was_seen_is_that_of_the_shell(pair, kettle, tmp_path):
+    files = write_files(tmp_path, kettle)
+    pair[1].write(tmp_path / "kettle.obj")
+    run = shell(
+        "align", tmp_path / "kettle.obj", "--depth", files["depth"], "--intrinsics", files["intrinsics"],
+        "--mask", files["mask"], "-o", tmp_path / "aligned.json",
+    )  # fmt: skip
+    assert run.returncode in (0, 1), run.stderr
+    aligned = semfm.align(tmp_path / "kettle.obj", semfm.Observation.read(**files))
+    told, ours = json.loads((tmp_path / "aligned.json").read_text()), aligned.to_dict()
+    assert {**told, "stages_ms": None} == {**ours, "stages_ms": None}
+    again = pickle.loads(pickle.dumps(aligned))
+    assert np.array_equal(again.camera_from_object, aligned.camera_from_object)
+    by_array = semfm.align(pair[1], kettle, mask=kettle.masks["object"], init=aligned)
+    assert by_array.verdict in ("accept", "check", "refuse")
+    # What it found is where a tracker begins.
+    assert semfm.Tracker(pair[1], init=aligned).update(kettle).state in ("new", "tracking", "lost")
+    with pytest.raises(semfm.InvalidInput, match="an Observation beside it"):
+        semfm.align(pair[1], kettle.cloud("object"), mask="object")
+
+
 def test_several_frames_become_one_surface(pair, tmp_path):
     frames = []
     for x in (-0.1, 0.0, 0.1):

@@ -5,16 +5,18 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use semfm::ObjectFrame;
 use semfm::align::Alignment as Found;
 use semfm::align::{self, AlignSettings, ObservedCloud, Sim3};
 use semfm::files::{AlignedFile, AlignedPose};
 use semfm::geom::math::DVec3;
 
-use crate::arrays_in::{self, Axis};
 use crate::interruptible::run;
 use crate::mesh::{Mesh, from_any};
+use crate::observation::Observation;
 use crate::shared::Shared;
-use crate::{arrays_out, errors, json};
+use crate::tracker::pose_with_scale;
+use crate::{arrays_in, arrays_out, errors, json};
 
 /// Pose and scale of an object before a camera, and how far to trust them: see `align`.
 #[pyclass(frozen, module = "semfm")]
@@ -27,9 +29,26 @@ pub struct Alignment {
 /// What was asked, so that a pickle can ask it again.
 struct Question {
     mesh: Shared<semfm::Mesh>,
-    points: Vec<DVec3>,
-    viewpoint: Option<(f64, f64, f64)>,
+    observed: Observed,
     settings: AlignSettings,
+}
+
+/// What a camera saw.
+enum Observed {
+    Points { points: Vec<DVec3>, viewpoint: Option<(f64, f64, f64)> },
+    Frame(ObjectFrame),
+}
+
+impl Observed {
+    fn cloud(&self) -> semfm::Result<ObservedCloud> {
+        Ok(match self {
+            Self::Frame(frame) => frame.seen.observed_cloud(frame.mask())?,
+            Self::Points { points, viewpoint: Some((x, y, z)) } => {
+                ObservedCloud::from_view(points, [*x, *y, *z].into())?
+            }
+            Self::Points { points, viewpoint: None } => ObservedCloud::from_many_views(points)?,
+        })
+    }
 }
 
 impl Question {
@@ -37,12 +56,8 @@ impl Question {
         let question = Arc::new(self);
         let asked = question.clone();
         let (found, file) = run(py, progress, move |task| {
-            let Question { mesh, points, viewpoint, settings } = &*asked;
-            let observed = match *viewpoint {
-                Some((x, y, z)) => ObservedCloud::from_view(points, [x, y, z].into())?,
-                None => ObservedCloud::from_many_views(points)?,
-            };
-            let found = align::align(mesh, &observed, settings, task)?;
+            let Question { mesh, observed, settings } = &*asked;
+            let found = align::align(mesh, &observed.cloud()?, settings, task)?;
             let file = AlignedFile::new(&found, mesh, settings);
             Ok((found, file))
         })?;
@@ -50,7 +65,8 @@ impl Question {
     }
 }
 
-/// What a pickle holds: mesh, points, viewpoint, init by rows, scale range, starts, seed.
+/// What a pickle holds: mesh, points or an observation, viewpoint, init by rows, scale range, starts, seed, and the place of
+/// the object's mask.
 type Pickled<'py> = (
     Mesh,
     Bound<'py, PyAny>,
@@ -59,6 +75,7 @@ type Pickled<'py> = (
     Option<[f64; 2]>,
     usize,
     u64,
+    Option<usize>,
 );
 
 impl Alignment {
@@ -196,13 +213,20 @@ impl Alignment {
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let restore = py.import("semfm._semfm")?.getattr("_restore_alignment")?;
-        let Question { mesh, points, viewpoint, settings } = &*self.question;
+        let Question { mesh, observed, settings } = &*self.question;
         let AlignSettings { init, scale_range, n_starts, seed } = *settings;
-        let numbers = points.iter().flat_map(|p| p.to_array()).collect();
-        let points = arrays_out::owned_rows(py, numbers, 3)?;
+        let (points, viewpoint, mask) = match observed {
+            Observed::Points { points, viewpoint } => {
+                (arrays_out::points(py, points)?, *viewpoint, None)
+            }
+            Observed::Frame(frame) => {
+                let seen = Observation { inner: frame.seen.clone() };
+                (Bound::new(py, seen)?.into_any(), None, frame.mask)
+            }
+        };
         let init = init.map(|init| init.to_rows());
         let mesh = Mesh { inner: mesh.clone() };
-        Ok((restore, (mesh, points, *viewpoint, init, scale_range, n_starts, seed)))
+        Ok((restore, (mesh, points, viewpoint, init, scale_range, n_starts, seed, mask)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -225,13 +249,17 @@ impl Alignment {
 /// ----------
 /// mesh : mesh_like
 ///     In any units.
-/// points : (n, 3) array_like
-///     What the camera saw of the object, metres, in the camera's frame.
+/// points : (n, 3) array_like or Observation
+///     What the camera saw of the object, metres, in the camera's frame; or all that it saw, of which the points beside the
+///     object tell where it is not.
+/// mask : str or (height, width) array_like, optional
+///     The object's mask in an `Observation`: a name, an array of dtype bool, or the only one that there is where none is
+///     given.
 /// viewpoint : tuple of float, float, float, optional
-///     Where the camera stands. The origin says that the frame is the camera's own (x right, y down,
+///     Where the camera of points stands. The origin says that the frame is the camera's own (x right, y down,
 ///     z forward), in which nothing it sees lies behind it. None for a cloud merged from many views, of which nothing can be
 ///     said about what should have been seen.
-/// init : (4, 4) array_like, optional
+/// init : (4, 4) array_like or Alignment or path, optional
 ///     A guess of `Alignment.camera_from_object`.
 /// scale_range : tuple of float, float, optional
 ///     Least and greatest scale, metres per unit.
@@ -245,16 +273,17 @@ impl Alignment {
 /// Alignment
 ///     A pose that cannot be trusted has the verdict ``"refuse"``; it is no error.
 #[pyfunction]
-#[pyo3(name = "align", signature = (mesh, points, *, viewpoint=(0.0, 0.0, 0.0), init=None,
+#[pyo3(name = "align", signature = (mesh, points, *, mask=None, viewpoint=(0.0, 0.0, 0.0), init=None,
     scale_range=None, n_starts=400, seed=0, progress=None))]
 #[pyo3(
-    text_signature = "(mesh, points, *, viewpoint=(0.0, 0.0, 0.0), init=None, scale_range=None, n_starts=400, seed=0, progress=None)"
+    text_signature = "(mesh, points, *, mask=None, viewpoint=(0.0, 0.0, 0.0), init=None, scale_range=None, n_starts=400, seed=0, progress=None)"
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn align_(
     py: Python<'_>,
     mesh: &Bound<'_, PyAny>,
     points: &Bound<'_, PyAny>,
+    mask: Option<&Bound<'_, PyAny>>,
     viewpoint: Option<(f64, f64, f64)>,
     init: Option<&Bound<'_, PyAny>>,
     scale_range: Option<(f64, f64)>,
@@ -263,22 +292,22 @@ pub fn align_(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Alignment> {
     let mesh = from_any(mesh, "mesh")?;
-    let points = arrays_in::points(points, "points")?;
-    let init = match init {
-        Some(init) => {
-            let (numbers, _) = arrays_in::floats(init, "init", &[Axis::Is(4), Axis::Is(4)])?;
-            let rows = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| numbers[4 * i + j]));
-            Some(Sim3::from_rows(rows).map_err(|error| errors::raise(py, &error.into()))?)
+    let observed = match points.cast::<Observation>() {
+        Ok(seen) => Observed::Frame(seen.get().frame(py, mask)?),
+        Err(_) if mask.is_some() => {
+            return Err(errors::invalid(py, "mask", "an Observation beside it", "points"));
         }
-        None => None,
+        Err(_) => Observed::Points { points: arrays_in::points(points, "points")?, viewpoint },
     };
+    let init = init.map(|init| pose_with_scale(init, "init")).transpose()?;
     let scale_range = scale_range.map(|(low, high)| [low, high]);
     let settings = AlignSettings { init, scale_range, n_starts, seed };
-    Question { mesh, points, viewpoint, settings }.answer(py, progress)
+    Question { mesh, observed, settings }.answer(py, progress)
 }
 
 /// An alignment out of a pickle: asked again, which gives the same.
 #[pyfunction]
+#[pyo3(signature = (mesh, points, viewpoint, init, scale_range, n_starts, seed, mask=None))]
 #[expect(clippy::too_many_arguments, reason = "what a pickle holds")]
 pub fn _restore_alignment(
     py: Python<'_>,
@@ -289,10 +318,14 @@ pub fn _restore_alignment(
     scale_range: Option<[f64; 2]>,
     n_starts: usize,
     seed: u64,
+    mask: Option<usize>,
 ) -> PyResult<Alignment> {
-    let points = arrays_in::points(points, "points")?;
+    let observed = match points.cast::<Observation>() {
+        Ok(seen) => Observed::Frame(ObjectFrame { seen: seen.get().inner.clone(), mask }),
+        Err(_) => Observed::Points { points: arrays_in::points(points, "points")?, viewpoint },
+    };
     let init = init.map(Sim3::from_rows).transpose();
     let init = init.map_err(|error| errors::raise(py, &error.into()))?;
     let settings = AlignSettings { init, scale_range, n_starts, seed };
-    Question { mesh: mesh.get().inner.clone(), points, viewpoint, settings }.answer(py, None)
+    Question { mesh: mesh.get().inner.clone(), observed, settings }.answer(py, None)
 }
