@@ -87,8 +87,9 @@ impl Stage {
     /// page shows are no part of it.
     pub(crate) fn settings(self, recipe: &Recipe) -> Value {
         let Recipe { demonstration, target, transfer, grasp, robot, seed, .. } = recipe;
-        let encoder =
-            json!([transfer.method.info().reads_features, transfer.encoder, transfer.rolls]);
+        let method = transfer.method.info();
+        let of_method = json!([method.reads_features, method.features.rolls]);
+        let encoder = json!([of_method, transfer.encoder, transfer.rolls]);
         match self {
             Self::DemonstrationSurface => {
                 let frame = demonstration.frames.first().filter(|_| demonstration.mesh.is_none());
@@ -190,6 +191,20 @@ mod tests {
         let observed = Recipe::parse(Path::new("demo.toml"), &observed).unwrap();
         let stages = ["demonstration-surface", "region", "target-surface", "transfer"];
         assert_eq!(Stage::of(&observed).iter().map(|s| s.name()).collect::<Vec<_>>(), stages);
+    }
+
+    #[test]
+    fn a_method_of_other_rotations_makes_what_is_seen_anew() {
+        let of = |method: &str| {
+            let text = format!(
+                "[demonstration]\nmesh = 'mug.obj'\n[target]\n[target.frame]\ndepth = 'd'\n[transfer]\nmethod = '{method}'\n"
+            );
+            Recipe::parse(Path::new("demo.toml"), &text).unwrap()
+        };
+        let (a, b) = (of("semfm"), of("nearest"));
+        let stages = Stage::of(&a).into_iter();
+        let changed = stages.filter(|stage| stage.settings(&a) != stage.settings(&b));
+        assert_eq!(changed.collect::<Vec<_>>(), [Stage::TargetSurface, Stage::Transfer]);
     }
 
     #[test]

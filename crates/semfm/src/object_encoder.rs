@@ -213,8 +213,8 @@ impl ObjectEncoder {
         }
     }
 
-    /// The embeddings of an object beside those of another that are there already: in its own colours where the other was
-    /// shown in its own.
+    /// The embeddings of an object beside those of another that are there already: at the other's rotations, in its own
+    /// colours where the other was shown in its own.
     ///
     /// # Errors
     /// As [`ObjectEncoder::embed`]; [`Error::Invalid`] where this is another encoder, or another
@@ -227,7 +227,8 @@ impl ObjectEncoder {
     ) -> Result<EncodedObject> {
         let is_colored = file.metadata.views.more.get("colors").is_some_and(|name| name == "own");
         let coloring = if is_colored { Coloring::Own } else { Coloring::Grey };
-        let made = self.embed(object, coloring, task)?;
+        let encoder = self.clone().with_rolls(file.metadata.rolls);
+        let made = encoder.embed(object, coloring, task)?;
         let identity = |file: &EmbeddingsFile| EncoderIdentity {
             name: file.metadata.encoder.clone(),
             version: file.metadata.revision.clone(),
@@ -355,6 +356,11 @@ mod tests {
         assert_eq!(
             made.embeddings,
             encoder.embed(&kettle, Coloring::Grey, &task).unwrap().embeddings
+        );
+        let other_rolls = beside.clone().with_rolls(1);
+        assert_eq!(
+            other_rolls.embed_beside(&file, &kettle, &task).unwrap().embeddings,
+            made.embeddings
         );
         file.metadata.revision = "0+ffffffffffff".into();
         let error = beside.embed_beside(&file, &kettle, &task).unwrap_err().to_string();

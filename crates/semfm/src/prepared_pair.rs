@@ -102,7 +102,7 @@ pub fn prepare_pair(
     Ok(PreparedPair { source: source?, target: target?, notes })
 }
 
-/// Embeddings of both objects; those that were given the wrong way round are named as such.
+/// Embeddings of both objects, averaged over as many rotations; those that were given the wrong way round are named as such.
 fn embeddings_of_both(
     files: &PairFiles,
     source: &MeshFile,
@@ -124,7 +124,14 @@ fn embeddings_of_both(
             return Err(Error::invalid("embeddings", expected, found));
         }
     }
-    read
+    let [a, b] = read?;
+    let (source_rolls, target_rolls) = (a.metadata.rolls, b.metadata.rolls);
+    if source_rolls != target_rolls {
+        let expected = "the same number of rotations (rolls) in both files";
+        let found = format!("{source_rolls} of the source and {target_rolls} of the target");
+        return Err(Error::invalid("embeddings", expected, found));
+    }
+    Ok([a, b])
 }
 
 /// An error about a mesh, with its file.
@@ -135,5 +142,38 @@ fn of_file(path: &Path, error: Error) -> Error {
             Error::Geom(semfm_geom::Error::InFile { path, cause })
         }
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use semfm_encoder::builtin_encoder;
+    use semfm_encoder::rendered_views::Coloring;
+    use semfm_geom::io::{read_mesh, write_mesh};
+    use semfm_geom::{ShapeCache, zoo};
+    use semfm_views::mcap::Dtype;
+
+    use super::*;
+
+    #[test]
+    fn embeddings_of_other_rotations_do_not_match() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ball.ply");
+        write_mesh(&path, &zoo::icosphere(2)).unwrap();
+        let mesh = read_mesh(&path).unwrap();
+        let encoder = ObjectEncoder::new(builtin_encoder().unwrap(), &ShapeCache::off());
+        let of = |rolls: u32| {
+            let at = folder.path().join(format!("{rolls}.emb.mcap"));
+            let encoder = encoder.clone().with_rolls(rolls);
+            let made = encoder.embed(&mesh, Coloring::Grey, &Task::default()).unwrap();
+            made.embeddings.write(&at, Dtype::F32).unwrap();
+            at
+        };
+        let (once, twice) = (of(1), of(2));
+        let same = PairFiles { source: once.clone(), target: once.clone() };
+        assert!(embeddings_of_both(&same, &mesh, &mesh).is_ok());
+        let files = PairFiles { source: once, target: twice };
+        let error = embeddings_of_both(&files, &mesh, &mesh).unwrap_err().to_string();
+        assert!(error.contains("1 of the source and 2 of the target"), "{error}");
     }
 }

@@ -175,7 +175,7 @@ pub fn reads_views(table: &TransferTable) -> bool {
 }
 
 /// The files of an encoder that is named by a path.
-fn encoder_files(table: &TransferTable) -> Result<Vec<PathBuf>> {
+pub fn encoder_files(table: &TransferTable) -> Result<Vec<PathBuf>> {
     let name = table.encoder.as_deref().filter(|name| BuiltinEncoder::named(name).is_none());
     let named = name.map(Path::new).filter(|path| path.exists());
     named.map_or_else(|| Ok(Vec::new()), files_under)
