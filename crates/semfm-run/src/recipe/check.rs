@@ -23,6 +23,7 @@ impl Recipe {
             .or_else(|| self.region_fault())
             .or_else(|| self.frame_faults())
             .or_else(|| self.target_fault())
+            .or_else(|| self.unseen_fault())
             .or_else(|| self.transfer_fault())
             .or_else(|| self.robot_fault())
     }
@@ -182,6 +183,19 @@ impl Recipe {
         None
     }
 
+    /// What lies behind a surface is told from the camera in the origin of its frame, where a mesh with a pose is not.
+    fn unseen_fault(&self) -> Option<Fault> {
+        self.grasp.as_ref()?.unseen?;
+        let expected =
+            "none beside a mesh whose pose is known: what one camera saw is in its own frame";
+        let found = match &self.target.aligned {
+            Some(_) => "`target.aligned`",
+            None if self.aligns_target() => "`target.frame.depth`, in which the mesh is found",
+            None => return None,
+        };
+        Some(Fault::new("grasp.unseen", expected, found))
+    }
+
     /// Features come in pairs and once.
     fn transfer_fault(&self) -> Option<Fault> {
         let transfer = &self.transfer;
@@ -300,6 +314,7 @@ mod tests {
 
     const MUG: &str = "[demonstration]\nmesh = 'mug.obj'\n";
     const KETTLE: &str = "[target]\nmesh = 'kettle.obj'\n";
+    const UNSEEN: &str = "[grasp]\ngripper = 'x'\nunseen = 0.05\n";
 
     #[test]
     fn what_is_missing_or_said_twice_is_named() {
@@ -346,6 +361,18 @@ mod tests {
                 format!("{MUG}region = 'r'\n{KETTLE}[transfer]\nsource_features = 'a'\n"),
                 "transfer.target_features",
                 "source_features",
+            ),
+            (
+                format!("{MUG}region = 'r'\n{KETTLE}aligned = 'a'\n{UNSEEN}"),
+                "grasp.unseen",
+                "own frame",
+            ),
+            (
+                format!(
+                    "{MUG}region = 'r'\n{KETTLE}[target.frame]\ndepth = 'd'\nintrinsics = 'K'\n{UNSEEN}"
+                ),
+                "grasp.unseen",
+                "own frame",
             ),
             (format!("{sound}[robot]\nurdf = 'u'\n"), "robot.tip", "flange"),
             (format!("{sound}[robot]\nurdf = 'u'\ntip = 't'\n"), "robot", "base_from_camera"),

@@ -197,7 +197,7 @@ pub struct GraspTable {
     pub pad_in_region: Option<f64>,
     /// The table below the object.
     pub table: Option<TableValue>,
-    /// Metres behind a surface that one camera saw which the gripper keeps out of.
+    /// Metres behind a surface that one camera saw which the gripper keeps out of; not beside a mesh whose pose is known.
     pub unseen: Option<f64>,
     /// What stands around: meshes and point clouds.
     #[serde(default)]
