@@ -1,7 +1,6 @@
-"""What a depth camera saw: as an object that a region is carried to, and followed from frame to frame."""
+"""What a depth camera saw: as an object that a region is carried to, and from frame to frame."""
 
 import numpy as np
-
 import semfm
 
 
@@ -12,7 +11,9 @@ def main() -> None:
     mug, kettle = (semfm.demo_object("containers", instance=i, n_vertices=1500) for i in (0, 1))
     low, high = kettle.mesh.bounds
     metres = semfm.Mesh(0.25 * (kettle.mesh.vertices - (low + high) / 2), kettle.mesh.faces)
-    frames = [seen(semfm.Mesh(metres.vertices + [0.01 * i, 0, 0.6], metres.faces)) for i in range(5)]
+    frames = [
+        seen(semfm.Mesh(metres.vertices + [0.01 * i, 0, 0.6], metres.faces)) for i in range(5)
+    ]
 
     # What was seen of it is an object like any other, in metres and in the camera's frame.
     surface = frames[0].surface()
@@ -32,7 +33,9 @@ def seen(mesh: semfm.Mesh) -> semfm.Observation:
     camera = semfm.Pinhole.from_matrix(k, 320, 240)
     view = semfm.render(mesh, [camera])[0]
     depth = np.where(np.isfinite(view.depth), view.depth, 1.0)
-    return semfm.Observation(camera, color=view.rgb, depth=depth, masks={"kettle": view.triangles >= 0})
+    return semfm.Observation(
+        camera, color=view.rgb, depth=depth, masks={"kettle": view.triangles >= 0}
+    )
 
 
 if __name__ == "__main__":

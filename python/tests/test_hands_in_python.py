@@ -1,4 +1,4 @@
-"""`semfm.read_hand` and `semfm.find_contact`: where a hand touches, as `semfm-cli region --hand` says."""
+"""`semfm.find_contact`: where a hand touches, as `semfm-cli region --hand` says."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import pickle
 
 import numpy as np
 import pytest
-from observed_frames import CAMERA, K, WALL, in_metres, shell, turned, write_files
-
 import semfm
 import semfm.zoo
+from observed_frames import CAMERA, WALL, K, in_metres, shell, turned, write_files
 
 #: Where the object stands before the camera, metres.
 PLACE = [0.0, 0.0, 0.6]
@@ -56,7 +55,9 @@ def test_a_reconstructed_hand_touches_what_the_shell_says(scene, tmp_path):
     )  # fmt: skip
     seen = semfm.Observation.read(files["intrinsics"], depth=files["depth"], mask=files["mask"])
     hand = semfm.read_hand(folder / "hand.obj", observation=seen)
-    touched = semfm.find_contact(folder / "mug.obj", hand, camera_from_object=folder / "aligned.json")
+    touched = semfm.find_contact(
+        folder / "mug.obj", hand, camera_from_object=folder / "aligned.json"
+    )
     mug = semfm.Mesh.read(folder / "mug.obj")
     touched.region.write(folder / "python.json", mug)
     assert (folder / "python.json").read_bytes() == (folder / "shell.json").read_bytes()
@@ -84,7 +85,9 @@ def test_a_mask_with_depth_is_a_hand_as_for_the_shell(scene):
         "--hand-mask", files["mask"], "--hand-intrinsics", files["intrinsics"],
     )  # fmt: skip
     seen = semfm.Observation.read(**files)
-    touched = semfm.find_contact(folder / "mug.obj", semfm.Hand.from_mask(seen), camera_from_object=pose)
+    touched = semfm.find_contact(
+        folder / "mug.obj", semfm.Hand.from_mask(seen), camera_from_object=pose
+    )
     assert touched.report == report
     touched.region.write(folder / "python2.json", semfm.Mesh.read(folder / "mug.obj"))
     assert (folder / "python2.json").read_bytes() == (folder / "shell2.json").read_bytes()

@@ -7,9 +7,8 @@ import pickle
 
 import numpy as np
 import pytest
-from observed_frames import in_metres, seen, shell, turned, write_files
-
 import semfm
+from observed_frames import in_metres, seen, shell, turned, write_files
 
 STAGES = ["region", "transfer", "target-pose", "grasp"]
 RECIPE = """
@@ -58,7 +57,10 @@ def write_recipe(folder, mug, samples=100):
 def result(folder):
     steps = []
     result = semfm.run(
-        folder / "demo.toml", folder / "python", cache=False, progress=lambda *step: steps.append(step)
+        folder / "demo.toml",
+        folder / "python",
+        cache=False,
+        progress=lambda *step: steps.append(step),
     )
     return result, steps
 
@@ -69,7 +71,9 @@ def test_stages_and_answers_are_those_of_the_shell(folder, result):
     assert done.returncode == (0 if found.no_answer is None else 1), done.stderr
     for stage in found.stages:
         for name in stage["files"]:
-            shells, ours = ((folder / side / stage["stage"] / name).read_bytes() for side in ("shell", "python"))
+            shells, ours = (
+                (folder / side / stage["stage"] / name).read_bytes() for side in ("shell", "python")
+            )
             if name == "aligned.json":
                 shells, ours = ({**json.loads(text), "stages_ms": None} for text in (shells, ours))
             if not name.endswith((".mcap", "report.json")):  # these say how long it took

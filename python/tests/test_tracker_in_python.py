@@ -1,4 +1,4 @@
-"""`semfm.Tracker`: an object followed through frames, with the lines that the shell writes of the same."""
+"""`semfm.Tracker`: an object followed through frames, with the lines that the shell writes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import threading
 
 import numpy as np
 import pytest
-from observed_frames import HEIGHT, K, WALL, WIDTH, in_metres, seen, shell, turned
-
 import semfm
+from observed_frames import HEIGHT, WALL, WIDTH, K, in_metres, seen, shell, turned
 
 #: Frames in which the object is away.
 AWAY = (5, 6, 7)
@@ -32,7 +31,9 @@ def frames(mug):
         time = 2 * 10**9 + 33_000_000 * i
         if i in AWAY:
             wall = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-            return semfm.Observation(K, color=wall, depth=np.full((HEIGHT, WIDTH), WALL), time_nanos=time)
+            return semfm.Observation(
+                K, color=wall, depth=np.full((HEIGHT, WIDTH), WALL), time_nanos=time
+            )
         mesh = turned(mug, [0.004 * i - 0.02, 0.0, 0.6], 40.0 + 2 * i)
         return seen(mesh, time_nanos=time)
 
@@ -99,7 +100,8 @@ def test_threads_and_errors_leave_a_tracker_as_it_should_be(mug, frames):
     timeless = semfm.Observation(frames[3].camera, depth=frames[3].depth)
     found = []
     threads = [
-        threading.Thread(target=lambda: found.append(tracker.update(timeless).frame)) for _ in range(4)
+        threading.Thread(target=lambda: found.append(tracker.update(timeless).frame))
+        for _ in range(4)
     ]
     for thread in threads:
         thread.start()
