@@ -1870,7 +1870,7 @@ class ObservedObject:
         ...
     @property
     def mesh(self) -> Mesh:
-        """Mesh: the surface, metres; of one frame in its camera's own frame, of several in that of their cameras' poses."""
+        """Mesh: the surface, metres, in its camera's own frame; in that of the cameras' poses where it was merged."""
         ...
     @property
     def observations(self) -> list[Observation]:

@@ -171,7 +171,11 @@ fn frames_of_several_sides_are_merged() {
     assert!((high - low - (to - from)).length() < 0.01, "all sides of it");
     let one = merge("scene", "one", &["--most", "1"]);
     assert_eq!(one.code, Some(0), "{}", one.err);
+    assert_eq!(json(&at("one/surface.json"))["frame"], "world");
     let one = read_mesh(at("one/surface.ply")).unwrap().mesh;
+    let off = one.vertices().iter().map(|&p| index.closest(p).unwrap().distance);
+    let off = off.fold(0.0, f64::max);
+    assert!(off < 0.006, "{off}: it is in the frame of the poses, too");
     assert!(merged.area() > 1.7 * one.area(), "{} of {}", merged.area(), one.area());
     // No point stands twice around it, though several frames saw it.
     let around = read_points(at("merged/around.ply")).unwrap().points;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use semfm::files::SurfaceFrame;
 use semfm::geom::ShapeCache;
 use semfm::observe::SurfaceSettings;
 use semfm::observed_object::ObservedViews;
@@ -42,11 +43,11 @@ pub struct ObservedObject {
     settings: SurfaceSettings,
 }
 
-/// What a pickle holds: observations, the places of the object's masks, and the settings.
-type Pickled = (Vec<Observation>, Vec<Option<usize>>, (usize, usize, usize));
+/// What a pickle holds: observations, the places of the object's masks, the settings, and whether it is a merged surface.
+type Pickled = (Vec<Observation>, Vec<Option<usize>>, (usize, usize, usize), bool);
 
 impl ObservedObject {
-    /// Of one frame, or of several whose cameras' poses are known.
+    /// Of one frame, in its camera's frame, or of several whose cameras' poses are known.
     pub fn new(
         py: Python<'_>,
         frames: Vec<ObjectFrame>,
@@ -55,11 +56,21 @@ impl ObservedObject {
         let inner = run(py, None, move |_| Seen::new(frames, &settings))?;
         Ok(Self { inner: Arc::new(inner), settings })
     }
+
+    /// In the frame of the cameras' poses.
+    fn merged(
+        py: Python<'_>,
+        frames: Vec<ObjectFrame>,
+        settings: SurfaceSettings,
+    ) -> PyResult<Self> {
+        let inner = run(py, None, move |_| Seen::merged(frames, &settings))?;
+        Ok(Self { inner: Arc::new(inner), settings })
+    }
 }
 
 #[pymethods]
 impl ObservedObject {
-    /// Mesh: the surface, metres; of one frame in its camera's own frame, of several in that of their cameras' poses.
+    /// Mesh: the surface, metres, in its camera's own frame; in that of the cameras' poses where it was merged.
     #[getter]
     fn mesh(&self) -> Mesh {
         Mesh { inner: Shared::part_of(&self.inner, Seen::mesh) }
@@ -216,7 +227,8 @@ impl ObservedObject {
         let masks = self.inner.frames().iter().map(|frame| frame.mask).collect();
         let SurfaceSettings { smooth_pixels, trim_pixels, most_vertices } = self.settings;
         let settings = (smooth_pixels, trim_pixels, most_vertices);
-        Ok((restore, (self.observations(), masks, settings)))
+        let is_merged = self.inner.frame() == SurfaceFrame::World;
+        Ok((restore, (self.observations(), masks, settings, is_merged)))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -235,12 +247,16 @@ pub fn _restore_observed_object(
     observations: Vec<Bound<'_, Observation>>,
     masks: Vec<Option<usize>>,
     settings: (usize, usize, usize),
+    is_merged: bool,
 ) -> PyResult<ObservedObject> {
     let frames = observations.iter().zip(masks);
     let frames = frames.map(|(seen, mask)| ObjectFrame { seen: seen.get().inner.clone(), mask });
     let (smooth_pixels, trim_pixels, most_vertices) = settings;
     let settings = SurfaceSettings { smooth_pixels, trim_pixels, most_vertices };
-    ObservedObject::new(py, frames.collect(), settings)
+    match is_merged {
+        true => ObservedObject::merged(py, frames.collect(), settings),
+        false => ObservedObject::new(py, frames.collect(), settings),
+    }
 }
 
 /// One surface of what several frames saw from known places: ``semfm-cli surface --merge``.
@@ -278,5 +294,5 @@ pub fn merged_surface(
     let object = mask.map(ToOwned::to_owned);
     let visible = run(py, None, move |_| VisibleFrames::of(seen, object.as_deref()))?;
     let settings = SurfaceSettings { smooth_pixels, trim_pixels, ..SurfaceSettings::default() };
-    ObservedObject::new(py, visible.frames, settings)
+    ObservedObject::merged(py, visible.frames, settings)
 }

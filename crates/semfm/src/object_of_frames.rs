@@ -13,7 +13,7 @@ use semfm_observe::{
 };
 use semfm_views::mcap::EmbeddingsFile;
 
-use crate::files::{SurfaceResult, write_surface};
+use crate::files::{SurfaceFrame, SurfaceResult, write_surface};
 use crate::object_encoder::ObjectEncoder;
 use crate::observed_object::{ObservedViews, embed_observed, observed_views};
 use crate::{Error, Result};
@@ -78,6 +78,7 @@ impl VisibleFrames {
 /// What cameras saw of an object, as an object: what `semfm-cli surface` makes.
 #[derive(Clone, Debug)]
 pub struct ObservedObject {
+    frame: SurfaceFrame,
     frames: Vec<ObjectFrame>,
     mesh: Mesh,
     colors: Option<Vec<[u8; 3]>>,
@@ -124,37 +125,72 @@ impl ObjectFrame {
 }
 
 impl ObservedObject {
-    /// Of one frame its surface in the camera's frame, of several one merged surface in the frame in which their cameras are
-    /// posed; metres.
+    /// Of one frame its surface in the camera's frame, of several what [`merged`](Self::merged) makes of them; metres.
+    ///
+    /// # Errors
+    /// As [`merged`](Self::merged).
+    pub fn new(frames: Vec<ObjectFrame>, settings: &SurfaceSettings) -> Result<Self> {
+        match &frames[..] {
+            [only] => Self::before_camera(only, settings),
+            _ => Self::merged(frames, settings),
+        }
+    }
+
+    /// One surface in the frame in which the cameras are posed, of one frame as of several; metres.
     ///
     /// # Errors
     /// [`Error::Invalid`] for no frame, for several frames whose cameras' poses nobody said, and as [`SurfaceSettings::check`],
     /// [`Observation::surface`] and [`merged_surface`].
-    pub fn new(frames: Vec<ObjectFrame>, settings: &SurfaceSettings) -> Result<Self> {
+    pub fn merged(frames: Vec<ObjectFrame>, settings: &SurfaceSettings) -> Result<Self> {
         settings.check()?;
         match &frames[..] {
-            [] => Err(Error::invalid("frames", "at least one", "none")),
-            [only] => {
-                let (seen, mask) = (&only.seen, only.mask());
-                let ObservedSurface { mesh, colors, report, .. } = seen.surface(mask, settings)?;
-                let around = mask.map(|mask| seen.surroundings(mask)).transpose()?;
-                let (pixels, around) = (Some(report), around.unwrap_or_default());
-                Ok(Self { frames, mesh, colors, pixels, around })
-            }
-            several => {
-                let mut poses = several.iter().map(|f| f.seen.camera().camera_from_world());
-                if poses.all(|pose| pose == DAffine3::IDENTITY) {
-                    let expected = "the camera's pose in each frame (a BOP scene with cam_R_w2c and cam_t_w2c, a bag \
-                                    whose fixed frame is named)";
-                    return Err(Error::invalid("frames", expected, "none"));
-                }
-                let masked: Vec<MaskedFrame<'_>> =
-                    several.iter().map(ObjectFrame::masked).collect();
-                let MergedSurface { mesh, colors, .. } = merged_surface(&masked, settings)?;
-                let around = merged_surroundings(&masked)?;
-                Ok(Self { frames, mesh, colors, pixels: None, around })
-            }
+            [] => return Err(Error::invalid("frames", "at least one", "none")),
+            [only] => return Self::before_camera(only, settings)?.in_world(),
+            _ => {}
         }
+        let mut poses = frames.iter().map(|f| f.seen.camera().camera_from_world());
+        if poses.all(|pose| pose == DAffine3::IDENTITY) {
+            let expected = "the camera's pose in each frame (a BOP scene with cam_R_w2c and cam_t_w2c, a bag \
+                            whose fixed frame is named)";
+            return Err(Error::invalid("frames", expected, "none"));
+        }
+        let masked: Vec<MaskedFrame<'_>> = frames.iter().map(ObjectFrame::masked).collect();
+        let MergedSurface { mesh, colors, .. } = merged_surface(&masked, settings)?;
+        let around = merged_surroundings(&masked)?;
+        Ok(Self { frame: SurfaceFrame::World, frames, mesh, colors, pixels: None, around })
+    }
+
+    /// Of one frame, in the camera's frame.
+    fn before_camera(frame: &ObjectFrame, settings: &SurfaceSettings) -> Result<Self> {
+        settings.check()?;
+        let (seen, mask) = (&frame.seen, frame.mask());
+        let ObservedSurface { mesh, colors, report, .. } = seen.surface(mask, settings)?;
+        let around = mask.map(|mask| seen.surroundings(mask)).transpose()?;
+        Ok(Self {
+            frame: SurfaceFrame::Camera,
+            frames: vec![frame.clone()],
+            mesh,
+            colors,
+            pixels: Some(report),
+            around: around.unwrap_or_default(),
+        })
+    }
+
+    /// The same of one frame, moved from its camera's frame to that of the camera's pose.
+    fn in_world(mut self) -> Result<Self> {
+        let [only] = &self.frames[..] else { return Ok(self) };
+        let world_from_camera = only.seen.camera().camera_from_world().inverse();
+        let moved = |p: &DVec3| world_from_camera.transform_point3(*p);
+        let vertices = self.mesh.vertices().iter().map(moved).collect();
+        self.mesh = Mesh::new(vertices, self.mesh.faces().to_vec())?;
+        self.around = self.around.iter().map(moved).collect();
+        self.frame = SurfaceFrame::World;
+        Ok(self)
+    }
+
+    /// The frame of its mesh and of what is around it.
+    pub fn frame(&self) -> SurfaceFrame {
+        self.frame
     }
 
     /// The frames in which it was seen.
@@ -221,24 +257,17 @@ impl ObservedObject {
         Ok(ObservedEmbeddings { file, shown })
     }
 
-    /// The frames' cameras in the mesh's frame: that of a single one stands in its own.
+    /// The frames' cameras in the mesh's frame.
     ///
     /// # Errors
     /// [`Error::Geom`] where a camera cannot be posed.
     pub fn cameras(&self) -> Result<Vec<Pinhole>> {
-        self.frames.iter().map(|frame| self.camera(frame)).collect()
-    }
-
-    fn camera(&self, frame: &ObjectFrame) -> Result<Pinhole> {
-        Ok(match self.frames[..] {
-            [_] => frame.seen.camera().posed(DAffine3::IDENTITY)?,
-            _ => *frame.seen.camera(),
-        })
+        self.frames.iter().map(|frame| self.frame.camera(&frame.seen)).collect()
     }
 
     /// A frame's picture before the mesh.
     fn picture<'a>(&self, frame: &'a ObjectFrame) -> Result<ObservedPicture<'a>> {
-        let camera = self.camera(frame)?;
+        let camera = self.frame.camera(&frame.seen)?;
         // The surface is rendered without colours.
         let color = frame.seen.color().unwrap_or_default();
         Ok(ObservedPicture { camera, color, mask: frame.mask().map(|mask| &mask.marked[..]) })
@@ -255,6 +284,7 @@ impl ObservedObject {
         use_it(&SurfaceResult {
             mesh: &self.mesh,
             colors: self.colors(),
+            frame: self.frame,
             frames: &frames,
             object: object.map(|mask| mask.name.as_str()),
             pixels: self.pixels,
@@ -318,6 +348,13 @@ mod tests {
         assert!(two.mesh().vertices().iter().all(|p| (p.x - 3.0).abs() < 0.2));
         assert!(two.pixels().is_none() && two.around().iter().all(|p| (p.x - 3.0).abs() < 1.0));
         two.with_result(None, |result| assert_eq!(result.object, Some("plate")));
+        // A single frame of many is moved to the others' frame, and so is its camera.
+        let only = ObjectFrame::of(Arc::new(frame(3.0)), None).unwrap();
+        let of_many = ObservedObject::merged(vec![only], &SurfaceSettings::default()).unwrap();
+        assert!(of_many.mesh().vertices().iter().all(|p| (p.x - 3.0).abs() < 0.2));
+        assert!(of_many.around().iter().all(|p| (p.x - 3.0).abs() < 1.0));
+        assert!((of_many.cameras().unwrap()[0].eye() - 3.0 * DVec3::X).length() < 1e-12);
+        assert_eq!((one.frame(), of_many.frame()), (SurfaceFrame::Camera, SurfaceFrame::World));
         let unmasked = Observation::new(*frame(0.0).camera());
         let all = [frame(3.0), unmasked, frame(3.01)].map(Arc::new);
         let visible = VisibleFrames::of(all.clone(), Some("plate")).unwrap();

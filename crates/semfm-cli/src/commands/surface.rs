@@ -104,7 +104,11 @@ impl SurfaceCommand {
         let task = console::progress(common.quiet);
         let all = self.frames(source.as_ref(), common)?;
         check_folder_again(&self.output, SURFACE_FILES)?;
-        let seen = ObservedObject::new(self.frames_of_object(all, common)?, &settings)?;
+        let frames = self.frames_of_object(all, common)?;
+        let seen = match self.merge {
+            true => ObservedObject::merged(frames, &settings)?,
+            false => ObservedObject::new(frames, &settings)?,
+        };
         let embeddings = match self.no_embeddings {
             true => None,
             false => {

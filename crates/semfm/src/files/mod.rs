@@ -108,7 +108,7 @@ pub use stored_transfer::StoredTransfer;
 #[cfg(feature = "mcap")]
 pub use surface::{
     CameraRecord, FILES as SURFACE_FILES, FORMAT as SURFACE_FORMAT, PixelsRecord, SurfaceFile,
-    SurfaceResult, write_surface,
+    SurfaceFrame, SurfaceResult, write_surface,
 };
 pub use track::{FORMAT as TRACK_FORMAT, PoseEvidenceRecord, TrackLine, TrackedRegionRecord};
 pub use trajectory::{

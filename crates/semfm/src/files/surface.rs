@@ -39,7 +39,9 @@ pub struct SurfaceFile {
     pub format: String,
     /// The mesh of `surface.ply`.
     pub mesh: MeshIdentity,
-    /// The cameras that saw it. Of one, `surface.ply` is in the camera's own frame; of several, in the world's.
+    /// The frame of `surface.ply`.
+    pub frame: SurfaceFrame,
+    /// The cameras that saw it.
     pub cameras: Vec<CameraRecord>,
     /// The mask of the object; null where all that was seen is the surface.
     pub object: Option<String>,
@@ -51,6 +53,29 @@ pub struct SurfaceFile {
     pub views: Option<String>,
     /// The encoder with its version; null without embeddings.
     pub encoder: Option<String>,
+}
+
+/// The frame that an observed surface is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SurfaceFrame {
+    /// That of the one camera that saw it.
+    Camera,
+    /// That in which the cameras' poses are given.
+    World,
+}
+
+impl SurfaceFrame {
+    /// The camera of an observation in this frame.
+    ///
+    /// # Errors
+    /// [`Error::Geom`](crate::Error::Geom) where it cannot be posed.
+    pub fn camera(self, seen: &Observation) -> Result<Pinhole> {
+        Ok(match self {
+            Self::Camera => seen.camera().posed(DAffine3::IDENTITY)?,
+            Self::World => *seen.camera(),
+        })
+    }
 }
 
 /// A pinhole camera as calibrations write it: the centre of the first pixel is at (0, 0).
@@ -95,6 +120,8 @@ pub struct SurfaceResult<'a> {
     pub mesh: &'a Mesh,
     /// Colours at its vertices (n).
     pub colors: Option<&'a [[u8; 3]]>,
+    /// The frame of the surface and of what is around it.
+    pub frame: SurfaceFrame,
     /// The frames in which it was seen; their cameras' worlds are what their files say.
     pub frames: &'a [&'a Observation],
     /// The name of its mask.
@@ -120,6 +147,7 @@ impl SurfaceResult<'_> {
         SurfaceFile {
             format: FORMAT.into(),
             mesh: MeshIdentity::of(self.mesh),
+            frame: self.frame,
             cameras: self.frames.iter().map(|seen| CameraRecord::of(seen.camera())).collect(),
             object: self.object.map(ToOwned::to_owned),
             pixels: self.pixels.map(pixels),
@@ -140,10 +168,7 @@ impl SurfaceResult<'_> {
             return Ok(Vec::new());
         }
         let view = |seen: &&Observation| {
-            let camera = match self.frames {
-                [_] => seen.camera().posed(DAffine3::IDENTITY)?,
-                _ => *seen.camera(),
-            };
+            let camera = self.frame.camera(seen)?;
             let color = seen.color().unwrap_or_default();
             whole_picture(self.mesh, &ObservedPicture { camera, color, mask: None }, task)
         };
@@ -245,6 +270,7 @@ mod tests {
         let result = SurfaceResult {
             mesh: &surface.mesh,
             colors: surface.colors.as_deref(),
+            frame: SurfaceFrame::Camera,
             frames: &[&seen],
             object: Some("box"),
             pixels: Some(surface.report),
