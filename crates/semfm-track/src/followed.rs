@@ -48,6 +48,11 @@ const FOUND_SHARE: f64 = 0.3;
 /// lies in any wall.
 const FOUND_JUMPS: usize = 5;
 
+/// Of what was seen or looked through, the share that may be looked through where it is found by search, and the share of the outline at which the
+/// depth must jump: a mug that is away was found in a box with .37 and .6; where it is they are .01 and .95.
+const FOUND_THROUGH: f64 = 0.1;
+const FOUND_OUTLINE: f64 = 0.7;
+
 /// An object of which this share is hidden, and of what is not less than this share is looked through, is not contradicted.
 const HIDDEN_SHARE: f64 = 0.5;
 const CONTRADICTED: f64 = 0.4;
@@ -218,7 +223,13 @@ impl Followed {
         let width = (0.5 * WIDTH * self.model.diameter()).max(LEAST_WIDTH);
         let looked_at = &poses[..poses.len().min(LOOKED_AT)];
         let attempts = looked_at.iter().filter_map(|pose| self.attempt(view, pose, width));
-        let is_found = |found: &Attempt| found.probability >= FOUND && is_distinct(&found.evidence);
+        let is_found = |found: &Attempt| {
+            let evidence = &found.evidence;
+            found.probability >= FOUND
+                && is_distinct(evidence)
+                && evidence.through_share() <= FOUND_THROUGH
+                && evidence.outline_share() >= FOUND_OUTLINE
+        };
         let best = attempts.filter(is_found).max_by(|a, b| a.probability.total_cmp(&b.probability));
         if best.is_none() {
             looked_at.iter().for_each(|pose| self.search.refute(pose));

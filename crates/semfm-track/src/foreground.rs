@@ -1,5 +1,6 @@
 //! Where in an image an object may stand: what is left once the large planes are taken away, in connected pieces.
 
+use nalgebra::{Matrix3, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use semfm_geom::math::DVec3;
@@ -15,11 +16,13 @@ const TRIALS: usize = 60;
 /// Points that are held against each trial's plane.
 const TESTED: usize = 400;
 
-/// Planes that are taken away at most: a table, a wall.
-const PLANES: usize = 2;
+/// Planes that are taken away at most: a table, walls.
+const PLANES: usize = 3;
 
-/// A plane holds at least this share of the points.
+/// A plane holds at least this share of the points, or of those that are left this, if it is wider than any object: of the strip
+/// of a wall above a table every part looks like a flat object.
 const PLANE_SHARE: f64 = 0.15;
+const WIDE_SHARE: f64 = 0.3;
 
 /// Thickness of a plane, metres, at one metre from the camera; it grows with the square of the depth.
 const PLANE_THICKNESS: f64 = 0.008;
@@ -41,6 +44,8 @@ pub(crate) struct Piece {
 /// The pieces of the foreground, as grid cells.
 pub(crate) struct Foreground {
     pub pieces: Vec<Piece>,
+    /// Normals of the planes that were taken away, the largest first; none under a mask.
+    pub planes: Vec<DVec3>,
     /// Pixels between two cells.
     pub step: usize,
 }
@@ -68,9 +73,10 @@ pub(crate) fn foreground(
         }
     }
     // Under a mask everything is the object's.
-    if mask.is_none() {
-        remove_planes(&mut cells, seed);
-    }
+    let planes = match mask {
+        None => remove_planes(&mut cells, most_diameter, seed),
+        Some(_) => Vec::new(),
+    };
     let mut pieces = Vec::new();
     for piece in connected(&cells, columns, step as f64 / view.focal()) {
         let whole = piece_of(&piece, &cells, columns, step);
@@ -84,7 +90,7 @@ pub(crate) fn foreground(
     pieces.retain(|piece| piece.pixels.len() >= LEAST_CELLS);
     pieces.sort_by_key(|piece| std::cmp::Reverse(piece.pixels.len()));
     pieces.truncate(most);
-    Foreground { pieces, step }
+    Foreground { pieces, planes, step }
 }
 
 impl Foreground {
@@ -105,42 +111,96 @@ fn pixel(cell: usize, columns: usize, step: usize) -> [usize; 2] {
     [cell % columns * step, cell / columns * step]
 }
 
-/// Takes away the points of the largest planes, and what lies behind them.
-fn remove_planes(cells: &mut [Option<DVec3>], seed: u64) {
+/// A plane: n·p = offset, the normal of length 1 towards the camera.
+#[derive(Clone, Copy)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+impl Plane {
+    /// Through a point; `None` for a normal of no length.
+    fn new(normal: DVec3, through: DVec3) -> Option<Self> {
+        let normal = normal.try_normalize()?;
+        let normal = if normal.dot(through) > 0.0 { -normal } else { normal };
+        Some(Self { normal, offset: normal.dot(through) })
+    }
+
+    /// How far a point lies before it.
+    fn height(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+
+    /// Twice the greatest distance of the points that lie on it from their middle.
+    fn extent(self, points: &[DVec3]) -> f64 {
+        let on = points.iter().copied().filter(|p| self.height(*p).abs() < thickness(*p));
+        let (sum, n) = on.clone().fold((DVec3::ZERO, 0.0), |(sum, n), p| (sum + p, n + 1.0));
+        let middle = if n > 0.0 { sum / n } else { sum };
+        2.0 * on.map(|p| p.distance(middle)).fold(0.0, f64::max)
+    }
+
+    /// The plane of least squares through those of the points that lie on this one. Three points with noise lean by so much
+    /// that a band of a wall is left at the edge of the image, which was sought for the object in every frame.
+    fn refined(self, points: &[DVec3]) -> Self {
+        let on: Vec<DVec3> =
+            points.iter().copied().filter(|p| self.height(*p).abs() < thickness(*p)).collect();
+        let middle = on.iter().sum::<DVec3>() / on.len().max(1) as f64;
+        let mut scatter = Matrix3::zeros();
+        for p in &on {
+            let d = (*p - middle).to_array();
+            scatter += Matrix3::from_fn(|i, j| d[i] * d[j]);
+        }
+        let eigen = SymmetricEigen::new(scatter);
+        let least = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        Self::new(DVec3::new(least[0], least[1], least[2]), middle).unwrap_or(self)
+    }
+}
+
+/// How often a plane is refined.
+const REFINEMENTS: usize = 2;
+
+/// Takes away the points of the largest planes, and what lies behind them; then those of planes that hold less, but are wider
+/// than any object (`most_diameter`). Their normals.
+fn remove_planes(cells: &mut [Option<DVec3>], most_diameter: f64, seed: u64) -> Vec<DVec3> {
+    let mut normals = Vec::new();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n_all = cells.iter().flatten().count();
     for _ in 0..PLANES {
         let points: Vec<DVec3> = cells.iter().flatten().copied().collect();
         if points.len() < 3 * LEAST_CELLS {
-            return;
+            return normals;
         }
         let tested: Vec<DVec3> =
             (0..TESTED).map(|_| points[rng.random_range(0..points.len())]).collect();
-        let mut best: Option<(usize, DVec3, f64)> = None;
+        let mut best: Option<(usize, Plane)> = None;
         for _ in 0..TRIALS {
             let [a, b, c] = [0; 3].map(|_| points[rng.random_range(0..points.len())]);
-            let Some(mut normal) = (b - a).cross(c - a).try_normalize() else { continue };
-            // Towards the camera.
-            if normal.dot(a) > 0.0 {
-                normal = -normal;
-            }
-            let offset = normal.dot(a);
-            let on = |p: &&DVec3| (normal.dot(**p) - offset).abs() < thickness(**p);
-            let n = tested.iter().filter(on).count();
-            if best.is_none_or(|(most, ..)| n > most) {
-                best = Some((n, normal, offset));
+            let Some(plane) = Plane::new((b - a).cross(c - a), a) else { continue };
+            let n = tested.iter().filter(|p| plane.height(**p).abs() < thickness(**p)).count();
+            if best.is_none_or(|(most, _)| n > most) {
+                best = Some((n, plane));
             }
         }
-        let Some((n, normal, offset)) = best else { return };
-        if (n as f64) < PLANE_SHARE * TESTED as f64 * n_all as f64 / points.len() as f64 {
-            return;
+        let Some((n, plane)) = best else { return normals };
+        let share = n as f64 / TESTED as f64;
+        let is_ground = share * points.len() as f64 >= PLANE_SHARE * n_all as f64;
+        let plane = (0..REFINEMENTS).fold(plane, |plane, _| plane.refined(&points));
+        let is_wide = share >= WIDE_SHARE && plane.extent(&points) > most_diameter;
+        if !(is_ground || is_wide) {
+            return normals;
         }
+        normals.push(plane.normal);
         for cell in cells.iter_mut() {
-            if cell.is_some_and(|p| normal.dot(p) - offset < thickness(p)) {
+            let is_taken = |p: DVec3| {
+                let height = plane.height(p);
+                height < thickness(p) && (is_ground || height > -thickness(p))
+            };
+            if cell.is_some_and(is_taken) {
                 *cell = None;
             }
         }
     }
+    normals
 }
 
 fn thickness(p: DVec3) -> f64 {
@@ -232,7 +292,9 @@ mod tests {
         assert!((1500..1800).contains(&mask.iter().filter(|&&m| m).count()));
         let masked = foreground(&view, Some(&left), 2.0, 6, 1);
         assert!(masked.pieces.iter().all(|piece| piece.middle.x < 0.0));
-        let cut = foreground(&view, None, 0.06, 6, 1);
+        let cut = foreground(&view, Some(&left), 0.06, 6, 1);
         assert!(cut.pieces.len() > 2);
+        // Faces that are wider than the object are none of its own.
+        assert!(foreground(&view, None, 0.06, 6, 1).pieces.is_empty());
     }
 }

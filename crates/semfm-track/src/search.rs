@@ -6,7 +6,7 @@ use semfm_geom::math::{DQuat, DVec3};
 
 use crate::depth_view::DepthView;
 use crate::evidence::Evidence;
-use crate::foreground::foreground;
+use crate::foreground::{Foreground, foreground};
 use crate::model::TrackModel;
 use crate::motion::{matrix, twist_between};
 use crate::outline::{GRAZING, Shown};
@@ -15,7 +15,11 @@ use crate::register::{Start, register};
 /// Rotations that are tried, spread over all of them: none is farther than some 40° from one.
 const N_ROTATIONS: usize = 240;
 
-/// Turns of the last pose that are tried before those, degrees, about the axes of a cube's faces.
+/// Steps of the turns of the last pose about the normals of planes, degrees, which are tried first: what is moved on a table
+/// mostly turns so.
+const TABLE_STEP: usize = 15;
+
+/// Turns of the last pose that are tried after those, degrees, about the axes of a cube's faces.
 const TURNS: [f64; 2] = [25.0, 50.0];
 
 /// Every so many-th sample takes part: 100 in all, half of which face the camera.
@@ -30,8 +34,7 @@ const KEPT: usize = 6;
 /// Poses that place the surface closer than this, in shares of its radius, are one pose.
 const SAME: f64 = 0.15;
 
-/// Frames in which a pose that did not stand a closer look is not looked at again. Without it the same
-/// poses were looked at in every frame: of eight pushed objects two were found again within 40 frames, with it three.
+/// Frames in which a pose that did not stand a closer look is not looked at again: others get their turn.
 const REFUTED_FRAMES: usize = 20;
 
 /// A piece wider than this many diameters is cut up.
@@ -102,9 +105,10 @@ impl Search {
             true => (FIRST_PIECES, FIRST_HYPOTHESES * at.budget),
             false => (PIECES, at.budget),
         };
-        let pieces = foreground(at.view, at.mask, most, n_pieces, at.seed).pieces;
+        let Foreground { pieces, planes, .. } =
+            foreground(at.view, at.mask, most, n_pieces, at.seed);
         let mut starts: Vec<Sim3> = self.kept.clone();
-        let rotations = rotations(at.last.as_ref());
+        let rotations = rotations(at.last.as_ref(), &planes);
         let n_places = pieces.len() + usize::from(at.last.is_some());
         if n_places > 0 {
             for _ in 0..budget.div_ceil(n_places).min(rotations.len()) {
@@ -142,17 +146,27 @@ impl Search {
     }
 }
 
-/// Those around the last one first.
-fn rotations(last: Option<&Sim3>) -> Vec<DQuat> {
+/// Those around the last one first, on the table and then in any direction.
+fn rotations(last: Option<&Sim3>, planes: &[DVec3]) -> Vec<DQuat> {
+    let on_table = last.into_iter().flat_map(|last| {
+        let steps = (TABLE_STEP..=180).step_by(TABLE_STEP).map(|degrees| degrees as f64);
+        steps.flat_map(move |degrees| {
+            planes.iter().flat_map(move |&normal| {
+                [degrees, -degrees]
+                    .map(|turn| DQuat::from_axis_angle(normal, turn.to_radians()) * last.rotation)
+            })
+        })
+    });
     let around = last.into_iter().flat_map(|last| {
         let turns = TURNS.into_iter().flat_map(|degrees: f64| {
             [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(move |axis| {
                 [degrees, -degrees].map(|turn| DQuat::from_axis_angle(axis, turn.to_radians()))
             })
         });
-        [DQuat::IDENTITY].into_iter().chain(turns).map(|turn| turn * last.rotation)
+        turns.map(|turn| turn * last.rotation)
     });
-    around.chain(super_fibonacci(N_ROTATIONS)).collect()
+    let same = last.map(|last| last.rotation);
+    same.into_iter().chain(on_table).chain(around).chain(super_fibonacci(N_ROTATIONS)).collect()
 }
 
 /// The pose of a rotation that brings the middle of the side that is seen to a place.
