@@ -77,7 +77,7 @@ pub struct TransferReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub one_kind: Option<f64>,
     /// Where the target is the source's surface once more, whatever its place, size or tessellation: the share of the
-    /// target's vertices that lie on it. They have the source's region as it is.
+    /// target's vertices that lie on it, each counted by how certain that is. They have the source's region as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub same_surface: Option<f64>,
     /// Share of the source's area in the region.
