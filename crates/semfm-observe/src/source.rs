@@ -37,7 +37,8 @@ pub struct SourceReport {
 /// `visit`, in order.
 ///
 /// # Errors
-/// As [`BopScene`] and [`read_bag`]; [`Error::Invalid`] for an `every` of 0; the errors of `visit`.
+/// As [`BopScene`] and [`read_bag`]; [`Error::Invalid`] for an `every` of 0, and for settings of a bag beside a BOP scene;
+/// the errors of `visit`.
 pub fn read_observations(
     path: &Path,
     settings: &SourceSettings,
@@ -49,6 +50,10 @@ pub fn read_observations(
     let most = settings.most.unwrap_or(usize::MAX);
     let mut n_observations = 0;
     if BopScene::is_scene(path) {
+        if let Some(setting) = settings.bag.given() {
+            let found = format!("the BOP scene {}", path.display());
+            return Err(Error::invalid(setting, "a bag", found));
+        }
         let scene = BopScene::open(path)?;
         for image in scene.images().step_by(settings.every).take(most) {
             visit(scene.observation(image)?)?;
@@ -88,9 +93,39 @@ pub fn read_observations(
 /// As [`write_bag`] and [`write_bop`].
 pub fn write_observations(path: &Path, observations: &[Observation]) -> Result<()> {
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    if is_bag {
-        write_bag(path, observations)
-    } else {
-        write_bop(path, observations).map(drop)
+    if is_bag { write_bag(path, observations) } else { write_bop(path, observations).map(drop) }
+}
+
+#[cfg(test)]
+mod tests {
+    use semfm_geom::math::DAffine3;
+    use semfm_geom::{Intrinsics, Pinhole};
+
+    use super::*;
+
+    #[test]
+    fn settings_of_a_bag_are_refused_beside_a_scene() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene");
+        let intrinsics = Intrinsics { width: 2, height: 1, fx: 2.0, fy: 2.0, cx: 1.0, cy: 0.5 };
+        let camera = Pinhole::with_pixel_centres_at_half(intrinsics, DAffine3::IDENTITY).unwrap();
+        let seen = Observation::new(camera).with_color(vec![[9; 3]; 2]).unwrap();
+        write_observations(&path, &[seen]).unwrap();
+        let read = |bag: BagSettings| {
+            let settings = SourceSettings { bag, ..Default::default() };
+            read_observations(&path, &settings, |_| Ok(())).map(|report| report.n_observations)
+        };
+        assert_eq!(read(BagSettings::default()).unwrap(), 1);
+        let some = || Some("x".to_owned());
+        for (bag, word) in [
+            (BagSettings { color: some(), ..Default::default() }, "colour"),
+            (BagSettings { depth: some(), ..Default::default() }, "depth"),
+            (BagSettings { camera_info: some(), ..Default::default() }, "camera"),
+            (BagSettings { fixed_frame: some(), ..Default::default() }, "fixed frame"),
+            (BagSettings { max_gap_nanos: 1, ..Default::default() }, "max gap"),
+        ] {
+            let error = read(bag).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains("the BOP scene"), "{error}");
+        }
     }
 }

@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail};
 use clap::{ArgGroup, Args};
 use semfm::files::read_camera_pose;
 use semfm::observe::{
-    BagSettings, BopScene, Mask, MaskFile, Observation, ObservationFiles, SourceReport,
-    SourceSettings, read_observations,
+    BagSettings, Mask, MaskFile, Observation, ObservationFiles, SourceReport, SourceSettings,
+    read_observations,
 };
 
 /// The files of one frame.
@@ -85,11 +85,8 @@ pub struct BagOptions {
 }
 
 impl BagOptions {
-    /// How a source is read.
-    pub fn settings(&self, source: &Path) -> Result<BagSettings> {
-        if let Some(option) = self.given().filter(|_| BopScene::is_scene(source)) {
-            bail!("{option}: expected a bag, found the BOP scene {}", source.display());
-        }
+    /// How a bag is read.
+    pub fn settings(&self) -> Result<BagSettings> {
         let settings = BagSettings {
             color: self.color_topic.clone(),
             depth: self.depth_topic.clone(),
@@ -137,8 +134,8 @@ pub struct FrameChoice {
 
 impl FrameChoice {
     /// How these frames of a source are read.
-    pub fn settings(&self, bag: &BagOptions, source: &Path) -> Result<SourceSettings> {
-        let (bag, every) = (bag.settings(source)?, self.every.unwrap_or(1));
+    pub fn settings(&self, bag: &BagOptions) -> Result<SourceSettings> {
+        let (bag, every) = (bag.settings()?, self.every.unwrap_or(1));
         Ok(SourceSettings { bag, every, most: self.most })
     }
 
@@ -171,7 +168,7 @@ pub fn parse_source(text: &str) -> (PathBuf, Option<usize>) {
 /// Reads one frame.
 pub fn read_source_frame(source: &Path, number: usize, bag: &BagOptions) -> Result<SourceFrame> {
     let most = number.checked_add(1); // all, for the last number there is
-    let settings = SourceSettings { bag: bag.settings(source)?, most, ..SourceSettings::default() };
+    let settings = SourceSettings { bag: bag.settings()?, most, ..SourceSettings::default() };
     let (mut n_seen, mut found) = (0, None);
     let report = read_observations(source, &settings, |seen| {
         if n_seen == number {

@@ -50,7 +50,7 @@ impl FramesCommand {
             Some(source) => {
                 let mut all = Vec::new();
                 let report =
-                    read_observations(source, &self.choice.settings(&self.bag, source)?, |seen| {
+                    read_observations(source, &self.choice.settings(&self.bag)?, |seen| {
                         all.push(seen);
                         Ok(())
                     })?;

@@ -151,7 +151,7 @@ impl SurfaceCommand {
             ),
             Some((path, None)) if self.merge => {
                 let settings = SourceSettings {
-                    bag: self.bag.settings(path)?,
+                    bag: self.bag.settings()?,
                     every: self.every,
                     most: self.most,
                 };

@@ -180,7 +180,7 @@ impl TrackCommand {
 
     /// Reads the source and follows the object.
     fn frames(&self, run: &mut Run<'_>, mut bag: Option<&mut Ros2Track<'_, '_>>) -> Result<()> {
-        let settings = self.choice.settings(&self.bag, &self.source)?;
+        let settings = self.choice.settings(&self.bag)?;
         let mut failure = None;
         let read = read_observations(&self.source, &settings, |seen| {
             self.frame(run, &seen, bag.as_deref_mut()).map_err(|error| {

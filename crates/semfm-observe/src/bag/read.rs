@@ -50,6 +50,18 @@ impl Default for BagSettings {
 const WIDEST_GAP: f64 = 3600.0;
 
 impl BagSettings {
+    /// A setting that is not the default, in words.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("topic of the colour", self.color.is_some()),
+            ("topic of the depth", self.depth.is_some()),
+            ("topic of the camera", self.camera_info.is_some()),
+            ("fixed frame", self.fixed_frame.is_some()),
+            ("max gap", self.max_gap_nanos != Self::default().max_gap_nanos),
+        ];
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(setting, _)| setting)
+    }
+
     /// With a gap in seconds.
     ///
     /// # Errors
