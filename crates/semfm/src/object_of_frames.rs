@@ -1,5 +1,6 @@
 //! An object out of what cameras saw of it, in one frame or in several: surface, surroundings, embeddings, files.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -40,7 +41,8 @@ impl VisibleFrames {
     /// Leaves out the frames without a mask of the object or without depth under it.
     ///
     /// # Errors
-    /// As [`ObjectFrame::where_visible`]; [`Error::Invalid`] where the object is named and no frame shows it.
+    /// As [`ObjectFrame::where_visible`]; [`Error::Invalid`] where the object is named and no frame shows it, and where nobody
+    /// names it and the masks of the frames have several names.
     pub fn of(
         all: impl IntoIterator<Item = Arc<Observation>>,
         object: Option<&str>,
@@ -55,6 +57,13 @@ impl VisibleFrames {
                 }
                 None => Ok(Self { frames: all, left_out: Vec::new() }),
             };
+        }
+        let masks = all.iter().filter_map(ObjectFrame::mask);
+        let names: BTreeSet<&str> = masks.map(|mask| mask.name.as_str()).collect();
+        if names.len() > 1 {
+            let names: Vec<&str> = names.into_iter().collect();
+            let expected = format!("one of the masks {}", names.join(", "));
+            return Err(Error::invalid("mask of the object", expected, "none"));
         }
         let mut visible = Self { frames: Vec::new(), left_out: Vec::new() };
         for (number, frame) in all.into_iter().enumerate() {
@@ -361,6 +370,20 @@ mod tests {
         assert_eq!((visible.frames.len(), visible.left_out.len()), (2, 1));
         assert!(visible.left_out[0].starts_with("frame 1 is left out"), "{:?}", visible.left_out);
         assert!(VisibleFrames::of(all, Some("cup")).unwrap_err().to_string().contains("`cup`"));
+    }
+
+    #[test]
+    fn frames_of_several_objects_are_told_apart_by_name() {
+        let cup = frame(3.0).masks()[0].marked.clone();
+        let camera = *frame(3.0).camera();
+        let of_cup = Observation::new(camera)
+            .with_depth(frame(3.0).depth().unwrap().clone())
+            .and_then(|seen| seen.with_mask("cup", cup))
+            .unwrap();
+        let all = [frame(3.01), of_cup].map(Arc::new);
+        let error = VisibleFrames::of(all.clone(), None).unwrap_err().to_string();
+        assert!(error.contains("cup, plate"), "{error}");
+        assert_eq!(VisibleFrames::of(all, Some("cup")).unwrap().frames.len(), 1);
     }
 
     #[test]
