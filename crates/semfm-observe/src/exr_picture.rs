@@ -85,18 +85,14 @@ impl<'a> ExrPicture<'a> {
         Ok(Self { path, width, height, channels })
     }
 
-    /// The depth: a channel with `depth` in its name, else `Z`, else the only one, else R, G and B that are the same.
+    /// The depth: the channel with a part `depth` in its dotted name, else `Z`, else the only `*.Z` that is no part of a vector.
+    /// Where there is neither, the only channel, or the R, G and B of the only layer with colours where they are the same.
     ///
     /// # Errors
     /// A [`FormatError`] with the names of the channels where none or several are meant.
     pub fn depth(&self) -> Result<ExrDepth, FormatError> {
-        let has_depth = |channel: &&Channel| {
-            channel.name.split('.').any(|part| part.eq_ignore_ascii_case("depth"))
-        };
-        let found = only(self.channels.iter().filter(has_depth))
-            .or_else(|| only(self.channels.iter().filter(|channel| channel.is_of("z"))))
-            .or_else(|| only(self.channels.iter()))
-            .or_else(|| self.grey());
+        let all: Vec<&Channel> = self.channels.iter().collect();
+        let found = self.named_depth().unwrap_or_else(|| only(all.iter().copied()).or(grey(&all)));
         let Some(Channel { samples, .. }) = found else {
             let expected = "one channel of depth: a single one, or one of the name `Z` or `depth`";
             return Err(self.other_channels(expected));
@@ -108,14 +104,40 @@ impl<'a> ExrPicture<'a> {
         })
     }
 
-    /// The colours as sRGB: R, G and B, or one channel as grey.
+    /// The channel that is called depth; `None` within where several are, or only parts of vectors.
+    fn named_depth(&self) -> Option<Option<&Channel>> {
+        let has_depth = |channel: &&Channel| {
+            channel.name.split('.').any(|part| part.eq_ignore_ascii_case("depth"))
+        };
+        let named: Vec<&Channel> = self.channels.iter().filter(has_depth).collect();
+        if !named.is_empty() {
+            return Some(only(named.iter().copied()).or(grey(&named)));
+        }
+        let z: Vec<&Channel> = self.channels.iter().filter(|channel| channel.is_of("z")).collect();
+        if z.is_empty() {
+            return None;
+        }
+        let depths: Vec<&Channel> = z.into_iter().filter(|z| !self.is_of_vector(z)).collect();
+        let without_layer = depths.iter().copied().filter(|z| z.layer().is_empty());
+        Some(only(without_layer).or_else(|| only(depths.iter().copied())))
+    }
+
+    /// Whether its layer has an X or a Y, as one of normals or of places does.
+    fn is_of_vector(&self, z: &Channel) -> bool {
+        let is_axis = |channel: &Channel| channel.is_of("x") || channel.is_of("y");
+        self.channels.iter().any(|other| other.layer() == z.layer() && is_axis(other))
+    }
+
+    /// The colours as sRGB: R, G and B without a layer, else those of the layer `Combined`, else of the only layer that has
+    /// some; or one channel as grey.
     ///
     /// # Errors
-    /// A [`FormatError`] with the names of the channels where there are others.
+    /// A [`FormatError`] with the names of the channels where there are others, or several layers may be meant.
     pub fn color(&self) -> Result<RgbImage, FormatError> {
         let grey = || only(self.channels.iter()).map(|channel| [channel; 3]);
         let Some(rgb) = self.rgb().or_else(grey) else {
-            return Err(self.other_channels("channels R, G and B, or a single one"));
+            let expected = "channels R, G and B of one layer (of several: without a name, or `Combined`), or a single one";
+            return Err(self.other_channels(expected));
         };
         let rgb = rgb.map(|channel| channel.samples.values_as_f32().map(srgb).collect::<Vec<u8>>());
         let pixel = |x: u32, y: u32| {
@@ -125,27 +147,19 @@ impl<'a> ExrPicture<'a> {
         Ok(RgbImage::from_fn(self.width as u32, self.height as u32, pixel))
     }
 
-    /// The first R, G and B of one layer.
+    /// R, G and B of the layer that is the picture.
     fn rgb(&self) -> Option<[&Channel; 3]> {
-        self.channels.iter().filter(|channel| channel.is_of("r")).find_map(|red| {
-            let of = |name: &str| {
-                let mut all = self.channels.iter();
-                all.find(|other| other.is_of(name) && other.layer() == red.layer())
-            };
-            Some([red, of("g")?, of("b")?])
-        })
-    }
-
-    /// R, where G and B are the same.
-    fn grey(&self) -> Option<&Channel> {
-        let [red, green, blue] = self.rgb()?;
-        let same = |other: &Channel| {
-            let bits = |channel: &Channel| {
-                channel.samples.values_as_f32().map(f32::to_bits).collect::<Vec<u32>>()
-            };
-            bits(red) == bits(other)
+        let all: Vec<&Channel> = self.channels.iter().collect();
+        let layers = rgb_layers(&all);
+        let is_combined = |layer: &str| {
+            layer.rsplit('.').next().is_some_and(|own| own.eq_ignore_ascii_case("combined"))
         };
-        (same(green) && same(blue)).then_some(red)
+        let of = |is_meant: &dyn Fn(&str) -> bool| -> Vec<[&Channel; 3]> {
+            layers.iter().copied().filter(|[red, ..]| is_meant(red.layer())).collect()
+        };
+        let preferred = [of(&str::is_empty), of(&is_combined), of(&|_| true)];
+        let first = preferred.into_iter().find(|layers| !layers.is_empty())?;
+        only(first.into_iter())
     }
 
     fn other_channels(&self, expected: &str) -> FormatError {
@@ -163,6 +177,28 @@ impl Channel {
     fn layer(&self) -> &str {
         self.name.rsplit_once('.').map_or("", |(layer, _)| layer)
     }
+}
+
+/// The R, G and B of each layer that has them.
+fn rgb_layers<'a>(channels: &[&'a Channel]) -> Vec<[&'a Channel; 3]> {
+    let reds = channels.iter().copied().filter(|channel| channel.is_of("r"));
+    let layer = |red: &'a Channel| {
+        let of = |name: &str| {
+            let mut all = channels.iter().copied();
+            all.find(|other| other.is_of(name) && other.layer() == red.layer())
+        };
+        Some([red, of("g")?, of("b")?])
+    };
+    reds.filter_map(layer).collect()
+}
+
+/// R of the only layer with colours, where G and B are the same.
+fn grey<'a>(channels: &[&'a Channel]) -> Option<&'a Channel> {
+    let [red, green, blue] = only(rgb_layers(channels).into_iter())?;
+    let bits =
+        |channel: &Channel| channel.samples.values_as_f32().map(f32::to_bits).collect::<Vec<u32>>();
+    let of_red = bits(red);
+    (of_red == bits(green) && of_red == bits(blue)).then_some(red)
 }
 
 /// The item of an iterator that has one.
@@ -241,6 +277,56 @@ mod tests {
         write_exr(&path, [2, 1], &[("mask", vec![0.0, 1.0])]);
         let of = crate::MaskedPicture { width: 2, height: 1, name: "the view" };
         assert_eq!(crate::read_mask(&path, of).unwrap(), [false, true]);
+    }
+
+    /// Channels of two pixels.
+    fn pair<'a>(names: &[&'a str], value: f32) -> Vec<(&'a str, Vec<f32>)> {
+        names.iter().map(|name| (*name, vec![value; 2])).collect()
+    }
+
+    #[test]
+    fn of_several_passes_the_picture_is_taken_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.exr");
+        let red = |layers: &[(&[&str], f32)]| {
+            let channels: Vec<_> =
+                layers.iter().flat_map(|(names, value)| pair(names, *value)).collect();
+            write_exr(&path, [2, 1], &channels);
+            read_picture(&path).map(|picture| picture.into_rgb8().get_pixel(0, 0).0[0])
+        };
+        let albedo: (&[&str], f32) = (&["V.Albedo.R", "V.Albedo.G", "V.Albedo.B"], 0.0);
+        let combined: (&[&str], f32) = (&["V.Combined.R", "V.Combined.G", "V.Combined.B"], 1.0);
+        let light: (&[&str], f32) = (&["V.Light.R", "V.Light.G", "V.Light.B"], 0.0);
+        assert_eq!(red(&[albedo, combined]).unwrap(), 255);
+        assert_eq!(red(&[albedo, (&["R", "G", "B"], 1.0)]).unwrap(), 255);
+        assert_eq!(red(&[albedo]).unwrap(), 0);
+        let several = red(&[albedo, light]).unwrap_err().to_string();
+        assert!(several.contains("V.Albedo.R") && several.contains("Combined"), "{several}");
+    }
+
+    #[test]
+    fn of_several_passes_the_depth_is_taken_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("d.exr");
+        let depth = |layers: &[(&[&str], f32)]| {
+            let channels: Vec<_> =
+                layers.iter().flat_map(|(names, value)| pair(names, *value)).collect();
+            write_exr(&path, [2, 1], &channels);
+            read_depth_image(&path, None).map(|image| image.metres()[0])
+        };
+        let combined: (&[&str], f32) = (&["V.Combined.R", "V.Combined.G", "V.Combined.B"], 0.3);
+        let normal: (&[&str], f32) = (&["V.Normal.X", "V.Normal.Y", "V.Normal.Z"], 0.6);
+        assert_eq!(depth(&[combined, (&["V.Depth.Z"], 2.0)]).unwrap(), 2.0);
+        assert_eq!(depth(&[combined, normal, (&["Z"], 2.0)]).unwrap(), 2.0);
+        assert_eq!(depth(&[normal, (&["V.Z"], 2.0)]).unwrap(), 2.0);
+        assert_eq!(depth(&[combined, (&["Depth.R", "Depth.G", "Depth.B"], 2.0)]).unwrap(), 2.0);
+        assert!(depth(&[normal]).is_err(), "a normal is no depth");
+        assert!(depth(&[combined, normal]).is_err(), "nor are colours beside it");
+        assert!(depth(&[(&["V.Mist.Z", "V.Other.Z"], 1.0)]).is_err());
+        assert!(depth(&[(&["A.Depth.Z", "B.Depth.Z"], 1.0), (&["Z"], 1.0)]).is_err());
+        assert!(
+            depth(&[combined, (&["W.Combined.R", "W.Combined.G", "W.Combined.B"], 1.0)]).is_err()
+        );
     }
 
     #[test]
