@@ -1,16 +1,27 @@
-"""`semfm.Observation`: pictures and depth as arrays, and what the shell makes of the same, to the last byte."""
+"""`semfm.Observation`: pictures and depth as arrays, with the shell's answers to the last byte."""
 
 from __future__ import annotations
 
 import copy
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
-from observed_frames import CAMERA, HEIGHT, K, WALL, WIDTH, in_metres, seen, shell, turned, write_files
-
 import semfm
+from observed_frames import (
+    CAMERA,
+    HEIGHT,
+    WALL,
+    WIDTH,
+    K,
+    in_metres,
+    seen,
+    shell,
+    turned,
+    write_files,
+)
 
 
 @pytest.fixture(scope="module")
@@ -23,6 +34,11 @@ def pair():
 @pytest.fixture(scope="module")
 def kettle(pair):
     return seen(turned(pair[1], [0.02, 0.0, 0.6], 60.0))
+
+
+def same_bytes(folder, name):
+    """Whether the shell and Python wrote the same file."""
+    return (folder / "shell" / name).read_bytes() == (folder / "python" / name).read_bytes()
 
 
 def test_arrays_come_out_as_they_went_in(kettle):
@@ -68,9 +84,13 @@ def test_a_lens_and_a_pose_are_taken_into_account(kettle):
     bent = semfm.Observation(K, depth=kettle.depth, **lens)
     assert bent.depth[0, 0] == 0 and bent.depth[120, 160] == kettle.depth[120, 160]
     # A fisheye lens bends rays with coefficients of 0, too: off the middle it shows what lies farther out.
-    fisheye = semfm.Observation(K, color=kettle.color, distortion=[0] * 4, distortion_model="equidistant")
+    fisheye = semfm.Observation(
+        K, color=kettle.color, distortion=[0] * 4, distortion_model="equidistant"
+    )
     straight = semfm.Observation(K, color=kettle.color, distortion=[0] * 4)
-    assert np.array_equal(straight.color, kettle.color) and not np.array_equal(fisheye.color, kettle.color)
+    assert np.array_equal(straight.color, kettle.color) and not np.array_equal(
+        fisheye.color, kettle.color
+    )
     pose = np.eye(4)
     pose[:3, 3] = [0.1, 0.2, 0.3]
     posed = semfm.Observation(K, depth=kettle.depth, camera_from_world=pose, time_nanos=5)
@@ -81,7 +101,9 @@ def test_files_are_read_as_the_shell_reads_them(kettle, tmp_path):
     files = write_files(tmp_path, kettle)
     read = semfm.Observation.read(**files)
     assert read == kettle
-    named = semfm.Observation.read(**{**files, "mask": {"kettle": files["mask"]}}, hand_mask=files["mask"])
+    named = semfm.Observation.read(
+        **{**files, "mask": {"kettle": files["mask"]}}, hand_mask=files["mask"]
+    )
     assert list(named.masks) == ["kettle", "hand"]
     written = shell(
         "frames", "--color", files["color"], "--depth", files["depth"], "--intrinsics", files["intrinsics"],
@@ -89,21 +111,27 @@ def test_files_are_read_as_the_shell_reads_them(kettle, tmp_path):
     )  # fmt: skip
     assert written.returncode == 0, written.stderr
     assert semfm.write_observations(tmp_path / "python", [read]) == str(tmp_path / "python")
-    names = sorted(path.relative_to(tmp_path / "shell") for path in (tmp_path / "shell").rglob("*.*"))
-    assert names == sorted(p.relative_to(tmp_path / "python") for p in (tmp_path / "python").rglob("*.*"))
+    names = sorted(
+        path.relative_to(tmp_path / "shell") for path in (tmp_path / "shell").rglob("*.*")
+    )
+    assert names == sorted(
+        p.relative_to(tmp_path / "python") for p in (tmp_path / "python").rglob("*.*")
+    )
     for name in names:
-        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+        assert same_bytes(tmp_path, name), name
 
 
 def test_a_source_hands_out_one_frame_after_the_other(pair, tmp_path):
     frames = [
-        seen(turned(pair[1], [0.01 * i, 0, 0.6], 10.0 * i), time_nanos=10**9 + 10**8 * i) for i in range(5)
+        seen(turned(pair[1], [0.01 * i, 0, 0.6], 10.0 * i), time_nanos=10**9 + 10**8 * i)
+        for i in range(5)
     ]
     for name in ("seen.mcap", "scene"):
         semfm.write_observations(tmp_path / name, frames)
     bag = semfm.read_observations(tmp_path / "seen.mcap")
     first = next(bag)
-    assert np.array_equal(first.color, frames[0].color) and np.array_equal(first.depth, frames[0].depth)
+    assert np.array_equal(first.color, frames[0].color)
+    assert np.array_equal(first.depth, frames[0].depth)
     assert first.time_nanos == frames[0].time_nanos and first.masks == {}
     assert bag.notes == [] and len(list(bag)) == 4
     assert any("camera from" in note for note in bag.notes)
@@ -111,7 +139,8 @@ def test_a_source_hands_out_one_frame_after_the_other(pair, tmp_path):
     scene = list(semfm.read_observations(tmp_path / "scene", every=2, most=2))
     assert [each.time_nanos for each in scene] == [frames[0].time_nanos, frames[2].time_nanos]
     assert np.array_equal(scene[1].masks["obj0"], frames[2].masks["object"])
-    assert scene[1].objects[0]["mask"] == "obj0" and scene[1].objects[0]["camera_from_object"].shape == (4, 4)
+    known = scene[1].objects[0]
+    assert known["mask"] == "obj0" and known["camera_from_object"].shape == (4, 4)
     # An iterator that is left alone stops its reader.
     for _ in semfm.read_observations(tmp_path / "seen.mcap"):
         break
@@ -134,8 +163,11 @@ def test_a_surface_is_the_same_at_the_shell(kettle, tmp_path, views):
     embeddings = surface.embed(views=views)
     written = surface.write(tmp_path / "python", embeddings=embeddings)
     assert len(written) == 5
-    for name in ("surface.ply", "surface.emb.mcap", "surface.views.mcap", "around.ply", "surface.json"):
-        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    assert sorted(path.name for path in (tmp_path / "shell").iterdir()) == sorted(
+        Path(path).name for path in written
+    )
+    for name in (Path(path).name for path in written):
+        assert same_bytes(tmp_path, name), name
     assert surface.report["views"] is None and surface.report["object"] == "object"
     assert surface.mesh == semfm.Mesh.read(tmp_path / "shell/surface.ply")
     assert surface.colors.shape == (surface.mesh.n_vertices, 3) and surface.colors.dtype == np.uint8
@@ -159,7 +191,7 @@ def test_a_region_on_what_was_seen_is_the_same_at_the_shell(pair, kettle, tmp_pa
     )
     result.write(tmp_path / "python")
     for name in ("region.json", "point_map.json", "target.ply"):
-        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+        assert same_bytes(tmp_path, name), name
     # The other object is shown to the encoder that made these, at their rotations; the named one must be it.
     turned_views = surface.embed(views="both", rolls=2)
     both = semfm.transfer(mug.mesh, surface.mesh, mug.region, target_embeddings=turned_views)
@@ -170,7 +202,8 @@ def test_a_region_on_what_was_seen_is_the_same_at_the_shell(pair, kettle, tmp_pa
     named = semfm.transfer(
         mug.mesh, surface.mesh, mug.region, target_embeddings=turned_views, encoder="builtin"
     )
-    assert np.array_equal(both.weights, same.weights) and np.array_equal(both.weights, named.weights)
+    assert np.array_equal(both.weights, same.weights)
+    assert np.array_equal(both.weights, named.weights)
     # The other way round, the observed object is the demonstrated one.
     back = semfm.transfer(surface.mesh, mug.mesh, result.region, source_embeddings=embeddings)
     assert back.region.n_vertices == mug.mesh.n_vertices
@@ -227,14 +260,21 @@ def test_several_frames_become_one_surface(pair, tmp_path):
         pose[0, 3] = -x
         frames.append(seen(turned(pair[1], [-x, 0, 0.6]), camera_from_world=pose))
     semfm.write_observations(tmp_path / "scene", frames)
-    made = shell("surface", tmp_path / "scene", "--merge", "--no-embeddings", "-o", tmp_path / "shell")
+    made = shell(
+        "surface", tmp_path / "scene", "--merge", "--no-embeddings", "-o", tmp_path / "shell"
+    )
     assert made.returncode == 0, made.stderr
     merged = semfm.merged_surface(semfm.read_observations(tmp_path / "scene"))
     merged.write(tmp_path / "python")
     for name in ("surface.ply", "around.ply", "surface.json"):
-        assert (tmp_path / "shell" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+        assert same_bytes(tmp_path, name), name
     assert len(merged.observations) == 3 and repr(merged).endswith("of 3 frames)")
     assert abs(merged.mesh.bounds.mean(axis=0)[0]) < 0.02
+    # One frame of them is in the same frame, and stays there in a pickle.
+    one = semfm.merged_surface(frames[:1])
+    assert abs(one.mesh.bounds.mean(axis=0)[0]) < 0.06 and one.report["frame"] == "world"
+    again = pickle.loads(pickle.dumps(one))
+    assert np.array_equal(again.mesh.vertices, one.mesh.vertices)
     with pytest.raises(semfm.InvalidInput, match="pose in each frame"):
         semfm.merged_surface([seen(turned(pair[1], [0, 0, 0.6]))] * 2)
 
