@@ -6,7 +6,7 @@ use image::DynamicImage;
 use semfm_align::DepthImage;
 use semfm_geom::io::{FormatError, read_file};
 
-use crate::exr_picture::{ExrDepth, ExrPicture, is_exr};
+use crate::exr_picture::{ExrPicture, is_exr};
 use crate::numpy_array::{Numbers, NumpyArray};
 use crate::picture::picture_in;
 use crate::{Error, Result};
@@ -19,8 +19,8 @@ const MILLIMETRES: f64 = 1000.0;
 
 /// Reads a depth image: a grey PNG of 16 bits, an EXR, or a NumPy array (height, width) of whole numbers or floats.
 /// `per_metre` is the number of its units to the metre; without it whole numbers count millimetres and floats metres.
-/// Where nothing came back there is 0, in 16 bits also 65535, or a number that is not finite, in an EXR also one of 65504
-/// and more. Of an EXR with several channels the depth is the one with `depth` in its name, else `Z`, else R, G and B
+/// Where nothing came back there is 0, in whole numbers also 65535, or a number that is not finite, in an EXR also 65504 in
+/// floats of 16 bits, and 65504 m and more. Of an EXR with several channels the depth is the one with `depth` in its name, else `Z`, else R, G and B
 /// that are the same.
 ///
 /// # Errors
@@ -124,10 +124,9 @@ fn from_picture(path: &Path, per_metre: Option<f64>) -> Result<Read> {
 
 fn from_exr(path: &Path, bytes: &[u8], per_metre: Option<f64>) -> Result<Read> {
     let picture = ExrPicture::read(path, bytes)?;
-    let ExrDepth { values, is_whole } = picture.depth()?;
-    let scale = per_metre.unwrap_or(if is_whole { MILLIMETRES } else { 1.0 });
-    let metres = values.iter().map(|&value| (f64::from(value) / scale) as f32).collect();
-    Ok((picture.width, picture.height, metres))
+    let depth = picture.depth()?;
+    let scale = per_metre.unwrap_or(if depth.is_whole() { MILLIMETRES } else { 1.0 });
+    Ok((picture.width, picture.height, depth.metres(scale)))
 }
 
 fn from_array(path: &Path, per_metre: Option<f64>) -> Result<Read> {

@@ -8,11 +8,15 @@ use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
 use image::RgbImage;
 use semfm_geom::io::FormatError;
 
+use crate::depth_image::NO_RETURN;
+
 /// Bytes that the pixels of a file may unpack to.
 const MOST_PIXEL_BYTES: u128 = 1 << 28;
 
-/// From here on a float says that nothing came back: no number of 16 bits is greater, and Blender writes 1e10.
-const NO_RETURN: f32 = 65504.0;
+/// Depths from here on, metres, say that nothing came back: Blender writes 1e10.
+const FARTHEST: f64 = 65504.0;
+/// The greatest number of a float of 16 bits, in which what is farther away is written, whatever its unit.
+const GREATEST_F16: f32 = 65504.0;
 
 /// Whether bytes begin as an EXR file does.
 pub(crate) fn is_exr(bytes: &[u8]) -> bool {
@@ -35,11 +39,28 @@ struct Channel {
 }
 
 /// A channel of depth.
-pub(crate) struct ExrDepth {
-    /// Row-major (height × width), in the file's unit; 0 where nothing came back.
-    pub values: Vec<f32>,
+pub(crate) struct ExrDepth<'a>(&'a FlatSamples);
+
+impl ExrDepth<'_> {
     /// Whether the file counts in whole numbers.
-    pub is_whole: bool,
+    pub fn is_whole(&self) -> bool {
+        matches!(self.0, FlatSamples::U32(_))
+    }
+
+    /// Row-major (height × width), metres; 0 where nothing came back.
+    pub fn metres(&self, per_metre: f64) -> Vec<f32> {
+        let no_return = match self.0 {
+            FlatSamples::F16(_) => Some(GREATEST_F16),
+            FlatSamples::U32(_) => Some(f32::from(NO_RETURN)),
+            FlatSamples::F32(_) => None,
+        };
+        let metres = |value: f32| {
+            let metres = f64::from(value) / per_metre;
+            // Not so for what is no number.
+            if metres < FARTHEST && Some(value) != no_return { metres as f32 } else { 0.0 }
+        };
+        self.0.values_as_f32().map(metres).collect()
+    }
 }
 
 impl<'a> ExrPicture<'a> {
@@ -90,18 +111,14 @@ impl<'a> ExrPicture<'a> {
     ///
     /// # Errors
     /// A [`FormatError`] with the names of the channels where none or several are meant.
-    pub fn depth(&self) -> Result<ExrDepth, FormatError> {
+    pub fn depth(&self) -> Result<ExrDepth<'_>, FormatError> {
         let all: Vec<&Channel> = self.channels.iter().collect();
         let found = self.named_depth().unwrap_or_else(|| only(all.iter().copied()).or(grey(&all)));
         let Some(Channel { samples, .. }) = found else {
             let expected = "one channel of depth: a single one, or one of the name `Z` or `depth`";
             return Err(self.other_channels(expected));
         };
-        let depth = |z: f32| if z < NO_RETURN { z } else { 0.0 };
-        Ok(ExrDepth {
-            values: samples.values_as_f32().map(depth).collect(),
-            is_whole: matches!(samples, FlatSamples::U32(_)),
-        })
+        Ok(ExrDepth(samples))
     }
 
     /// The channel that is called depth; `None` within where several are, or only parts of vectors.
@@ -217,11 +234,15 @@ fn srgb(linear: f32) -> u8 {
 
 /// Writes an EXR of 32-bit floats with these channels, for tests.
 #[cfg(any(test, feature = "test-files"))]
-pub fn write_exr(path: &Path, [width, height]: [usize; 2], channels: &[(&str, Vec<f32>)]) {
+pub fn write_exr(path: &Path, size: [usize; 2], channels: &[(&str, Vec<f32>)]) {
+    let channels = channels.iter().map(|(name, values)| (*name, FlatSamples::F32(values.clone())));
+    write_samples(path, size, channels.collect());
+}
+
+#[cfg(any(test, feature = "test-files"))]
+fn write_samples(path: &Path, [width, height]: [usize; 2], channels: Vec<(&str, FlatSamples)>) {
     use exr::prelude::*;
-    let channels = channels
-        .iter()
-        .map(|(name, values)| AnyChannel::new(*name, FlatSamples::F32(values.clone())));
+    let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples));
     let channels = AnyChannels::sort(channels.collect());
     let layer =
         Layer::new((width, height), LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
@@ -257,6 +278,24 @@ mod tests {
         assert_eq!(read_depth_image(&at("passes.exr"), None).unwrap(), image);
         let color = read_picture(&at("passes.exr")).unwrap().into_rgb8();
         assert_eq!(color.get_pixel(2, 1).0, [srgb(0.1); 3]);
+    }
+
+    #[test]
+    fn what_is_no_return_is_told_by_the_kind_of_number() {
+        use exr::prelude::f16;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("z.exr");
+        let read = |samples: FlatSamples, per_metre: Option<f64>| {
+            write_samples(&path, [3, 1], vec![("Z", samples)]);
+            read_depth_image(&path, per_metre).unwrap().metres().to_vec()
+        };
+        // 70 m in millimetres is a depth, and 1e10 none whatever its unit.
+        let floats = FlatSamples::F32(vec![70_000.0, 500.0, 1e10]);
+        assert_eq!(read(floats, Some(1000.0)), [70.0, 0.5, 0.0]);
+        let whole = FlatSamples::U32(vec![65_504, 65_535, u32::MAX]);
+        assert_eq!(read(whole, None), [65.504, 0.0, 0.0]);
+        let half = [500.0, 65504.0, f32::INFINITY].map(f16::from_f32);
+        assert_eq!(read(FlatSamples::F16(half.to_vec()), Some(1000.0)), [0.5, 0.0, 0.0]);
     }
 
     #[test]
