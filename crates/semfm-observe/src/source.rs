@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::bag::{BagSettings, read_bag, write_bag};
+use crate::bag::{BagSettings, Choice, read_chosen, write_bag};
 use crate::bop::{BopScene, write_bop};
 use crate::observation::Observation;
 use crate::{Error, Result};
@@ -33,12 +33,13 @@ pub struct SourceReport {
     pub notes: Vec<String>,
 }
 
-/// Hands each observation of a BOP scene (a folder with `scene_camera.json`) or of a bag (`.mcap`, or a folder of them) to
-/// `visit`, in order.
+/// Hands each wanted observation of a BOP scene (a folder with `scene_camera.json`) or of a bag (`.mcap`, or a folder of
+/// them) to `visit`, in order. Pictures of the others are not decoded, and behind the last wanted one no picture is read. A
+/// bag is gone through once before, for the times of all of it.
 ///
 /// # Errors
-/// As [`BopScene`] and [`read_bag`]; [`Error::Invalid`] for an `every` of 0, and for settings of a bag beside a BOP scene;
-/// the errors of `visit`.
+/// As [`BopScene`] and [`read_bag`](crate::read_bag); [`Error::Invalid`] for an `every` of 0, and for settings of a bag
+/// beside a BOP scene; the errors of `visit`.
 pub fn read_observations(
     path: &Path,
     settings: &SourceSettings,
@@ -48,29 +49,21 @@ pub fn read_observations(
         return Err(Error::invalid("every", "at least 1", 0));
     }
     let most = settings.most.unwrap_or(usize::MAX);
-    let mut n_observations = 0;
     if BopScene::is_scene(path) {
         if let Some(setting) = settings.bag.given() {
             let found = format!("the BOP scene {}", path.display());
             return Err(Error::invalid(setting, "a bag", found));
         }
         let scene = BopScene::open(path)?;
+        let mut n_observations = 0;
         for image in scene.images().step_by(settings.every).take(most) {
             visit(scene.observation(image)?)?;
             n_observations += 1;
         }
         return Ok(SourceReport { n_observations, notes: Vec::new() });
     }
-    let mut seen = 0;
-    let report = read_bag(path, &settings.bag, |observation| {
-        let is_wanted = seen % settings.every == 0 && n_observations < most;
-        seen += 1;
-        if is_wanted {
-            n_observations += 1;
-            visit(observation)?;
-        }
-        Ok(())
-    })?;
+    let choice = Choice { every: settings.every, most };
+    let report = read_chosen(path, &settings.bag, choice, visit)?;
     let topic =
         |kind: &str, name: &Option<String>| name.as_ref().map(|name| format!("{kind} from {name}"));
     let mut notes: Vec<String> = [topic("colour", &report.color), topic("depth", &report.depth)]
@@ -84,7 +77,7 @@ pub fn read_observations(
             report.n_unpaired
         ));
     }
-    Ok(SourceReport { n_observations, notes })
+    Ok(SourceReport { n_observations: report.n_observations, notes })
 }
 
 /// Writes observations as a bag, where the name ends with `.mcap`, else as the folder of a BOP scene.

@@ -12,4 +12,5 @@ mod transforms;
 mod write;
 
 pub use read::{BagReport, BagSettings, read_bag};
+pub(crate) use read::{Choice, read_chosen};
 pub use write::write_bag;

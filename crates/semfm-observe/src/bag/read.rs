@@ -2,6 +2,7 @@
 //! memory than wait for their counterpart.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use semfm_align::DepthImage;
@@ -99,6 +100,28 @@ pub struct BagReport {
 pub fn read_bag(
     path: &Path,
     settings: &BagSettings,
+    visit: impl FnMut(Observation) -> Result<()>,
+) -> Result<BagReport> {
+    read_chosen(path, settings, Choice { every: 1, most: usize::MAX }, visit)
+}
+
+/// Which observations of a bag are made.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choice {
+    /// The first, and each that is so many further on; at least 1.
+    pub every: usize,
+    /// At most so many.
+    pub most: usize,
+}
+
+/// The same of some observations: of the others no picture is decoded, and behind the last the bag is not read on.
+///
+/// # Errors
+/// As [`read_bag`], of the observations that are made.
+pub(crate) fn read_chosen(
+    path: &Path,
+    settings: &BagSettings,
+    Choice { every, most }: Choice,
     mut visit: impl FnMut(Observation) -> Result<()>,
 ) -> Result<BagReport> {
     let files = files_of(path)?;
@@ -113,25 +136,31 @@ pub fn read_bag(
     let info = survey.camera(path, &chosen.camera_info)?;
     let pairs = Pairs::new(path, &survey, &chosen, settings.max_gap_nanos)?;
     let maker = Maker { chosen: &chosen, info, transforms: &survey.transforms, settings };
-    let mut waiting = Waiting::default();
+    let mut waiting = Waiting { every, parts: BTreeMap::new(), next: 0 };
     let mut n_observations = 0;
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for file in &files {
+        if n_observations >= most {
+            break;
+        }
         each_message(file, |message| {
             let topic = &message.channel.topic;
             let index = counts.entry(topic.clone()).or_default();
             let Some(place) = pairs.place(topic, *index) else {
                 *index += 1;
-                return Ok(());
+                return Ok(ControlFlow::Continue(()));
             };
             *index += 1;
-            waiting.put(place, message.data.to_vec());
+            waiting.put(place, message.data);
             while let Some(parts) = waiting.next(&pairs) {
                 let seen = maker.observation(parts, message.log_time);
                 visit(seen.map_err(|fault| in_message(file, message, fault))?)?;
                 n_observations += 1;
+                if n_observations == most {
+                    return Ok(ControlFlow::Break(()));
+                }
             }
-            Ok(())
+            Ok(ControlFlow::Continue(()))
         })?;
     }
     Ok(BagReport {
@@ -177,18 +206,26 @@ fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Reads a file whose visitor fails in our way.
-fn each_message(file: &Path, mut visit: impl FnMut(&Message<'_>) -> Result<()>) -> Result<()> {
-    let mut failure = None;
-    let read = read_messages(file, |message| {
-        visit(&message).map_err(|error| {
-            failure = Some(error);
-            semfm_geom::Error::Cancelled.into()
-        })
+/// Reads a file whose visitor fails in our way, up to where it has enough.
+fn each_message(
+    file: &Path,
+    mut visit: impl FnMut(&Message<'_>) -> Result<ControlFlow<()>>,
+) -> Result<()> {
+    let mut end = None;
+    let read = read_messages(file, |message| match visit(&message) {
+        Ok(ControlFlow::Continue(())) => Ok(()),
+        Ok(ControlFlow::Break(())) => {
+            end = Some(Ok(()));
+            Err(semfm_geom::Error::Cancelled.into())
+        }
+        Err(error) => {
+            end = Some(Err(error));
+            Err(semfm_geom::Error::Cancelled.into())
+        }
     });
-    match (failure, read) {
-        (Some(error), _) => Err(error),
-        (None, read) => Ok(read.map(drop)?),
+    match end {
+        Some(end) => end,
+        None => Ok(read.map(drop)?),
     }
 }
 
@@ -215,7 +252,8 @@ impl Survey {
         let mut survey = Self::default();
         for file in files {
             each_message(file, |message| {
-                survey.message(message).map_err(|fault| in_message(file, message, fault))
+                let read = survey.message(message).map(ControlFlow::Continue);
+                read.map_err(|fault| in_message(file, message, fault))
             })?;
         }
         Ok(survey)
@@ -389,15 +427,20 @@ struct Parts {
     depth: Option<Vec<u8>>,
 }
 
-/// Messages that wait for their counterpart, or for an earlier observation.
-#[derive(Default)]
+/// Messages that wait for their counterpart, or for an earlier observation; of those observations alone that are wanted.
 struct Waiting {
+    /// From one wanted observation to the next.
+    every: usize,
     parts: BTreeMap<usize, Parts>,
     next: usize,
 }
 
 impl Waiting {
-    fn put(&mut self, place: Place, message: Vec<u8>) {
+    fn put(&mut self, place: Place, message: &[u8]) {
+        if !place.observation.is_multiple_of(self.every) {
+            return;
+        }
+        let message = message.to_vec();
         let parts = self.parts.entry(place.observation).or_default();
         match place.part {
             Part::Color => parts.color = Some(message),
@@ -405,16 +448,17 @@ impl Waiting {
         }
     }
 
-    /// The next observation, once it is complete.
+    /// The next wanted observation, once it is complete.
     fn next(&mut self, pairs: &Pairs) -> Option<Parts> {
-        let parts = self.parts.get(&self.next)?;
+        let at = self.next;
+        let parts = self.parts.get(&at)?;
         let is_there =
             |topic: &Option<String>, part: &Option<Vec<u8>>| topic.is_none() || part.is_some();
         if !(is_there(&pairs.color, &parts.color) && is_there(&pairs.depth, &parts.depth)) {
             return None;
         }
-        self.next += 1;
-        self.parts.remove(&(self.next - 1))
+        self.next += self.every;
+        self.parts.remove(&at)
     }
 }
 

@@ -158,6 +158,7 @@ fn transform(seen: &Observation, time: u64) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::bag::{BagSettings, read_bag};
+    use crate::source::{SourceSettings, read_observations};
     use semfm_align::DepthImage;
     use semfm_geom::math::{DAffine3, DMat3, DVec3};
     use semfm_geom::{Intrinsics, Pinhole};
@@ -228,6 +229,43 @@ mod tests {
         std::fs::write(&path, &bytes[..bytes.len() - 40]).unwrap();
         assert!(words(BagSettings::default()).contains("seen.mcap"));
         assert!(write_bag(&path, &[]).is_err() && write_bag(&path, &[seen(1), seen(0)]).is_err());
+    }
+
+    #[test]
+    fn pictures_that_nobody_wants_are_not_decoded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("seen.mcap");
+        // Every second picture has an encoding that is not read.
+        write_mcap(&path, "ros2", ChunkCompression::Lz4, |file| {
+            let mut channels = Channels::default();
+            for i in 0..4 {
+                let (seen, encoding) = (seen(i), if i % 2 == 0 { "rgb8" } else { "bayer_rggb8" });
+                let time = seen.time_nanos.unwrap();
+                let info = camera_info(&seen, time);
+                channels.log(file, COLOR_INFO, Ros2Message::CameraInfo, time, info)?;
+                let message = image(&seen, time, encoding, 3, seen.color().unwrap().as_flattened());
+                channels.log(file, COLOR, Ros2Message::Image, time, message)?;
+            }
+            Ok(())
+        })
+        .unwrap();
+        let read = |every: usize, most: Option<usize>| {
+            let settings = SourceSettings { every, most, ..Default::default() };
+            let mut times = Vec::new();
+            let report = read_observations(&path, &settings, |seen| {
+                times.push((seen.time_nanos.unwrap() - 5_000_000_000) / 40_000_000);
+                Ok(())
+            })?;
+            assert_eq!(report.n_observations, times.len());
+            Ok(times)
+        };
+        let times = |every: usize, most: Option<usize>| read(every, most).unwrap();
+        assert_eq!(times(2, None), [0, 2]);
+        assert_eq!(times(1, Some(1)), [0]);
+        assert_eq!(times(1, Some(0)), [0; 0]);
+        assert_eq!(times(2, Some(1)), [0]);
+        let all: Result<Vec<u64>> = read(1, None);
+        assert!(all.unwrap_err().to_string().contains("bayer_rggb8"));
     }
 
     #[test]
