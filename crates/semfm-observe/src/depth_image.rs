@@ -20,8 +20,9 @@ const MILLIMETRES: f64 = 1000.0;
 /// Reads a depth image: a grey PNG of 16 bits, an EXR, or a NumPy array (height, width) of whole numbers or floats.
 /// `per_metre` is the number of its units to the metre; without it whole numbers count millimetres and floats metres.
 /// Where nothing came back there is 0, in whole numbers also 65535, or a number that is not finite, in an EXR also 65504 in
-/// floats of 16 bits, and 65504 m and more. Of an EXR with several channels the depth is the one with `depth` in its name, else `Z`, else R, G and B
-/// that are the same.
+/// floats of 16 bits, and 65504 m and more. Of an EXR with several channels the depth is the one of whose dotted name a part
+/// is `depth` (in any case), else `Z`, else the only `*.Z` without an X or a Y beside it, else R, G and B of the only layer with
+/// colours that are the same.
 ///
 /// # Errors
 /// [`Error::Format`] for a picture of another kind (depth in 8 bits, or in a JPEG, was thrown away when it was
@@ -52,8 +53,7 @@ pub(crate) fn read_depth_of_frame(path: &Path, per_metre: Option<f64>) -> Result
 /// A depth image of an array's numbers (height × width), understood as [`read_depth_image`] does.
 ///
 /// # Errors
-/// [`Error::Invalid`] for truth values and for a scale that is not positive; [`Error::Align`] for another number of pixels
-/// and where no pixel has a depth.
+/// [`Error::Invalid`] for truth values and for a scale that is not positive; [`Error::Align`] for another number of pixels.
 pub fn depth_of_numbers(
     width: usize,
     height: usize,

@@ -17,7 +17,7 @@ const MOST_PIXEL_BYTES: u64 = 1 << 30;
 ///
 /// # Errors
 /// [`semfm_geom::Error::Io`]; [`Error::Format`](crate::Error::Format) where it is none, or where it unpacks to more
-/// than a gigabyte.
+/// than a gigabyte, an EXR to more than 256 MB.
 pub(crate) fn read_picture(path: &Path) -> Result<DynamicImage> {
     picture_in(path, &read_file(path)?)
 }
