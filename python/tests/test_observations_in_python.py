@@ -275,6 +275,8 @@ def test_several_frames_become_one_surface(pair, tmp_path):
     assert abs(one.mesh.bounds.mean(axis=0)[0]) < 0.06 and one.report["frame"] == "world"
     again = pickle.loads(pickle.dumps(one))
     assert np.array_equal(again.mesh.vertices, one.mesh.vertices)
+    with pytest.raises(semfm.InvalidInput, match="the BOP scene"):
+        list(semfm.read_observations(tmp_path / "scene", fixed_frame="map"))
     with pytest.raises(semfm.InvalidInput, match="pose in each frame"):
         semfm.merged_surface([seen(turned(pair[1], [0, 0, 0.6]))] * 2)
 
