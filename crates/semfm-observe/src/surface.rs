@@ -39,10 +39,8 @@ impl SurfaceSettings {
     /// # Errors
     /// [`Error::Invalid`], naming the setting.
     pub fn check(&self) -> Result<()> {
-        let pixels = [
-            ("smooth", self.smooth_pixels, MOST_SMOOTH),
-            ("trim", self.trim_pixels, MOST_TRIM),
-        ];
+        let pixels =
+            [("smooth", self.smooth_pixels, MOST_SMOOTH), ("trim", self.trim_pixels, MOST_TRIM)];
         for (name, found, most) in pixels {
             if found > most {
                 return Err(Error::invalid(name, format!("0 to {most} pixels"), found));
