@@ -110,6 +110,8 @@ pub use pipeline::{
 pub use planned_motion::PlannedMotion;
 pub use pose_dependence::shares_of_poses;
 #[cfg(feature = "mcap")]
-pub use prepared_pair::{NamedMesh, PairFeatures, PairFiles, PreparedPair, prepare_pair};
+pub use prepared_pair::{
+    NamedMesh, PairFeatures, PairFiles, PreparedPair, embeddings_of_both, prepare_pair,
+};
 pub use robot_arm::RobotArm;
 pub use scene_contents::SceneContents;

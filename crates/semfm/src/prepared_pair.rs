@@ -103,7 +103,11 @@ pub fn prepare_pair(
 }
 
 /// Embeddings of both objects, averaged over as many rotations; those that were given the wrong way round are named as such.
-fn embeddings_of_both(
+///
+/// # Errors
+/// Those of [`read_embeddings`]; [`Error::Invalid`] for files that were given the wrong way round, and for files that average
+/// over different numbers of rotations: their features are not comparable.
+pub fn embeddings_of_both(
     files: &PairFiles,
     source: &MeshFile,
     target: &MeshFile,

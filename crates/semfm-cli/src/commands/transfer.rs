@@ -13,9 +13,9 @@ use semfm::geom::ShapeCache;
 use semfm::geom::io::{MeshFile, read_mesh};
 use semfm::memory::MemorySettings;
 use semfm::object_encoder::EncodedPair;
-use semfm::views::{self, mcap::EmbeddingsFile};
 use semfm::{
-    FeatureSource, Mesh, Method, PipelineSettings, Prepared, Rule, Task, prepare, transfer,
+    FeatureSource, Mesh, Method, PairFiles, PipelineSettings, Prepared, Rule, Task,
+    embeddings_of_both, prepare, transfer,
 };
 use semfm_show::{PLAN_FILES, TRANSFER_FILES, TransferFiles};
 
@@ -343,25 +343,6 @@ impl TransferCommand {
         error.into()
     }
 
-    /// Embeddings of both objects.
-    fn read_both(&self, a: &Path, b: &Path, files: &Pair<MeshFile>) -> Result<[EmbeddingsFile; 2]> {
-        let read = read_embeddings(a, &files.source.mesh)
-            .and_then(|a| Ok([a, read_embeddings(b, &files.target.mesh)?]));
-        if let Err(semfm::Error::Views(views::Error::OtherMesh { .. })) = &read {
-            let swapped = read_embeddings(a, &files.target.mesh).is_ok()
-                && read_embeddings(b, &files.source.mesh).is_ok();
-            if swapped {
-                bail!(
-                    "the embeddings are swapped: {} is of the target and {} of the source; \
-                     exchange --source-embeddings and --target-embeddings",
-                    a.display(),
-                    b.display()
-                );
-            }
-        }
-        Ok(read?)
-    }
-
     /// Both objects, with features from wherever the caller said.
     fn prepare(
         &self,
@@ -379,7 +360,8 @@ impl TransferCommand {
             return self.prepare_both(files, features, settings, task);
         }
         if let (Some(a), Some(b)) = (&options.source_embeddings, &options.target_embeddings) {
-            let [a, b] = self.read_both(a, b, &files)?;
+            let paths = PairFiles { source: a.clone(), target: b.clone() };
+            let [a, b] = embeddings_of_both(&paths, &files.source, &files.target)?;
             let features =
                 Pair { source: FeatureSource::from(&a), target: FeatureSource::from(&b) };
             return self.prepare_both(files, features, settings, task);
