@@ -77,7 +77,7 @@ impl Frame {
         Observation::new(self.camera)
             .posed(self.camera_from_object)
             .and_then(|seen| seen.with_color(pixels.to_vec()))
-            .and_then(|seen| Ok(seen.with_depth(DepthImage::new(640, 480, depth)?)?))
+            .and_then(|seen| seen.with_depth(DepthImage::new(640, 480, depth)?))
             .and_then(|seen| seen.with_mask("object", is_object))
             .expect("an observation")
     }
