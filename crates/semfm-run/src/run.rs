@@ -159,6 +159,7 @@ impl Run {
                 break;
             }
         }
+        task.check()?;
         // What later stages wrote in an earlier run answers another question.
         for stage in Stage::ALL {
             if !records.iter().any(|record| record.stage == stage.name()) {
@@ -215,6 +216,8 @@ impl Run {
             no_answer,
         };
         file.write(staged.path())?;
+        // Whoever stopped the run may have begun another one.
+        task.check()?;
         self.clear(&folder)?;
         staged.put(&[STAGE_FILE], &[])?;
         Ok(file)
@@ -347,5 +350,31 @@ fn remove(path: &Path) -> Result<()> {
             Err(Error::from(io(path)(error)))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_is_told_to_stop_replaces_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+        fs::write(at("mug.obj"), mesh).unwrap();
+        let recipe = "[demonstration]\nmesh = 'mug.obj'\nnear = [0, 0, 0]\nradius = 0.5\n\
+                      [target]\nmesh = 'mug.obj'\n";
+        fs::write(at("demo.toml"), recipe).unwrap();
+        let run = Run::open(&at("demo.toml"), &at("out")).unwrap();
+        let earlier = at("out/region/region.json");
+        fs::create_dir_all(earlier.parent().unwrap()).unwrap();
+        fs::write(&earlier, "of an earlier run").unwrap();
+        let task = Task::default();
+        let mut stop = |_: RunProgress<'_>| task.cancel();
+        let error = run.carry_out(&RunSettings::default(), &mut stop, &task).unwrap_err();
+        assert_eq!(error.code(), "cancelled", "{error}");
+        assert_eq!(fs::read_to_string(&earlier).unwrap(), "of an earlier run");
+        assert_eq!(fs::read_dir(at("out/region")).unwrap().count(), 1);
     }
 }
