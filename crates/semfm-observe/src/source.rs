@@ -1,5 +1,6 @@
 //! Observations out of whatever holds several: a BOP scene or a bag.
 
+use std::borrow::Borrow;
 use std::path::Path;
 
 use crate::bag::{BagSettings, Choice, read_chosen, write_bag};
@@ -84,7 +85,7 @@ pub fn read_observations(
 ///
 /// # Errors
 /// As [`write_bag`] and [`write_bop`].
-pub fn write_observations(path: &Path, observations: &[Observation]) -> Result<()> {
+pub fn write_observations<O: Borrow<Observation>>(path: &Path, observations: &[O]) -> Result<()> {
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     if is_bag { write_bag(path, observations) } else { write_bop(path, observations).map(drop) }
 }

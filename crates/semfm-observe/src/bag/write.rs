@@ -1,5 +1,6 @@
 //! Writing a bag: what [`read_bag`](super::read_bag) reads, and every ROS 2 installation.
 
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -31,7 +32,8 @@ const STEP_NANOS: u64 = 33_333_333;
 /// # Errors
 /// [`Error::Invalid`] for no observation, one without colour and depth, and times that do not ascend;
 /// [`Error::Views`] where the file cannot be written.
-pub fn write_bag(path: &Path, observations: &[Observation]) -> Result<()> {
+pub fn write_bag<O: Borrow<Observation>>(path: &Path, observations: &[O]) -> Result<()> {
+    let observations: Vec<&Observation> = observations.iter().map(Borrow::borrow).collect();
     if observations.is_empty() {
         return Err(Error::invalid("observations", "at least one", "none"));
     }
@@ -44,7 +46,7 @@ pub fn write_bag(path: &Path, observations: &[Observation]) -> Result<()> {
         let what = format!("time of observation {}", at + 1);
         return Err(Error::invalid(what, format!("more than {} ns", times[at]), times[at + 1]));
     }
-    let is_empty = |seen: &Observation| seen.color().is_none() && seen.depth().is_none();
+    let is_empty = |seen: &&Observation| seen.color().is_none() && seen.depth().is_none();
     if let Some(at) = observations.iter().position(is_empty) {
         return Err(Error::invalid(format!("observation {at}"), "colour or depth", "neither"));
     }
@@ -228,7 +230,10 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 40]).unwrap();
         assert!(words(BagSettings::default()).contains("seen.mcap"));
-        assert!(write_bag(&path, &[]).is_err() && write_bag(&path, &[seen(1), seen(0)]).is_err());
+        assert!(
+            write_bag::<Observation>(&path, &[]).is_err()
+                && write_bag(&path, &[seen(1), seen(0)]).is_err()
+        );
     }
 
     #[test]

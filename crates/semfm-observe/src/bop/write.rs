@@ -1,5 +1,6 @@
 //! Writing a scene.
 
+use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
 use image::{GrayImage, ImageBuffer, Luma, RgbImage};
@@ -22,7 +23,10 @@ const COARSE_REACHES: f32 = 65.5;
 /// # Errors
 /// [`Error::Invalid`] for no observation, for one with a cloud alone and for depths beyond 65 m; [`Error::Geom`] where the
 /// folder cannot be written, holds something already, or is one of the files that were read.
-pub fn write_bop(folder: &Path, observations: &[Observation]) -> Result<Vec<PathBuf>> {
+pub fn write_bop<O: Borrow<Observation>>(
+    folder: &Path,
+    observations: &[O],
+) -> Result<Vec<PathBuf>> {
     if observations.is_empty() {
         return Err(Error::invalid("observations", "at least one", "none"));
     }
@@ -32,7 +36,7 @@ pub fn write_bop(folder: &Path, observations: &[Observation]) -> Result<Vec<Path
     }
     let staged = StagedFolder::new(folder)?;
     let (mut cameras, mut objects) = (SceneCameras::new(), SceneObjects::new());
-    for (image, seen) in observations.iter().enumerate() {
+    for (image, seen) in observations.iter().map(Borrow::borrow).enumerate() {
         if seen.color().is_none() && seen.depth().is_none() {
             let what = format!("observation {image}");
             return Err(Error::invalid(what, "colour or depth: BOP has no clouds", "neither"));

@@ -83,7 +83,7 @@ impl Hand {
             })
         };
         let points = surface.iter().flat_map(behind).collect();
-        Ok(Self { is_one_sided: true, ..Self::new(points, Vec::new())? })
+        Ok(Self::new(points, Vec::new())?.one_sided())
     }
 
     /// With the part that each point belongs to.
@@ -96,6 +96,11 @@ impl Hand {
             return Err(Error::invalid("hand", expected, parts.len()));
         }
         Ok(Self { parts: Some(parts), ..self })
+    }
+
+    /// The same points as one side of a hand, whose other side is unknown, as [`Hand::from_mask`] makes them.
+    pub fn one_sided(self) -> Self {
+        Self { is_one_sided: true, ..self }
     }
 
     /// With parts by the 21 joints that pose estimators give: the wrist, then four of each finger from the thumb to the
@@ -159,6 +164,11 @@ impl Hand {
     /// The faces; none for points alone.
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.faces
+    }
+
+    /// Whether the points are one side of a hand with the other side unknown.
+    pub fn is_one_sided(&self) -> bool {
+        self.is_one_sided
     }
 
     /// What each point belongs to, where that is known.
