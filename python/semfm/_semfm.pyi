@@ -23,6 +23,7 @@ class _WithTriangles(Protocol):
 
 _Path = Union[str, os.PathLike[str]]
 _MeshLike = Union["Mesh", _Path, _WithFaces, _WithTriangles]
+_PoseLike = Union[ArrayLike, "Alignment", _Path]
 _Progress = Union[bool, Callable[[str, int, int], object]]
 _Cache = Union[bool, _Path]
 
@@ -854,6 +855,7 @@ class Grasps:
 
     A sequence of `Grasp`.
     """
+    def __getitem__(self, index: int) -> Grasp: ...
     def __len__(self) -> int: ...
     @property
     def advice(self) -> Optional[str]:
@@ -1663,8 +1665,9 @@ class Observation:
         Which pixels show what, of dtype bool, by name; those of a list are called 0, 1 and so on.
     distortion : (c,) array_like, optional
         Coefficients of the lens in OpenCV's order; the pictures come out without distortion.
-    distortion_model : str, default "plumb_bob"
-        ``"plumb_bob"`` or ``"rational_polynomial"`` (4, 5 or 8 coefficients), or ``"equidistant"`` (4, a fisheye).
+    distortion_model : str, optional
+        ``"plumb_bob"`` or ``"rational_polynomial"`` (4, 5 or 8 coefficients), or ``"equidistant"`` (4, a fisheye);
+        ``"plumb_bob"`` where none is given.
     camera_from_world : (4, 4) array_like, optional
         Where the camera stood; that of a `Pinhole`, else its own frame is the world, where none is given.
     time_nanos : int, optional
@@ -1673,7 +1676,8 @@ class Observation:
     Raises
     ------
     InvalidInput
-        Pictures of different sizes, a mask that marks nothing, no depth at all in a depth image.
+        Pictures of different sizes, a mask that marks nothing or everything, an argument that nothing would read
+        (`depth_scale` without `depth`). A depth image in which nothing came back is none of it.
 
     Examples
     --------
@@ -1690,7 +1694,7 @@ class Observation:
     >>> seen.surface().mesh
     Mesh(308 vertices, 546 triangles)
     """
-    def __init__(self, intrinsics: Union[Pinhole, ArrayLike], *, color: Optional[ArrayLike] = None, depth: Optional[ArrayLike] = None, depth_scale: Optional[float] = None, cloud: Optional[ArrayLike] = None, masks: Optional[Union[Mapping[str, Any], Iterable[ArrayLike]]] = None, distortion: Optional[ArrayLike] = None, distortion_model: str = 'plumb_bob', camera_from_world: Optional[ArrayLike] = None, time_nanos: Optional[int] = None) -> None: ...
+    def __init__(self, intrinsics: Union[Pinhole, ArrayLike], *, color: Optional[ArrayLike] = None, depth: Optional[ArrayLike] = None, depth_scale: Optional[float] = None, cloud: Optional[ArrayLike] = None, masks: Optional[Union[Mapping[str, Any], Iterable[ArrayLike]]] = None, distortion: Optional[ArrayLike] = None, distortion_model: Optional[str] = None, camera_from_world: Optional[ArrayLike] = None, time_nanos: Optional[int] = None) -> None: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def camera(self) -> Pinhole:
@@ -1748,9 +1752,9 @@ class Observation:
         intrinsics : path
             The camera (JSON); a lens that distorts is taken out of the pictures.
         color : path, optional
-            A PNG or JPEG.
+            A PNG, JPEG or EXR.
         depth : path, optional
-            A 16-bit PNG or .npy, registered to the colour.
+            A 16-bit PNG, an EXR or .npy, registered to the colour.
         depth_scale : float, optional
             Units of the depth to the metre; 1000 for whole numbers and 1 for floats where none is given.
         mask : path or list of path or dict, optional
@@ -1808,8 +1812,12 @@ class Observation:
 class Observations:
     """The frames of a BOP scene or of a bag, in order: an iterator of `Observation`, made by `read_observations`.
 
-    Files are read as frames are asked for, with one frame read ahead; a bag of any length needs the memory of some frames.
+    Reading begins at once, in a thread of its own, and stays up to two frames ahead of what was asked for; a source of any
+    length needs the memory of some frames. What nobody iterates any more is not read on. A process that was forked off has
+    no such thread: it raises `InvalidInput`.
     """
+    def __iter__(self) -> Observations: ...
+    def __next__(self) -> Observation: ...
     @property
     def notes(self) -> list[str]:
         """list of str: what was chosen or left out (topics, messages without a counterpart), known at the end."""
@@ -1871,6 +1879,10 @@ class ObservedObject:
     @property
     def mesh(self) -> Mesh:
         """Mesh: the surface, metres, in its camera's own frame; in that of the cameras' poses where it was merged."""
+        ...
+    @property
+    def notes(self) -> list[str]:
+        """list of str: which frames `merged_surface` left out, and why, as ``semfm-cli surface --merge`` prints it."""
         ...
     @property
     def observations(self) -> list[Observation]:
@@ -3349,7 +3361,6 @@ class Tracker:
     hypotheses : int, default 96
         Poses that are tried in a frame in which the object is not where it was.
     seed : int, default 0
-    progress : progress, optional
 
     Examples
     --------
@@ -3366,7 +3377,7 @@ class Tracker:
     >>> pose.state, bool(abs(pose.camera_from_object[0, 3] - 0.03) < 0.003)
     ('tracking', True)
     """
-    def __init__(self, mesh: _MeshLike, *, init: Optional[Union[ArrayLike, Alignment, _Path]] = None, scale: Optional[float] = None, region: Optional[Union[Region, _Path]] = None, hypotheses: int = 96, seed: int = 0, progress: Optional[_Progress] = None) -> None: ...
+    def __init__(self, mesh: _MeshLike, *, init: Optional[Union[ArrayLike, Alignment, _Path]] = None, scale: Optional[float] = None, region: Optional[Union[Region, _Path]] = None, hypotheses: int = 96, seed: int = 0) -> None: ...
     @property
     def mesh(self) -> Mesh:
         """Mesh: the object."""
@@ -3377,10 +3388,11 @@ class Tracker:
         where the mesh has it; None without a region.
         """
         ...
-    def update(self, observation: Observation, *, mask: Optional[Union[str, ArrayLike]] = None, progress: Optional[_Progress] = None) -> TrackedPose:
+    def update(self, observation: Observation, *, mask: Optional[Union[str, ArrayLike]] = None) -> TrackedPose:
         """The object in the next frame.
 
-        Where the call is interrupted, the frame counts as one that was seen.
+        Where the call is interrupted, the frame counts as one that was seen. Calls of several threads wait for each other;
+        one from within another, by a signal's handler, raises `InvalidInput`.
 
         Parameters
         ----------
@@ -3389,7 +3401,6 @@ class Tracker:
         mask : str or (height, width) array_like, optional
             The object's mask, which helps to find it: a name, an array of dtype bool, or the only one that there is where
             none is given. That a frame has no mask of the name says that the object is not visible in it.
-        progress : progress, optional
 
         Returns
         -------
@@ -3822,7 +3833,7 @@ def farthest_points(points: ArrayLike, n: int) -> NDArray[numpy.uint32]:
     """
     ...
 
-def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_from_object: Optional[Union[ArrayLike, Alignment, _Path, Iterable[Alignment]]] = None) -> TouchedRegion:
+def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_from_object: Optional[Union[_PoseLike, Iterable[_PoseLike]]] = None) -> TouchedRegion:
     """Finds where a hand touches a mesh: ``semfm-cli region --hand``.
 
     The hand is moved by what makes it rest on the surface, within what it may be off; weights are averaged over the places
@@ -3833,10 +3844,10 @@ def find_contact(mesh: _MeshLike, hands: Union[Hand, Iterable[Hand]], *, camera_
     mesh : mesh_like
     hands : Hand or list of Hand
         Several are frames of one grasp.
-    camera_from_object : (4, 4) array_like or Alignment or path or list of Alignment, optional
-        How the mesh stands before the camera, scale included (`Alignment.camera_from_object`): the hands are then in the
-        camera's frame. One for all frames, or a list with one for each. Without it mesh and hands are in one frame, in
-        metres.
+    camera_from_object : pose_like or list of pose_like, optional
+        How the mesh stands before the camera, scale included: a (4, 4) matrix, an `Alignment` or the path of its file. The
+        hands are then in the camera's frame. One for all frames, or a list with one for each. Without it mesh and hands
+        are in one frame, in metres.
 
     Returns
     -------
@@ -4048,7 +4059,7 @@ def merged_surface(observations: Iterable[Observation], *, mask: Optional[str] =
         Their cameras' poses are known (`Observation.camera`), and the object stands still in them.
     mask : str, optional
         Name of the object's mask; the only one of each frame where none is given. Frames that have none, or no depth under
-        it, are left out.
+        it, are left out: `ObservedObject.notes` says which.
     smooth_pixels : int, default 3
         Radius of the window in which depth is smoothed, 0 to 20.
     trim_pixels : int, default 1
@@ -4257,11 +4268,17 @@ def read_hand(path: _Path, *, vertices: Optional[Union[ArrayLike, _Path]] = None
     mask : str or (height, width) array_like, optional
         The hand's mask in it: a name, an array of dtype bool, or the only one that there is where none is given.
     focal : float, optional
-        Focal length in pixels that the hand was made with, where it is not the camera's.
+        Focal length in pixels that the hand was made with, where it is not the camera's; the observation then has a depth
+        image.
 
     Returns
     -------
     Hand
+
+    Raises
+    ------
+    InvalidInput
+        `mask` without an observation, `focal` without one that has a depth image: nothing would read them.
     """
     ...
 
@@ -4306,7 +4323,8 @@ def read_observations(source: _Path, *, every: int = 1, most: Optional[int] = No
     Returns
     -------
     Observations
-        Each frame is read when it is asked for; what is wrong with the source is raised by then.
+        Reading begins at once and stays up to two frames ahead; what is wrong with the source is raised when the frame
+        is asked for that could not be read.
 
     Examples
     --------
@@ -4314,9 +4332,10 @@ def read_observations(source: _Path, *, every: int = 1, most: Optional[int] = No
     >>> import semfm, tempfile
     >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
     >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
-    >>> path = semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames)
-    >>> for seen in semfm.read_observations(path, every=2):
-    ...     print(seen, round(float(seen.depth[0, 0]), 3))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = semfm.write_observations(folder + "/seen.mcap", frames)
+    ...     for seen in semfm.read_observations(path, every=2):
+    ...         print(seen, round(float(seen.depth[0, 0]), 3))
     Observation(64 × 48, depth) 0.5
     Observation(64 × 48, depth) 0.7
     """
@@ -4418,7 +4437,8 @@ def run(recipe: _Path, output: _Path, *, cache: bool = True, progress: Optional[
     """Goes from pictures of a demonstration to a grasp by one recipe: pose, region, transfer, grasps and motion.
 
     The same as ``semfm-cli run``: each stage keeps its files in a folder of its own and is done again only when
-    something that it was made from has changed. `docs/observations.md` tells of recipes and stages.
+    something that it was made from has changed. `docs/observations.md` tells of recipes and stages. Two runs must not write
+    one folder at once. Where a run is interrupted, the stage at work replaces nothing.
 
     Parameters
     ----------

@@ -47,6 +47,7 @@ class _WithTriangles(Protocol):
 
 _Path = Union[str, os.PathLike[str]]
 _MeshLike = Union["Mesh", _Path, _WithFaces, _WithTriangles]
+_PoseLike = Union[ArrayLike, "Alignment", _Path]
 _Progress = Union[bool, Callable[[str, int, int], object]]
 _Cache = Union[bool, _Path]
 
@@ -62,15 +63,22 @@ PLAIN = {
     "object": "Any",
     "path": "_Path",
     "mesh_like": "_MeshLike",
+    "pose_like": "_PoseLike",
     "progress": "_Progress",
     "cache": "_Cache",
     "scipy.sparse.csc_matrix": "Any",
 }
+#: What an iterator and a sequence hold.
+ITEMS = {"Observations": "Observation", "Grasps": "Grasp"}
+#: Methods whose documentation is Python's own, for a class and its items.
 SPECIAL = {
     "__len__": "def __len__(self) -> int: ...",
     "__eq__": "def __eq__(self, other: object) -> bool: ...",
     "__hash__": "def __hash__(self) -> int: ...",
     "__getattr__": "def __getattr__(self, name: str) -> Any: ...",
+    "__iter__": "def __iter__(self) -> {name}: ...",
+    "__next__": "def __next__(self) -> {item}: ...",
+    "__getitem__": "def __getitem__(self, index: int) -> {item}: ...",
 }
 CLASSES = {name for name, value in vars(_semfm).items() if inspect.isclass(value)}
 
@@ -195,7 +203,8 @@ def klass(value: type) -> list[str]:
         lines.append(f"    def __init__(self{', ' + inside if inside else ''}) -> None: ...")
     for member, found in sorted(vars(value).items()):
         if member in SPECIAL and not (member == "__hash__" and found is None):
-            lines.append(f"    {SPECIAL[member]}")
+            item = ITEMS.get(name, "")
+            lines.append(f"    {SPECIAL[member].format(name=name, item=item)}")
         if member.startswith("_"):
             continue
         if inspect.isgetsetdescriptor(found):

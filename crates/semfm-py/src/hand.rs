@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
+use pyo3::types::{PyBytes, PyDict};
 use semfm::align::Sim3;
 use semfm::demonstration::region_of_hands;
 use semfm::observe::{self, ContactSettings, HandFrame, HandPart, HandShift, read_vertex_ids};
@@ -148,6 +148,19 @@ impl Hand {
         format!("Hand({n} points, {faces} triangles{parts})")
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let py = slf.py();
+        let restore = py.import("semfm._semfm")?.getattr("_restore_hand")?;
+        let hand = slf.get();
+        let shift = hand.shift.map(|shift| {
+            let HandShift { along_axis, residual, scale, n_measured } = shift;
+            (along_axis, residual, scale, n_measured)
+        });
+        let parts = hand.parts().map(|parts| parts.into_iter().map(ToOwned::to_owned).collect());
+        let is_one_sided = hand.inner.is_one_sided();
+        Ok((restore, (hand.points(py)?, Self::faces(slf)?, parts, is_one_sided, shift)))
+    }
+
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
     }
@@ -155,6 +168,52 @@ impl Hand {
     fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
         slf
     }
+}
+
+/// What a pickle holds: points, faces, the names of the points' parts, whether it is one side of a hand, and the shift
+/// (`along_axis`, `residual`, `scale`, `n_measured`).
+type Pickled<'py> = (
+    Bound<'py, PyAny>,
+    Bound<'py, PyAny>,
+    Option<Vec<String>>,
+    bool,
+    Option<(f64, f64, f64, usize)>,
+);
+
+/// A hand out of a pickle.
+#[pyfunction]
+#[pyo3(signature = (points, faces, parts, is_one_sided, shift))]
+pub fn _restore_hand(
+    points: &Bound<'_, PyAny>,
+    faces: &Bound<'_, PyAny>,
+    parts: Option<Vec<String>>,
+    is_one_sided: bool,
+    shift: Option<(f64, f64, f64, usize)>,
+) -> PyResult<Hand> {
+    let py = points.py();
+    let part_of = |name: &String| {
+        let part = HandPart::ALL.into_iter().find(|part| part.name() == name);
+        part.ok_or_else(|| errors::invalid(py, "pickle", "the parts of a hand", name))
+    };
+    let parts =
+        parts.map(|parts| parts.iter().map(part_of).collect::<PyResult<_>>()).transpose()?;
+    let mut hand = Hand::new(points, Some(faces), None)?;
+    let inner = guard(py, || {
+        let hand = (*hand.inner).clone();
+        let hand = if is_one_sided { hand.one_sided() } else { hand };
+        Ok(match parts {
+            Some(parts) => hand.with_parts(parts)?,
+            None => hand,
+        })
+    })?;
+    hand.inner = Arc::new(inner);
+    hand.shift = shift.map(|(along_axis, residual, scale, n_measured)| HandShift {
+        along_axis,
+        residual,
+        scale,
+        n_measured,
+    });
+    Ok(hand)
 }
 
 /// An observation with the place of the hand's mask in it.
@@ -193,11 +252,17 @@ impl SeenHand {
 /// mask : str or (height, width) array_like, optional
 ///     The hand's mask in it: a name, an array of dtype bool, or the only one that there is where none is given.
 /// focal : float, optional
-///     Focal length in pixels that the hand was made with, where it is not the camera's.
+///     Focal length in pixels that the hand was made with, where it is not the camera's; the observation then has a depth
+///     image.
 ///
 /// Returns
 /// -------
 /// Hand
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     `mask` without an observation, `focal` without one that has a depth image: nothing would read them.
 #[pyfunction]
 #[pyo3(signature = (path, *, vertices=None, mirrored=false, observation=None, mask=None, focal=None))]
 pub fn read_hand(
@@ -217,6 +282,13 @@ pub fn read_hand(
         None => None,
     };
     let seen = observation.map(|seen| SeenHand::of(seen, mask)).transpose()?;
+    if seen.is_none() && mask.is_some() {
+        return Err(errors::invalid(py, "mask", "an observation beside it", "none"));
+    }
+    if focal.is_some() && seen.as_ref().is_none_or(|seen| seen.0.depth().is_none()) {
+        let expected = "an observation with a depth image beside it";
+        return Err(errors::invalid(py, "focal", expected, "none"));
+    }
     let (hand, shift) = run(py, None, move |_| {
         let mut hand = observe::read_hand(&path)?;
         if mirrored {
@@ -328,10 +400,10 @@ pub fn _restore_touched_region(
 /// mesh : mesh_like
 /// hands : Hand or list of Hand
 ///     Several are frames of one grasp.
-/// camera_from_object : (4, 4) array_like or Alignment or path or list of Alignment, optional
-///     How the mesh stands before the camera, scale included (`Alignment.camera_from_object`): the hands are then in the
-///     camera's frame. One for all frames, or a list with one for each. Without it mesh and hands are in one frame, in
-///     metres.
+/// camera_from_object : pose_like or list of pose_like, optional
+///     How the mesh stands before the camera, scale included: a (4, 4) matrix, an `Alignment` or the path of its file. The
+///     hands are then in the camera's frame. One for all frames, or a list with one for each. Without it mesh and hands
+///     are in one frame, in metres.
 ///
 /// Returns
 /// -------
@@ -389,18 +461,22 @@ fn hands_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<(Arc<observe::Hand>, Optio
     list.map(|hand| of(&hand?)).collect()
 }
 
-/// A pose, or a list of poses: a list of rows of numbers is one pose.
+/// A pose, or several: of a matrix, what is iterated are rows of numbers.
 fn poses_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Sim3>> {
-    let is_list = value.cast::<PyList>().is_ok() || value.cast::<PyTuple>().is_ok();
-    if is_list && value.len()? > 0 {
-        let first = value.get_item(0)?;
-        let is_pose = first.cast::<Alignment>().is_ok() || first.extract::<PathBuf>().is_ok();
-        let numpy = value.py().import("numpy")?;
-        if is_pose || numpy.call_method1("ndim", (&first,))?.extract::<usize>()? == 2 {
-            let one =
-                |pose: PyResult<Bound<'_, PyAny>>| pose_with_scale(&pose?, "camera_from_object");
-            return value.try_iter()?.map(one).collect();
-        }
+    let is_named = |pose: &Bound<'_, PyAny>| {
+        pose.cast::<Alignment>().is_ok() || pose.extract::<PathBuf>().is_ok()
+    };
+    let several = match value.try_iter() {
+        Ok(several) if !is_named(value) => several.collect::<PyResult<Vec<_>>>()?,
+        _ => Vec::new(),
+    };
+    let n_axes = value.py().import("numpy")?.getattr("ndim")?;
+    let are_poses = match several.first() {
+        Some(first) => is_named(first) || n_axes.call1((first,))?.extract::<usize>()? == 2,
+        None => false,
+    };
+    if !are_poses {
+        return Ok(vec![pose_with_scale(value, "camera_from_object")?]);
     }
-    Ok(vec![pose_with_scale(value, "camera_from_object")?])
+    several.iter().map(|pose| pose_with_scale(pose, "camera_from_object")).collect()
 }

@@ -89,7 +89,9 @@ mod _semfm {
     #[pymodule_export]
     use crate::gripper::{_restore_gripper, Gripper};
     #[pymodule_export]
-    use crate::hand::{_restore_touched_region, Hand, TouchedRegion, find_contact, read_hand};
+    use crate::hand::{
+        _restore_hand, _restore_touched_region, Hand, TouchedRegion, find_contact, read_hand,
+    };
     #[pymodule_export]
     use crate::interruptible::{_work_for_tests, get_num_threads, set_num_threads};
     #[pymodule_export]

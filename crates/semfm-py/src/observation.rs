@@ -7,13 +7,15 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
 use semfm::ObjectFrame;
 use semfm::geom::math::{DAffine3, DVec3};
-use semfm::observe::{self, ObservationFiles, SeenObject, SurfaceSettings, depth_of_numbers};
+use semfm::observe::{self, ObservationFiles, SeenObject, depth_of_numbers};
 use semfm_show::write_sheet;
 
 use crate::arrays_in::{self, Axis};
 use crate::interruptible::{guard, run};
-use crate::observation_parts::{Pictures, axes, given_pose, lens_of, mask_files, masks_of};
-use crate::observed_object::ObservedObject;
+use crate::observation_parts::{
+    Pictures, axes, check_scale, given_pose, lens_of, mask_files, masks_of,
+};
+use crate::observed_object::{ObservedObject, surface_settings};
 use crate::pinhole::{Pinhole, camera_of_matrix, pose_of, rows_and_columns};
 use crate::{arrays_out, errors, pictures};
 
@@ -38,8 +40,9 @@ use crate::{arrays_out, errors, pictures};
 ///     Which pixels show what, of dtype bool, by name; those of a list are called 0, 1 and so on.
 /// distortion : (c,) array_like, optional
 ///     Coefficients of the lens in OpenCV's order; the pictures come out without distortion.
-/// distortion_model : str, default "plumb_bob"
-///     ``"plumb_bob"`` or ``"rational_polynomial"`` (4, 5 or 8 coefficients), or ``"equidistant"`` (4, a fisheye).
+/// distortion_model : str, optional
+///     ``"plumb_bob"`` or ``"rational_polynomial"`` (4, 5 or 8 coefficients), or ``"equidistant"`` (4, a fisheye);
+///     ``"plumb_bob"`` where none is given.
 /// camera_from_world : (4, 4) array_like, optional
 ///     Where the camera stood; that of a `Pinhole`, else its own frame is the world, where none is given.
 /// time_nanos : int, optional
@@ -48,7 +51,8 @@ use crate::{arrays_out, errors, pictures};
 /// Raises
 /// ------
 /// InvalidInput
-///     Pictures of different sizes, a mask that marks nothing, no depth at all in a depth image.
+///     Pictures of different sizes, a mask that marks nothing or everything, an argument that nothing would read
+///     (`depth_scale` without `depth`). A depth image in which nothing came back is none of it.
 ///
 /// Examples
 /// --------
@@ -74,7 +78,7 @@ impl Observation {
     #[new]
     #[pyo3(signature = (
         intrinsics, *, color=None, depth=None, depth_scale=None, cloud=None, masks=None, distortion=None,
-        distortion_model="plumb_bob", camera_from_world=None, time_nanos=None
+        distortion_model=None, camera_from_world=None, time_nanos=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments, one for each part")]
     fn new(
@@ -85,11 +89,12 @@ impl Observation {
         cloud: Option<&Bound<'_, PyAny>>,
         masks: Option<&Bound<'_, PyAny>>,
         distortion: Option<&Bound<'_, PyAny>>,
-        distortion_model: &str,
+        distortion_model: Option<&str>,
         camera_from_world: Option<&Bound<'_, PyAny>>,
         time_nanos: Option<u64>,
     ) -> PyResult<Self> {
         let py = intrinsics.py();
+        check_scale(py, depth_scale, depth.is_some())?;
         let given = intrinsics.cast::<Pinhole>().ok().map(|pinhole| pinhole.get().camera);
         let size = given.map(|camera| [camera.height() as usize, camera.width() as usize]);
         let Pictures { size, color, depth } = Pictures::of(size, color, depth)?;
@@ -142,9 +147,9 @@ impl Observation {
     /// intrinsics : path
     ///     The camera (JSON); a lens that distorts is taken out of the pictures.
     /// color : path, optional
-    ///     A PNG or JPEG.
+    ///     A PNG, JPEG or EXR.
     /// depth : path, optional
-    ///     A 16-bit PNG or .npy, registered to the colour.
+    ///     A 16-bit PNG, an EXR or .npy, registered to the colour.
     /// depth_scale : float, optional
     ///     Units of the depth to the metre; 1000 for whole numbers and 1 for floats where none is given.
     /// mask : path or list of path or dict, optional
@@ -172,6 +177,7 @@ impl Observation {
         hand_mask: Option<&Bound<'_, PyAny>>,
         camera_from_world: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        check_scale(py, depth_scale, depth.is_some())?;
         let mut masks = mask_files(mask)?;
         masks.extend(mask_files(hand_mask)?.into_iter().map(|hand| hand.named("hand")));
         let camera_from_world = camera_from_world.map(given_pose).transpose()?;
@@ -333,7 +339,7 @@ impl Observation {
         trim_pixels: usize,
         most_vertices: usize,
     ) -> PyResult<ObservedObject> {
-        let settings = SurfaceSettings { smooth_pixels, trim_pixels, most_vertices };
+        let settings = surface_settings(py, smooth_pixels, trim_pixels, most_vertices)?;
         ObservedObject::new(py, vec![self.frame(py, mask)?], settings)
     }
 

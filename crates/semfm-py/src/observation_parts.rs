@@ -78,15 +78,32 @@ pub fn masks_of(masks: &Bound<'_, PyAny>, size: [usize; 2]) -> PyResult<Vec<(Str
     named.into_iter().map(checked).collect()
 }
 
-/// The lens of these coefficients; `None` where it bends nothing.
+/// Refuses a scale that no depth is read with.
+pub fn check_scale(py: Python<'_>, scale: Option<f64>, has_depth: bool) -> PyResult<()> {
+    match scale {
+        Some(_) if !has_depth => {
+            Err(errors::invalid(py, "depth_scale", "`depth` beside it", "none"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The lens of these coefficients, of `plumb_bob` where no model is named; `None` where it bends nothing.
 pub fn lens_of(
     py: Python<'_>,
     coefficients: Option<&Bound<'_, PyAny>>,
-    model: &str,
+    model: Option<&str>,
 ) -> PyResult<Option<Distortion>> {
-    let Some(coefficients) = coefficients else { return Ok(None) };
+    let Some(coefficients) = coefficients else {
+        return match model {
+            Some(_) => {
+                Err(errors::invalid(py, "distortion_model", "`distortion` beside it", "none"))
+            }
+            None => Ok(None),
+        };
+    };
     let (numbers, _) = arrays_in::floats(coefficients, "distortion", &[Axis::Any("c")])?;
-    match model {
+    match model.unwrap_or("plumb_bob") {
         "plumb_bob" | "rational_polynomial" => guard(py, || Ok(Distortion::brown(&numbers)?)),
         "equidistant" => guard(py, || Ok(Some(Distortion::equidistant(&numbers)?))),
         other => {

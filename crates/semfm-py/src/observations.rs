@@ -14,15 +14,19 @@ use crate::observation::{Observation, observation_of};
 
 /// Between two looks at Python's signals.
 const NAP: Duration = Duration::from_millis(40);
-/// Frames that are read ahead.
+/// Frames that are kept beside the one that the reader waits to hand on.
 const AHEAD: usize = 1;
 
 /// The frames of a BOP scene or of a bag, in order: an iterator of `Observation`, made by `read_observations`.
 ///
-/// Files are read as frames are asked for, with one frame read ahead; a bag of any length needs the memory of some frames.
+/// Reading begins at once, in a thread of its own, and stays up to two frames ahead of what was asked for; a source of any
+/// length needs the memory of some frames. What nobody iterates any more is not read on. A process that was forked off has
+/// no such thread: it raises `InvalidInput`.
 #[pyclass(frozen, module = "semfm")]
 pub struct Observations {
     source: PathBuf,
+    /// The process that has the reader's thread.
+    process: u32,
     /// Taken by whoever waits for the next frame, without the interpreter's lock.
     news: Mutex<Option<Receiver<News>>>,
     notes: Mutex<Vec<String>>,
@@ -34,15 +38,22 @@ enum News {
 }
 
 impl Observations {
-    fn open(source: PathBuf, settings: SourceSettings) -> Self {
+    fn open(py: Python<'_>, source: PathBuf, settings: SourceSettings) -> PyResult<Self> {
         let (tell, news) = sync_channel(AHEAD);
         let path = source.clone();
-        std::thread::spawn(move || {
+        let read = move || {
             let end = observe::read_observations(&path, &settings, |seen| tell_of(&tell, seen));
             // Nothing receives any more where the frames were left alone.
             let _ = tell.send(News::End(end.map_err(Into::into)));
-        });
-        Self { source, news: Mutex::new(Some(news)), notes: Mutex::default() }
+        };
+        let reader = std::thread::Builder::new().name("semfm-reader".into()).spawn(read);
+        reader.map_err(|error| errors::no_threads(py, &error.to_string()))?;
+        let process = std::process::id();
+        Ok(Self { source, process, news: Mutex::new(Some(news)), notes: Mutex::default() })
+    }
+
+    fn is_forked(&self) -> bool {
+        self.process != std::process::id()
     }
 
     /// Waits for news, but not for long; `None` after the end.
@@ -63,6 +74,16 @@ fn tell_of(tell: &SyncSender<News>, seen: observe::Observation) -> observe::Resu
     told.map_err(|_| semfm::geom::Error::Cancelled.into())
 }
 
+impl Drop for Observations {
+    fn drop(&mut self) {
+        if self.is_forked() {
+            // Locks may be taken by the reader, which is not here.
+            let news = std::mem::replace(&mut self.news, Mutex::new(None));
+            std::mem::forget(news);
+        }
+    }
+}
+
 #[pymethods]
 impl Observations {
     /// list of str: what was chosen or left out (topics, messages without a counterpart), known at the end.
@@ -76,6 +97,10 @@ impl Observations {
     }
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Observation>> {
+        if self.is_forked() {
+            let expected = "the process that opened them (open the source in each process)";
+            return Err(errors::invalid(py, "observations", expected, "one forked off it"));
+        }
         loop {
             let Some(news) = py.detach(|| self.nap()) else { return Ok(None) };
             match news {
@@ -124,7 +149,8 @@ impl Observations {
 /// Returns
 /// -------
 /// Observations
-///     Each frame is read when it is asked for; what is wrong with the source is raised by then.
+///     Reading begins at once and stays up to two frames ahead; what is wrong with the source is raised when the frame
+///     is asked for that could not be read.
 ///
 /// Examples
 /// --------
@@ -132,9 +158,10 @@ impl Observations {
 /// >>> import semfm, tempfile
 /// >>> k = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]
 /// >>> frames = [semfm.Observation(k, depth=np.full((48, 64), z)) for z in (0.5, 0.6, 0.7)]
-/// >>> path = semfm.write_observations(tempfile.mkdtemp() + "/seen.mcap", frames)
-/// >>> for seen in semfm.read_observations(path, every=2):
-/// ...     print(seen, round(float(seen.depth[0, 0]), 3))
+/// >>> with tempfile.TemporaryDirectory() as folder:
+/// ...     path = semfm.write_observations(folder + "/seen.mcap", frames)
+/// ...     for seen in semfm.read_observations(path, every=2):
+/// ...         print(seen, round(float(seen.depth[0, 0]), 3))
 /// Observation(64 × 48, depth) 0.5
 /// Observation(64 × 48, depth) 0.7
 #[pyfunction]
@@ -164,7 +191,7 @@ pub fn read_observations(
         ..BagSettings::default()
     };
     let bag = bag.with_max_gap(max_gap).map_err(|error| errors::raise(py, &error.into()))?;
-    Ok(Observations::open(source, SourceSettings { bag, every, most }))
+    Observations::open(py, source, SourceSettings { bag, every, most })
 }
 
 /// Writes frames as ``semfm-cli frames`` does.
@@ -184,7 +211,7 @@ pub fn write_observations(path: PathBuf, observations: &Bound<'_, PyAny>) -> PyR
     let list = observations.try_iter();
     let list =
         list.map_err(|_| errors::wrong_type("observations", "Observations", observations))?;
-    let frames = list.map(|seen| Ok((*observation_of(&seen?)?.inner).clone()));
+    let frames = list.map(|seen| Ok(observation_of(&seen?)?.inner.clone()));
     let frames = frames.collect::<PyResult<Vec<_>>>()?;
     let written = path.display().to_string();
     run(observations.py(), None, move |_| Ok(observe::write_observations(&path, &frames)?))?;

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use semfm::files::SurfaceFrame;
 use semfm::geom::ShapeCache;
-use semfm::observe::SurfaceSettings;
+use semfm::observe::{self, SurfaceSettings};
 use semfm::observed_object::ObservedViews;
 use semfm::{Method, ObjectFrame, ObservedObject as Seen, VisibleFrames};
 
@@ -41,10 +41,12 @@ use crate::{arrays_out, errors, json, pictures};
 pub struct ObservedObject {
     inner: Arc<Seen>,
     settings: SurfaceSettings,
+    notes: Vec<String>,
 }
 
-/// What a pickle holds: observations, the places of the object's masks, the settings, and whether it is a merged surface.
-type Pickled = (Vec<Observation>, Vec<Option<usize>>, (usize, usize, usize), bool);
+/// What a pickle holds: observations, the places of the object's masks, the settings, whether it is a merged surface, and
+/// the notes.
+type Pickled = (Vec<Observation>, Vec<Option<usize>>, (usize, usize, usize), bool, Vec<String>);
 
 impl ObservedObject {
     /// Of one frame, in its camera's frame, or of several whose cameras' poses are known.
@@ -54,7 +56,7 @@ impl ObservedObject {
         settings: SurfaceSettings,
     ) -> PyResult<Self> {
         let inner = run(py, None, move |_| Seen::new(frames, &settings))?;
-        Ok(Self { inner: Arc::new(inner), settings })
+        Ok(Self { inner: Arc::new(inner), settings, notes: Vec::new() })
     }
 
     /// In the frame of the cameras' poses.
@@ -62,9 +64,10 @@ impl ObservedObject {
         py: Python<'_>,
         frames: Vec<ObjectFrame>,
         settings: SurfaceSettings,
+        notes: Vec<String>,
     ) -> PyResult<Self> {
         let inner = run(py, None, move |_| Seen::merged(frames, &settings))?;
-        Ok(Self { inner: Arc::new(inner), settings })
+        Ok(Self { inner: Arc::new(inner), settings, notes })
     }
 }
 
@@ -100,6 +103,12 @@ impl ObservedObject {
     fn observations(&self) -> Vec<Observation> {
         let observation = |frame: &ObjectFrame| Observation { inner: frame.seen.clone() };
         self.inner.frames().iter().map(observation).collect()
+    }
+
+    /// list of str: which frames `merged_surface` left out, and why, as ``semfm-cli surface --merge`` prints it.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
     }
 
     /// list of Pinhole: the cameras in the frame of `mesh`.
@@ -228,7 +237,7 @@ impl ObservedObject {
         let SurfaceSettings { smooth_pixels, trim_pixels, most_vertices } = self.settings;
         let settings = (smooth_pixels, trim_pixels, most_vertices);
         let is_merged = self.inner.frame() == SurfaceFrame::World;
-        Ok((restore, (self.observations(), masks, settings, is_merged)))
+        Ok((restore, (self.observations(), masks, settings, is_merged, self.notes())))
     }
 
     fn __copy__(slf: Py<Self>) -> Py<Self> {
@@ -248,15 +257,39 @@ pub fn _restore_observed_object(
     masks: Vec<Option<usize>>,
     settings: (usize, usize, usize),
     is_merged: bool,
+    notes: Vec<String>,
 ) -> PyResult<ObservedObject> {
     let frames = observations.iter().zip(masks);
     let frames = frames.map(|(seen, mask)| ObjectFrame { seen: seen.get().inner.clone(), mask });
     let (smooth_pixels, trim_pixels, most_vertices) = settings;
     let settings = SurfaceSettings { smooth_pixels, trim_pixels, most_vertices };
     match is_merged {
-        true => ObservedObject::merged(py, frames.collect(), settings),
+        true => ObservedObject::merged(py, frames.collect(), settings, notes),
         false => ObservedObject::new(py, frames.collect(), settings),
     }
+}
+
+/// The settings of a surface; what is wrong with them is named as the argument.
+pub fn surface_settings(
+    py: Python<'_>,
+    smooth_pixels: usize,
+    trim_pixels: usize,
+    most_vertices: usize,
+) -> PyResult<SurfaceSettings> {
+    let settings = SurfaceSettings { smooth_pixels, trim_pixels, most_vertices };
+    settings.check().map_err(|error| match error {
+        observe::Error::Invalid { what, expected, found } => {
+            let argument = match what.as_str() {
+                "smooth" => "smooth_pixels",
+                "trim" => "trim_pixels",
+                "vertices" => "most_vertices",
+                other => other,
+            };
+            errors::invalid(py, argument, &expected, &found)
+        }
+        other => errors::raise(py, &other.into()),
+    })?;
+    Ok(settings)
 }
 
 /// One surface of what several frames saw from known places: ``semfm-cli surface --merge``.
@@ -267,7 +300,7 @@ pub fn _restore_observed_object(
 ///     Their cameras' poses are known (`Observation.camera`), and the object stands still in them.
 /// mask : str, optional
 ///     Name of the object's mask; the only one of each frame where none is given. Frames that have none, or no depth under
-///     it, are left out.
+///     it, are left out: `ObservedObject.notes` says which.
 /// smooth_pixels : int, default 3
 ///     Radius of the window in which depth is smoothed, 0 to 20.
 /// trim_pixels : int, default 1
@@ -286,6 +319,8 @@ pub fn merged_surface(
     trim_pixels: usize,
 ) -> PyResult<ObservedObject> {
     let py = observations.py();
+    let most_vertices = SurfaceSettings::default().most_vertices;
+    let settings = surface_settings(py, smooth_pixels, trim_pixels, most_vertices)?;
     let list = observations.try_iter();
     let list =
         list.map_err(|_| errors::wrong_type("observations", "Observations", observations))?;
@@ -293,6 +328,5 @@ pub fn merged_surface(
     let seen = seen.collect::<PyResult<Vec<_>>>()?;
     let object = mask.map(ToOwned::to_owned);
     let visible = run(py, None, move |_| VisibleFrames::of(seen, object.as_deref()))?;
-    let settings = SurfaceSettings { smooth_pixels, trim_pixels, ..SurfaceSettings::default() };
-    ObservedObject::merged(py, visible.frames, settings)
+    ObservedObject::merged(py, visible.frames, settings, visible.left_out)
 }

@@ -182,7 +182,8 @@ pub fn _restore_run_result(py: Python<'_>, text: &str, folder: PathBuf) -> PyRes
 /// Goes from pictures of a demonstration to a grasp by one recipe: pose, region, transfer, grasps and motion.
 ///
 /// The same as ``semfm-cli run``: each stage keeps its files in a folder of its own and is done again only when
-/// something that it was made from has changed. `docs/observations.md` tells of recipes and stages.
+/// something that it was made from has changed. `docs/observations.md` tells of recipes and stages. Two runs must not write
+/// one folder at once. Where a run is interrupted, the stage at work replaces nothing.
 ///
 /// Parameters
 /// ----------

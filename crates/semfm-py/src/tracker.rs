@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::ThreadId;
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -39,7 +40,6 @@ use crate::{arrays_out, errors, gripper, json};
 /// hypotheses : int, default 96
 ///     Poses that are tried in a frame in which the object is not where it was.
 /// seed : int, default 0
-/// progress : progress, optional
 ///
 /// Examples
 /// --------
@@ -64,7 +64,8 @@ pub struct Tracker {
 /// Where the tracker is: work on a pool's thread has it to itself, so that it never waits for a lock.
 enum Slot {
     Free(Box<Following>),
-    Busy,
+    /// Working, for a call of this thread, which waits for it; `None` once that call was interrupted.
+    Busy(Option<ThreadId>),
     /// Work on it ended with a bug.
     Gone,
 }
@@ -89,18 +90,59 @@ fn locked(slot: &Mutex<Slot>) -> MutexGuard<'_, Slot> {
     slot.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// A call that waits for work on the tracker; when it ends, whatever the work does, its thread may call again.
+struct Call<'a> {
+    slot: &'a Mutex<Slot>,
+    thread: ThreadId,
+}
+
+impl Drop for Call<'_> {
+    fn drop(&mut self) {
+        if let Slot::Busy(thread) = &mut *locked(self.slot) {
+            *thread = thread.filter(|thread| *thread != self.thread);
+        }
+    }
+}
+
+/// What became of an attempt to take the tracker.
+enum Attempt {
+    Taken(Taken),
+    Busy,
+    /// Taken by a call of the same thread, which cannot end before this one.
+    Within,
+    Gone,
+}
+
 impl Tracker {
+    fn try_to_take(&self, thread: ThreadId) -> Attempt {
+        let mut slot = locked(&self.following);
+        match std::mem::replace(&mut *slot, Slot::Busy(Some(thread))) {
+            Slot::Free(following) => {
+                Attempt::Taken(Taken { slot: self.following.clone(), following: Some(following) })
+            }
+            Slot::Busy(other) => {
+                *slot = Slot::Busy(other);
+                if other == Some(thread) { Attempt::Within } else { Attempt::Busy }
+            }
+            Slot::Gone => {
+                *slot = Slot::Gone;
+                Attempt::Gone
+            }
+        }
+    }
+
     /// Waits, without the interpreter's lock, for the frames of other threads.
-    fn taken(&self, py: Python<'_>) -> PyResult<Taken> {
+    fn taken(&self, py: Python<'_>, thread: ThreadId) -> PyResult<Taken> {
         loop {
-            match std::mem::replace(&mut *locked(&self.following), Slot::Busy) {
-                Slot::Free(following) => {
-                    let slot = self.following.clone();
-                    return Ok(Taken { slot, following: Some(following) });
+            match self.try_to_take(thread) {
+                Attempt::Taken(taken) => return Ok(taken),
+                Attempt::Busy => {}
+                Attempt::Within => {
+                    let expected = "calls after the one that is at work";
+                    let found = "one from within it (by a signal's handler)";
+                    return Err(errors::invalid(py, "tracker", expected, found));
                 }
-                Slot::Busy => {}
-                Slot::Gone => {
-                    *locked(&self.following) = Slot::Gone;
+                Attempt::Gone => {
                     return Err(errors::internal(py, "this tracker was lost by an earlier one"));
                 }
             }
@@ -113,11 +155,12 @@ impl Tracker {
     fn with<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        progress: Option<&Bound<'_, PyAny>>,
         work: impl FnOnce(&mut Following, &semfm::Task) -> semfm::Result<T> + Send + 'static,
     ) -> PyResult<T> {
-        let mut taken = self.taken(py)?;
-        run(py, progress, move |task| match &mut taken.following {
+        let thread = std::thread::current().id();
+        let mut taken = self.taken(py, thread)?;
+        let _call = Call { slot: &self.following, thread };
+        run(py, None, move |task| match &mut taken.following {
             Some(following) => work(following, task),
             None => Err(semfm::geom::Error::Cancelled.into()),
         })
@@ -127,7 +170,7 @@ impl Tracker {
 #[pymethods]
 impl Tracker {
     #[new]
-    #[pyo3(signature = (mesh, *, init=None, scale=None, region=None, hypotheses=96, seed=0, progress=None))]
+    #[pyo3(signature = (mesh, *, init=None, scale=None, region=None, hypotheses=96, seed=0))]
     fn new(
         mesh: &Bound<'_, PyAny>,
         init: Option<&Bound<'_, PyAny>>,
@@ -135,7 +178,6 @@ impl Tracker {
         region: Option<&Bound<'_, PyAny>>,
         hypotheses: usize,
         seed: u64,
-        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let py = mesh.py();
         let mesh = from_any(mesh, "mesh")?;
@@ -143,7 +185,7 @@ impl Tracker {
         let init = init.map(|init| pose_with_scale(init, "init")).transpose()?;
         let settings = TrackSettings { init, scale, hypotheses, seed };
         let shape = mesh.clone();
-        let following = run(py, progress, move |task| {
+        let following = run(py, None, move |task| {
             let following = Following::new(&shape, &settings, task)?;
             Ok(match region {
                 Some(region) => following.with_region(region.weights())?,
@@ -156,7 +198,8 @@ impl Tracker {
 
     /// The object in the next frame.
     ///
-    /// Where the call is interrupted, the frame counts as one that was seen.
+    /// Where the call is interrupted, the frame counts as one that was seen. Calls of several threads wait for each other;
+    /// one from within another, by a signal's handler, raises `InvalidInput`.
     ///
     /// Parameters
     /// ----------
@@ -165,17 +208,15 @@ impl Tracker {
     /// mask : str or (height, width) array_like, optional
     ///     The object's mask, which helps to find it: a name, an array of dtype bool, or the only one that there is where
     ///     none is given. That a frame has no mask of the name says that the object is not visible in it.
-    /// progress : progress, optional
     ///
     /// Returns
     /// -------
     /// TrackedPose
-    #[pyo3(signature = (observation, *, mask=None, progress=None))]
+    #[pyo3(signature = (observation, *, mask=None))]
     fn update(
         &self,
         observation: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
-        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<TrackedPose> {
         let py = observation.py();
         let seen = observation_of(observation)?;
@@ -185,7 +226,7 @@ impl Tracker {
             }
             _ => seen.frame(py, mask)?,
         };
-        let record = self.with(py, progress, move |tracker, task| {
+        let record = self.with(py, move |tracker, task| {
             let frame = DepthFrame {
                 depth: frame.seen.depth_image()?,
                 camera: frame.seen.camera(),
@@ -201,7 +242,7 @@ impl Tracker {
     /// where the mesh has it; None without a region.
     #[getter]
     fn refined_region(&self, py: Python<'_>) -> PyResult<Option<Region>> {
-        let region = self.with(py, None, |tracker, _| {
+        let region = self.with(py, |tracker, _| {
             let weights = tracker.refined_region()?;
             Ok(weights.map(semfm::Region::from_weights).transpose()?)
         })?;
