@@ -1,5 +1,7 @@
 """What a depth camera saw: as an object that a region is carried to, and from frame to frame."""
 
+import tempfile
+
 import numpy as np
 import semfm
 
@@ -23,8 +25,10 @@ def main() -> None:
 
     # Where the whole mesh is known, it is followed: each frame has a pose, a probability and a state.
     tracker = semfm.Tracker(metres, scale=1.0)
-    for frame in frames:
-        print(tracker.update(frame))
+    with tempfile.TemporaryDirectory() as folder:
+        bag = semfm.write_observations(f"{folder}/seen.mcap", frames)
+        for frame in semfm.read_observations(bag):
+            print(tracker.update(frame))
 
 
 def seen(mesh: semfm.Mesh) -> semfm.Observation:

@@ -76,6 +76,10 @@ def test_a_reconstructed_hand_touches_what_the_shell_says(scene, tmp_path):
     each = semfm.find_contact(mug, [hand, hand], camera_from_object=[pose, pose])
     assert each.region == twice.region
     np.testing.assert_allclose(each.region.weights, touched.region.weights, atol=1e-12)
+    aligned = folder / "aligned.json"
+    for poses in ((aligned, pose), iter([aligned] * 2), np.stack([pose, pose]), pose.tolist()):
+        again = semfm.find_contact(mug, [hand, hand], camera_from_object=poses)
+        assert again.region == twice.region
 
 
 def test_a_mask_with_depth_is_a_hand_as_for_the_shell(scene):
@@ -93,6 +97,23 @@ def test_a_mask_with_depth_is_a_hand_as_for_the_shell(scene):
     assert (folder / "python2.json").read_bytes() == (folder / "shell2.json").read_bytes()
 
 
+def test_a_pickled_hand_touches_the_same(scene):
+    folder, pose, files = scene
+    seen = semfm.Observation.read(**files)
+    joints = np.linspace([-0.1, 0, 0.5], [0.1, 0.1, 0.6], 21)
+    file = semfm.read_hand(folder / "hand.obj", observation=seen)
+    hands = [file, semfm.Hand.from_mask(seen), semfm.Hand(file.points, file.faces, joints=joints)]
+    for hand in hands:
+        again = pickle.loads(pickle.dumps(hand))
+        assert np.array_equal(again.points, hand.points) and again.shift == hand.shift
+        assert np.array_equal(again.faces, hand.faces) and again.parts == hand.parts
+        touched = [
+            semfm.find_contact(folder / "mug.obj", one, camera_from_object=pose)
+            for one in (hand, again)
+        ]
+        assert touched[0].region == touched[1].region and touched[0].report == touched[1].report
+
+
 def test_hands_are_arrays(scene):
     folder, _, files = scene
     hand = semfm.read_hand(folder / "hand.obj")
@@ -108,6 +129,7 @@ def test_hands_are_arrays(scene):
     np.testing.assert_allclose(mirrored.points, hand.points * [-1, 1, 1])
     assert len(semfm.read_hand(folder / "hand.obj", vertices=np.arange(100))) == 100
     mug = semfm.Mesh.read(folder / "mug.obj")
+    colours = semfm.Observation.read(files["intrinsics"], color=files["color"], mask=files["mask"])
     wrong = [
         (lambda: semfm.find_contact(mug, semfm.Hand(hand.points + [5, 0, 0])), "hand"),
         (lambda: semfm.find_contact(mug, semfm.Hand(1000 * hand.points)), "millimetres"),
@@ -115,6 +137,9 @@ def test_hands_are_arrays(scene):
         (lambda: semfm.find_contact(mug, [hand] * 3, camera_from_object=[np.eye(4)] * 2), "one for each hand"),
         (lambda: semfm.Hand([[0, 0, 0]]), "at least 3 points"),
         (lambda: semfm.read_hand(folder / "hand.obj", vertices=[10**6]), "ids below"),
+        (lambda: semfm.read_hand(folder / "hand.obj", mask="object"), "an observation beside"),
+        (lambda: semfm.read_hand(folder / "hand.obj", focal=500.0), "a depth image beside"),
+        (lambda: semfm.read_hand(folder / "hand.obj", focal=500.0, observation=colours), "a depth image beside"),
         (lambda: semfm.Hand.from_mask(semfm.Observation.read(files["intrinsics"], depth=files["depth"])), "hand"),
     ]  # fmt: skip
     for call, words in wrong:
