@@ -101,7 +101,9 @@ impl Steps<'_> {
     fn pytest(&self, tests: &str, more: &[&str], samples: Option<&Path>) -> Result<Tally> {
         let python = self.workspace.root.join(".venv/bin/python");
         let arguments = [&["-m", "pytest", "-ra", "--durations=10", tests], more].concat();
-        let mut process = self.with_settings(program(self.workspace, &python, &arguments))?;
+        let mut process = self
+            .with_settings(program(self.workspace, &python, &arguments))?
+            .env("SEMFM_CLI", self.workspace.built("debug/semfm-cli"));
         if let Some(samples) = samples {
             process = process.env("SEMFM_SAMPLES", samples);
         }
