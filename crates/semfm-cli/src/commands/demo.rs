@@ -270,7 +270,8 @@ fn recipe_of_pictures(meshes: [&PathBuf; 2], arm: &DemoArm) -> String {
         "# A hand on one object, and another object of its kind before an arm: semfm-cli run demo.toml -o run\n\
          # All keys: semfm-cli run --template\n\n\
          title = \"From a hand on one object to a grasp on another\"\n\n\
-         [demonstration]\nmesh = \"../{source}\"\n\n\
+         [demonstration]\nmesh = \"../{source}\"\n\
+         grow = true                              # what the hand touched, completed to the part that it belongs to\n\n\
          [[demonstration.frames]]\n\
          color = \"demonstration/color.png\"\n\
          depth = \"demonstration/depth.png\"        # millimetres\n\
