@@ -9,7 +9,9 @@ use semfm::files::{
     FileHash, NoAnswerRecord, RUN_FILE, RUN_FORMAT, RunFile, RunStageRecord, STAGE_FILE,
     STAGE_FORMAT, StageFile, StageState,
 };
-use semfm::geom::io::{FormatError, ReadFiles, StagedFolder, is_same_file, refuse_to_overwrite};
+use semfm::geom::io::{
+    FormatError, ReadFiles, StagedFolder, TEMPORARY_PREFIX, is_same_file, refuse_to_overwrite,
+};
 use semfm::geom::{Error as GeomError, ShapeCache};
 
 use crate::fingerprint::{Begin, hashes, of_settings};
@@ -136,7 +138,10 @@ impl Run {
         let mut no_answer: Option<NoAnswerRecord> = None;
         for stage in self.stages() {
             let (state, file) = match self.kept(stage) {
-                Ok(file) => (StageState::Kept, file),
+                Ok(file) => {
+                    remove_left_behind(&self.folder(stage));
+                    (StageState::Kept, file)
+                }
                 Err(why) => {
                     tell(RunProgress::Begun { stage, why: &why });
                     self.forget_page()?;
@@ -323,6 +328,16 @@ impl Run {
             }
         }
         Ok(())
+    }
+}
+
+/// Removes what a run left in a stage's folder that was killed after it had put the record there, where it can be removed.
+fn remove_left_behind(folder: &Path) {
+    let mut names = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_left =
+        |entry: fs::DirEntry| entry.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX);
+    if names.any(is_left) {
+        let _ = StagedFolder::new(folder); // making one removes those that nobody holds
     }
 }
 
