@@ -4,8 +4,8 @@ use std::path::Path;
 
 use semfm::align::Sim3;
 use semfm::files::{
-    GraspsFile, NoAnswerRecord, PointMapFile, RunStageRecord, StageState, TransferredRegionFile,
-    read_pose, read_region,
+    GraspsFile, NoAnswerRecord, PointMapFile, RunStageRecord, SURFACE_MESH, StageState,
+    TransferredRegionFile, read_pose, read_region,
 };
 use semfm::geom::io::{read_file, read_json, read_mesh};
 use semfm::observe::Observation;
@@ -17,7 +17,7 @@ use semfm_show::{
 use serde_json::Value;
 
 use crate::stages::{
-    CONTACT_FILE, HAND_FILE, SURFACE_FILE, StageContext, aligned_of_frame, observation_of_frame,
+    CONTACT_FILE, HAND_FILE, StageContext, aligned_of_frame, observation_of_frame,
     observation_of_target,
 };
 use crate::{Result, Stage};
@@ -127,7 +127,7 @@ impl Page<'_> {
     fn found_in(&self, photo: &Photo, frame: usize) -> Result<Option<Figure>> {
         let pose = match aligned_of_frame(self.context, frame) {
             // An object without a mesh stands in its camera's frame.
-            None if self.has(Stage::DemonstrationSurface, SURFACE_FILE) => Sim3::IDENTITY,
+            None if self.has(Stage::DemonstrationSurface, SURFACE_MESH) => Sim3::IDENTITY,
             None => return Ok(None),
             Some(aligned) if aligned.is_made_here && !aligned.path.is_file() => return Ok(None),
             Some(aligned) => read_pose(&aligned.path)?,
@@ -233,7 +233,7 @@ impl Page<'_> {
         let recipe = self.context.recipe;
         let pose = match &recipe.target.aligned {
             Some(path) => Some(read_pose(path)?),
-            None if self.has(Stage::TargetSurface, SURFACE_FILE) => Some(Sim3::IDENTITY),
+            None if self.has(Stage::TargetSurface, SURFACE_MESH) => Some(Sim3::IDENTITY),
             None if self.has(Stage::TargetPose, "aligned.json") => {
                 Some(read_pose(&self.context.file(Stage::TargetPose, "aligned.json"))?)
             }

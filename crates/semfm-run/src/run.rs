@@ -10,7 +10,7 @@ use semfm::files::{
     STAGE_FORMAT, StageFile, StageState,
 };
 use semfm::geom::io::{
-    FormatError, ReadFiles, StagedFolder, TEMPORARY_PREFIX, is_same_file, refuse_to_overwrite,
+    FormatError, ReadFiles, StagedFolder, is_same_file, refuse_to_overwrite, remove_left_behind,
 };
 use semfm::geom::{Error as GeomError, ShapeCache};
 
@@ -139,6 +139,7 @@ impl Run {
         for stage in self.stages() {
             let (state, file) = match self.kept(stage) {
                 Ok(file) => {
+                    // Of a run that was killed after it had put the record there.
                     remove_left_behind(&self.folder(stage));
                     (StageState::Kept, file)
                 }
@@ -328,16 +329,6 @@ impl Run {
             }
         }
         Ok(())
-    }
-}
-
-/// Removes what a run left in a stage's folder that was killed after it had put the record there, where it can be removed.
-fn remove_left_behind(folder: &Path) {
-    let mut names = fs::read_dir(folder).into_iter().flatten().flatten();
-    let is_left =
-        |entry: fs::DirEntry| entry.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX);
-    if names.any(is_left) {
-        let _ = StagedFolder::new(folder); // making one removes those that nobody holds
     }
 }
 

@@ -54,7 +54,7 @@ pub use self::printable::{printable, printable_name};
 pub use self::read_files::ReadFiles;
 pub use self::staged_folder::{StagedFolder, shown_path};
 pub use self::target::{check_output, is_stdout};
-pub use self::temporary::TEMPORARY_PREFIX;
+pub use self::temporary::{TEMPORARY_PREFIX, remove_left_behind};
 pub use self::vertex_attributes::VertexAttributes;
 pub use self::write::{write_mesh, write_mesh_in_node, write_mesh_with_attributes};
 use crate::math::DVec3;

@@ -155,7 +155,7 @@ fn hold(file: &File, path: &Path) -> bool {
 
 /// Removes the temporaries that killed processes left in `folder`: those that nobody holds. Each
 /// folder is looked at once in a process.
-pub(super) fn remove_left_behind(folder: &Path) {
+pub fn remove_left_behind(folder: &Path) {
     static SEEN: LazyLock<Mutex<HashSet<PathBuf>>> = LazyLock::new(Mutex::default);
     let Ok(real) = folder.canonicalize() else { return };
     if !SEEN.lock().unwrap_or_else(PoisonError::into_inner).insert(real) {

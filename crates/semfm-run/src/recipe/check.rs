@@ -1,6 +1,8 @@
 //! What a recipe must say besides having the right keys.
 
-use super::{DemonstrationFrame, Recipe};
+use std::path::PathBuf;
+
+use super::{DemonstrationFrame, Recipe, TargetFrame};
 
 /// Something that is missing, or said twice.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +45,7 @@ impl Recipe {
                 };
                 return Some(Fault::new("demonstration.mesh", SEEN, &found));
             };
-            if frame.depth.is_none() || frame.mask.is_none() || frame.intrinsics.is_none() {
+            if !shows_object([&frame.depth, &frame.mask, &frame.intrinsics]) {
                 return Some(Fault::new("demonstration.mesh", SEEN, "neither"));
             }
             let poses = [("aligned", frame.aligned.is_some()), ("init", frame.init.is_some())];
@@ -53,12 +55,10 @@ impl Recipe {
             }
         }
         if target.mesh.is_none() {
-            let Some(frame) = &target.frame else {
+            let shows = |f: &&TargetFrame| shows_object([&f.depth, &f.mask, &f.intrinsics]);
+            let Some(frame) = target.frame.as_ref().filter(shows) else {
                 return Some(Fault::new("target.mesh", SEEN, "neither"));
             };
-            if frame.depth.is_none() || frame.mask.is_none() || frame.intrinsics.is_none() {
-                return Some(Fault::new("target.mesh", SEEN, "neither"));
-            }
             let poses = [
                 ("target.scale", target.scale.is_some()),
                 ("target.aligned", target.aligned.is_some()),
@@ -270,6 +270,11 @@ impl DemonstrationFrame {
     fn needs_camera(&self) -> bool {
         self.depth.is_some() || self.hand_mask.is_some() || self.region_mask.is_some()
     }
+}
+
+/// Whether all that a surface is made of is given: depth, mask and intrinsics.
+fn shows_object(files: [&Option<PathBuf>; 3]) -> bool {
+    files.iter().all(|file| file.is_some())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use semfm::demonstration::is_one_sided;
-use semfm::files::{read_aligned, read_obstacle, read_region};
+use semfm::files::{SURFACE_AROUND, read_aligned, read_obstacle, read_region};
 use semfm::geom::io::read_mesh;
 use semfm::geom::math::DVec3;
 use semfm::grasp::{ApproachCone, GraspSettings, Grasps};
@@ -15,7 +15,6 @@ use semfm_show::write_grasp_picture;
 
 use super::pose::ALIGNED_FILE;
 use super::region::REGION_FILE;
-use super::surface::AROUND_FILE;
 use super::{StageContext, StageEnd, no_answer};
 use crate::recipe::{GraspTable, TableValue};
 use crate::{Result, Stage};
@@ -83,7 +82,7 @@ fn request(context: &StageContext<'_>, mesh: &Mesh) -> Result<GraspRequest> {
 fn observed_request(context: &StageContext<'_>) -> Result<GraspRequest> {
     let mut request = GraspRequest::new(1.0);
     request.camera_from_object = Some(Pose::IDENTITY);
-    let around = context.file(Stage::TargetSurface, AROUND_FILE);
+    let around = context.file(Stage::TargetSurface, SURFACE_AROUND);
     if around.is_file() {
         request.obstacles.push(read_obstacle(&around)?);
     }

@@ -10,7 +10,7 @@ mod transfer;
 use std::path::{Path, PathBuf};
 
 use semfm::Task;
-use semfm::files::NoAnswerRecord;
+use semfm::files::{NoAnswerRecord, SURFACE_MESH};
 
 use crate::recipe::Recipe;
 use crate::{Result, Stage};
@@ -49,13 +49,13 @@ impl StageContext<'_> {
 
     /// The demonstrated object: the recipe's mesh, or the surface that was seen.
     pub fn source_mesh(&self) -> PathBuf {
-        let seen = || self.file(Stage::DemonstrationSurface, surface::MESH_FILE);
+        let seen = || self.file(Stage::DemonstrationSurface, SURFACE_MESH);
         self.recipe.demonstration.mesh.clone().unwrap_or_else(seen)
     }
 
     /// The target, likewise.
     pub fn target_mesh(&self) -> PathBuf {
-        let seen = || self.file(Stage::TargetSurface, surface::MESH_FILE);
+        let seen = || self.file(Stage::TargetSurface, SURFACE_MESH);
         self.recipe.target.mesh.clone().unwrap_or_else(seen)
     }
 
@@ -81,4 +81,3 @@ fn no_answer(reason: impl Into<String>, next: impl Into<String>) -> Option<NoAns
 
 pub use pose::{aligned_of_frame, observation_of_frame, observation_of_target};
 pub use region::{CONTACT_FILE, HAND_FILE};
-pub use surface::MESH_FILE as SURFACE_FILE;

@@ -11,11 +11,6 @@ use super::transfer::{encoder_files, object_encoder, reads_views, settings};
 use super::{StageContext, StageEnd};
 use crate::Result;
 
-/// The surface, its embeddings, and points of what was seen beside it.
-pub const MESH_FILE: &str = "surface.ply";
-pub const EMBEDDINGS_FILE: &str = "surface.emb.mcap";
-pub const AROUND_FILE: &str = "around.ply";
-
 /// The demonstrated object.
 pub fn demonstration(context: &StageContext<'_>, folder: &Path, task: &Task) -> Result<StageEnd> {
     let frame = context.recipe.demonstration.frames.first().cloned().unwrap_or_default();

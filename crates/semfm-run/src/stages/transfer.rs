@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use semfm::encoder::{BUILTIN_ENCODERS, BuiltinEncoder, OpenSettings, open_encoder};
 use semfm::files::{
-    Provenance, Seeds, TransferInputs, TransferResult, read_embeddings, read_region,
+    Provenance, SURFACE_EMBEDDINGS, Seeds, TransferInputs, TransferResult, read_embeddings,
+    read_region,
 };
 use semfm::fmap::transfer_with_anchors;
 use semfm::geom::ShapeCache;
@@ -17,7 +18,6 @@ use semfm::{
 use semfm_show::{TransferFiles, write_transfer};
 
 use super::region::REGION_FILE;
-use super::surface::EMBEDDINGS_FILE;
 use super::{StageContext, StageEnd, no_answer};
 use crate::fingerprint::files_under;
 use crate::recipe::TransferTable;
@@ -129,7 +129,7 @@ fn features(
     let encoder = object_encoder(context, settings)?;
     // What was seen of an object has its embeddings; those of the other one are made to match.
     let seen = |stage: Stage, mesh: &Option<PathBuf>| {
-        mesh.is_none().then(|| context.file(stage, EMBEDDINGS_FILE))
+        mesh.is_none().then(|| context.file(stage, SURFACE_EMBEDDINGS))
     };
     let seen_source = seen(Stage::DemonstrationSurface, &context.recipe.demonstration.mesh);
     let seen_target = seen(Stage::TargetSurface, &context.recipe.target.mesh);

@@ -107,8 +107,9 @@ pub use stage::{FORMAT as STAGE_FORMAT, FileHash, NoAnswerRecord, STAGE_FILE, St
 pub use stored_transfer::StoredTransfer;
 #[cfg(feature = "mcap")]
 pub use surface::{
-    CameraRecord, FILES as SURFACE_FILES, FORMAT as SURFACE_FORMAT, PixelsRecord, SurfaceFile,
-    SurfaceFrame, SurfaceResult, write_surface,
+    AROUND as SURFACE_AROUND, CameraRecord, EMBEDDINGS as SURFACE_EMBEDDINGS,
+    FILES as SURFACE_FILES, FORMAT as SURFACE_FORMAT, MESH as SURFACE_MESH, PixelsRecord,
+    SurfaceFile, SurfaceFrame, SurfaceResult, write_surface,
 };
 pub use track::{FORMAT as TRACK_FORMAT, PoseEvidenceRecord, TrackLine, TrackedRegionRecord};
 pub use trajectory::{

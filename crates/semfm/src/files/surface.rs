@@ -20,13 +20,13 @@ use crate::observed_object::{ObservedViews, whole_picture};
 /// The format that is written.
 pub const FORMAT: &str = "semfm.surface/1";
 /// The mesh, in the camera's frame, metres.
-const MESH: &str = "surface.ply";
+pub const MESH: &str = "surface.ply";
 /// Its embeddings.
-const EMBEDDINGS: &str = "surface.emb.mcap";
+pub const EMBEDDINGS: &str = "surface.emb.mcap";
 /// The picture as a view of it.
 const VIEWS: &str = "surface.views.mcap";
 /// Points of what is beside it.
-const AROUND: &str = "around.ply";
+pub const AROUND: &str = "around.ply";
 /// What became of what.
 const REPORT: &str = "surface.json";
 /// All of them, the report last.
